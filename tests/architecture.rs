@@ -1,4 +1,4 @@
-//! Holds what ARCHITECTURE.md promises about the crates, and the tidy rules that no compiler knows.
+//! Checks the promises of ARCHITECTURE.md about the crates, and the style rules that no compiler checks.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
@@ -11,7 +11,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Which crates of the project each one may use. A new crate is an entry here and a section in ARCHITECTURE.md.
+/// The crates of the project that each one may use. A new crate needs an entry here and a section in ARCHITECTURE.md.
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
     ("rayfold-files", &["rayfold-scene"]),
@@ -19,6 +19,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),
+    ("rayfold-simulation", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
@@ -55,6 +56,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-tracer",
             "rayfold-gif",
             "rayfold-pipeline",
+            "rayfold-simulation",
             "rayfold-lambda",
             "rayfold-local",
             "rayfold",
@@ -62,10 +64,29 @@ const KNOWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// The crates that turn values into values.
+/// The rooms of the fast tracer, each a folder, in the order of [docs/tracer.md](../docs/tracer.md): a room uses only those
+/// before it.
+const ROOMS: [&str; 14] = [
+    "arithmetic",
+    "rays",
+    "lights",
+    "shapes",
+    "shared",
+    "acceleration",
+    "bodies",
+    "placement",
+    "materials",
+    "build",
+    "transport",
+    "film",
+    "sampled",
+    "probe",
+];
+
+/// The crates of pure functions, without side effects.
 const CORE: [&str; 3] = ["rayfold-scene", "rayfold-tracer", "rayfold-gif"];
 
-/// What opens sockets, reads clocks or draws randomness, by the start of a package's name.
+/// Packages that open sockets, read clocks or draw random numbers, by the start of their names.
 const OUTSIDE_THE_CORE: &[&str] = &[
     "tokio",
     "aws-",
@@ -81,7 +102,7 @@ const OUTSIDE_THE_CORE: &[&str] = &[
     "getrandom",
 ];
 
-/// Lines of a source file; beyond it a file holds more than one responsibility.
+/// The largest number of lines of a source file. A longer file has more than one responsibility.
 const LONGEST_FILE: usize = 800;
 
 #[test]
@@ -145,6 +166,23 @@ fn no_modules_use_one_another_in_a_circle() {
 }
 
 #[test]
+fn rooms_of_the_tracer_use_those_before_them_and_are_small() {
+    let read = |path: &Path| std::fs::read_to_string(path).ok();
+    let source = root().join("crates/tracer/src");
+    let found = circles::upward(&source.join("lib.rs"), &read, "fast", &ROOMS);
+    assert!(
+        found.is_empty(),
+        "uses of later rooms, or rooms that have no place in ROOMS:\n{}",
+        found.join("\n")
+    );
+    for room in ROOMS {
+        let files = rust_files(&source.join("fast").join(room));
+        assert!(room == "probe" || !files.is_empty(), "there is no folder {room}");
+        assert!(files.len() <= 12, "{room} has {} files: more than twelve are two rooms", files.len());
+    }
+}
+
+#[test]
 fn the_core_names_no_file_clock_environment_or_output() {
     let banned =
         ["std::fs", "std::env", "std::net", "std::process", "std::time", "SystemTime", "Instant::now"];
@@ -182,11 +220,13 @@ fn aws_stays_in_the_s3_store_and_the_functions() {
 
 #[test]
 fn source_files_are_short() {
-    for folder in ["crates", "tests", "fuzz"] {
-        for file in rust_files(&root().join(folder)) {
-            let lines = read(&file).lines().count();
-            assert!(lines < LONGEST_FILE, "{} has {lines} lines: split it by responsibility", file.display());
-        }
+    let rust = ["crates", "tests", "fuzz"].map(|folder| rust_files(&root().join(folder)));
+    let page = ["src", "tests"].map(|folder| root().join("crates/studio/web").join(folder));
+    let page = page.map(|folder| files(&folder, &["ts", "tsx", "mjs", "css"]));
+    assert!(page.iter().all(|files| !files.is_empty()), "the page's sources are elsewhere");
+    for file in rust.iter().chain(&page).flatten() {
+        let lines = read(file).lines().count();
+        assert!(lines < LONGEST_FILE, "{} has {lines} lines: split it by responsibility", file.display());
     }
 }
 
@@ -245,13 +285,14 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
-/// The files that crates in `src` begin with: a library, a program, or several.
+/// Returns the root files of the crates in `src`: a library, a program, or several.
 fn crate_roots(src: &Path) -> Vec<PathBuf> {
     let named = ["lib.rs", "main.rs"].map(|name| src.join(name)).into_iter().filter(|path| path.exists());
     named.chain(rust_files(&src.join("bin"))).collect()
 }
 
-/// Of this machine's platform alone: the packages of others need not be on the disk.
+/// Returns the metadata for this machine's platform only, because the packages of other platforms need not be on the
+/// disk.
 fn metadata() -> Value {
     let version = Command::new("rustc").arg("-vV").output().expect("rustc runs");
     let version = String::from_utf8(version.stdout).unwrap();
@@ -284,19 +325,24 @@ fn text<'a>(value: &'a Value, key: &str) -> &'a str {
 }
 
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    let Ok(entries) = std::fs::read_dir(folder) else { return files };
-    for path in entries.map(|entry| entry.unwrap().path()) {
-        if path.is_dir() && !path.ends_with("target") {
-            files.extend(rust_files(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            files.push(path);
-        }
-    }
-    files
+    files(folder, &["rs"])
 }
 
-/// The code that ships: everything before the unit tests, without comments.
+/// Returns the files below a folder with one of the endings; none if there is no such folder.
+fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let Ok(entries) = std::fs::read_dir(folder) else { return found };
+    for path in entries.map(|entry| entry.unwrap().path()) {
+        if path.is_dir() && !path.ends_with("target") {
+            found.extend(files(&path, endings));
+        } else if path.extension().is_some_and(|e| endings.iter().any(|ending| e == *ending)) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Returns the shipped code: everything before the unit tests, without comments.
 fn production(source: &str) -> impl Iterator<Item = &str> {
     source
         .lines()

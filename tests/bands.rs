@@ -1,7 +1,7 @@
-//! Rows of a picture that are drawn by themselves show what the whole picture shows there, bit for bit: however it is cut,
-//! whatever is drawn, with one ray a pixel, with many, and where pixels get as many as their neighbours ask for.
+//! Rows of a picture that are drawn separately equal those of the whole picture, bit for bit. This holds for any
+//! division and any scene, with one ray per pixel, with many, and with adaptive sampling.
 //!
-//! Scenes and cuts are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+//! Scenes and divisions are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -18,7 +18,7 @@ use rayfold_tracer::{Drawing, Exposure, Level, Precision, RenderOptions};
 
 const SEED: u64 = 20_261_123;
 
-/// Three numbers of a line.
+/// Returns three numbers of a line.
 fn triple(v: DVec3) -> String {
     format!(" {:.4} {:.4} {:.4}", v.x, v.y, v.z)
 }
@@ -53,7 +53,7 @@ impl Dice {
         }
     }
 
-    /// A script of some size with any of what a picture can have.
+    /// Returns a script of random size with random features.
     fn script(&mut self, samples: (u32, f64)) -> String {
         let (columns, rows) = (self.0.u32(1..130), self.0.u32(1..260));
         let mut text = format!("Screen {columns} {rows}\n");
@@ -89,7 +89,7 @@ impl Dice {
         for _ in 0..count {
             writeln!(text, "{}", self.object(is_moving)).unwrap();
         }
-        // What is narrower than a pixel.
+        // Objects narrower than a pixel.
         for _ in 0..self.0.u8(0..3) {
             let (a, b, c) = (self.point(3.0), self.point(3.0), self.point(2.0));
             writeln!(text, "Cylinder .002{}{}{}", triple(a), triple(b), self.paint()).unwrap();
@@ -99,7 +99,7 @@ impl Dice {
         text
     }
 
-    /// Rows cut at random, some of them next to each other.
+    /// Returns random ranges of rows, some of them adjacent.
     fn cut(&mut self, height: u32) -> Vec<Range<u32>> {
         let mut edges: Vec<u32> = (0..self.0.usize(1..6)).map(|_| self.0.u32(0..=height)).collect();
         edges.extend([0, height]);
@@ -120,7 +120,7 @@ fn with_drawing<T>(script: &Script, options: &RenderOptions, then: impl FnOnce(&
     then(&Drawing::exposed(Exposure::moving(&scene, &after), options).unwrap())
 }
 
-/// Bands one below the other.
+/// Returns bands joined below each other.
 fn joined(bands: &[RgbImage]) -> Vec<u8> {
     bands.iter().flat_map(|band| band.as_raw()).copied().collect()
 }
@@ -130,7 +130,7 @@ fn hold(dice: &mut Dice, text: &str, options: &RenderOptions) {
     with_drawing(&script, options, |drawing| {
         let whole = drawing.draw().unwrap();
         let cut = dice.cut(whole.height());
-        // Each band by a drawing of its own, as by another process.
+        // Each band is drawn separately, like by another process.
         let draw = |rows: &Range<u32>| {
             with_drawing(&script, options, |drawing| drawing.draw_rows(rows.clone()).unwrap())
         };
@@ -180,7 +180,7 @@ fn bands_of_as_many_rays_as_neighbours_ask_for_are_the_whole() {
     }
 }
 
-/// Slivers along which it goes on from pixel to pixel who gets more rays, from top to bottom, over every cut.
+/// Along slivers the requests for more rays spread from pixel to pixel, from top to bottom, across every division.
 #[test]
 fn what_goes_on_from_neighbour_to_neighbour_goes_on_over_a_cut() {
     let mut dice = Dice::new("slivers over cuts", SEED);
@@ -193,8 +193,8 @@ fn what_goes_on_from_neighbour_to_neighbour_goes_on_over_a_cut() {
     }
 }
 
-/// A line that a few pixels see at first is found along its length, but from each of them no farther than a band's margin: a
-/// cut anywhere changes nothing.
+/// Few pixels see a thin line at first. Adaptive sampling follows the line, but from each pixel no farther than a
+/// band's margin, so a division anywhere changes nothing.
 #[test]
 fn what_would_go_on_for_ever_ends_at_the_margin() {
     let mut dice = Dice::new("a thin line over cuts", SEED);
@@ -209,7 +209,7 @@ fn what_would_go_on_for_ever_ends_at_the_margin() {
     }
 }
 
-/// What numbers of no kernel can hold is drawn one by one.
+/// The plain tracer draws scenes whose values the kernels cannot represent.
 #[test]
 fn bands_of_the_plain_tracer_are_the_whole() {
     let mut dice = Dice::new("bands of the plain tracer", SEED);

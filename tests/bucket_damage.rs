@@ -1,4 +1,4 @@
-//! Damaged files of the object store: damage is noticed, named with its place, and nothing else is lost by it.
+//! Damaged files of the object store: the store detects damage, reports its position, and loses nothing else.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 #![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]
@@ -19,7 +19,7 @@ use process::Process;
 use rayfold_bucket::{Error, Server, check};
 use stage::{BUCKET, Stage, client, failure, options, stage};
 
-/// Beyond this size a body is a file.
+/// Larger bodies are files.
 const LARGE: usize = 200_000;
 
 fn body(number: usize) -> Vec<u8> {
@@ -33,11 +33,11 @@ async fn put(client: &Client, number: usize) {
     put.body(body(number).into()).send().await.unwrap();
 }
 
-/// A folder with 40 objects whose store was killed.
+/// Returns a folder with 40 objects whose store was killed.
 async fn killed() -> tempfile::TempDir {
     loop {
         let folder = killed_once().await;
-        // On a busy machine the database may have caught up in between.
+        // On a busy machine the database may have received the entries already.
         if fs::metadata(folder.path().join("journal")).unwrap().len() > 20_000 {
             return folder;
         }
@@ -56,7 +56,7 @@ async fn killed_once() -> tempfile::TempDir {
     folder
 }
 
-/// Every file of a folder but the lock, with its bytes.
+/// Returns every file of a folder except the lock, with its bytes.
 fn tree(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -77,7 +77,7 @@ fn flip(file: &Path, at: usize) {
     fs::write(file, bytes).unwrap();
 }
 
-/// The files of large bodies, in the order in which they were made.
+/// Returns the files of large bodies, in the order of their creation.
 fn body_files(folder: &Path) -> Vec<PathBuf> {
     tree(&folder.join("bodies")).into_iter().map(|(path, _)| path).collect()
 }
@@ -102,7 +102,7 @@ fn checked(folder: &Path, repair: bool) -> Output {
     command.output().unwrap()
 }
 
-/// The numbers of the objects that are there, whole; that what is there is whole is asserted.
+/// Returns the numbers of the objects that exist. Asserts that each is complete.
 async fn there(client: &Client) -> BTreeSet<usize> {
     let listed = client.list_objects_v2().bucket(BUCKET).send().await.unwrap();
     let mut there = BTreeSet::new();
@@ -167,13 +167,13 @@ async fn a_damaged_journal_is_repaired_to_all_that_can_be_read() {
     let aside = folder.path().join("set-aside-1");
     assert!(fs::read(aside.join("journal")).unwrap() == damaged);
     assert!(fs::read_to_string(aside.join("list.txt")).unwrap().contains("journal: at byte "));
-    // No body is gone: each is in its place, or aside.
+    // No body is lost: each is in its place or set aside.
     for file in large {
         assert!(file.exists() || aside.join(file.file_name().unwrap()).exists(), "{file:?}");
     }
     let process = Process::start(folder.path(), None, None);
     let client = client(process.address());
-    // One batch is lost: here, of one object.
+    // One batch is lost, here of one object.
     assert_eq!(there(&client).await.len(), 39);
     put(&client, 40).await;
     process.kill();
@@ -191,7 +191,7 @@ async fn a_damaged_body_is_never_served_as_whole() {
         let put = client.put_object().bucket(BUCKET).key(size.to_string()).set_checksum_algorithm(sum);
         put.body(vec![7; size].into()).send().await.unwrap();
     }
-    // In parts: the second one will be damaged.
+    // An object in parts. The second part will be damaged.
     let upload = client.create_multipart_upload().bucket(BUCKET).key("parts").send().await.unwrap();
     let mut parts = Vec::new();
     for (number, size) in [(1, 5 * 1024 * 1024), (2, 300_000)] {
@@ -208,7 +208,7 @@ async fn a_damaged_body_is_never_served_as_whole() {
     let read = async |key: &str| {
         let got = client.get_object().bucket(BUCKET).key(key).send().await;
         match got {
-            // Before anything was sent.
+            // The error occurred before anything was sent.
             Err(error) if error.raw_response().is_some() => Err(failure::<(), _>(Err(error)).1),
             Err(_) => Err("broke off".to_owned()),
             Ok(got) => {
@@ -236,18 +236,18 @@ async fn a_damaged_body_is_never_served_as_whole() {
             Err(if key == "parts" { "broke off" } else { "InternalError" }.to_owned()),
             "{key}"
         );
-        // Neither is it copied.
+        // It cannot be copied either.
         let copy = client.copy_object().bucket(BUCKET).key("copy").copy_source(format!("{BUCKET}/{key}"));
         assert_eq!(failure(copy.send().await), (500, "InternalError".into()), "{key}");
         fs::write(&files[file], bytes).unwrap();
         assert!(read(key).await.is_ok(), "{key}");
     }
     flip(&files[1], 5);
-    // A range is not compared, but a part that is asked for as a whole is.
+    // A range is not verified, but a part that is requested as a whole is.
     let part = client.get_object().bucket(BUCKET).key("parts").part_number(2).send().await.unwrap();
     assert_eq!(part.body.collect().await.unwrap().to_vec().len(), 300_000);
     flip(&files[4], 5);
-    // The end may come before the client has read the head.
+    // The connection may end before the client has read the head.
     if let Ok(part) = client.get_object().bucket(BUCKET).key("parts").part_number(2).send().await {
         part.body.collect().await.unwrap_err();
     }
@@ -259,7 +259,7 @@ async fn a_damaged_body_is_never_served_as_whole() {
     assert!(report.damages[1].what.starts_with("part 2: "), "{report:?}");
     let report = check(folder.path(), true).unwrap();
     let aside = report.set_aside.unwrap();
-    // Both parts: the object is no more.
+    // Both parts: the object is lost.
     for file in [1, 3, 4] {
         assert!(
             !files[file].exists() && aside.join(files[file].file_name().unwrap()).exists(),
@@ -273,11 +273,11 @@ async fn a_damaged_body_is_never_served_as_whole() {
     server.stop().await;
 }
 
-/// Whatever bits of the database flip: a request is answered right, or with a clear error, and a repair keeps the rest.
+/// Any bits of the database flip: a request gets a correct reply or a clear error, and a repair keeps the rest.
 #[tokio::test]
 async fn thirty_flipped_bits_in_the_database_end_in_clear_errors() {
     let folder = killed().await;
-    // The database has everything, the journal nothing.
+    // The database has all entries, the journal none.
     let server = Server::start(options(folder.path(), None)).await.unwrap();
     server.stop().await;
     let undamaged = tree(folder.path());
@@ -317,13 +317,13 @@ async fn thirty_flipped_bits_in_the_database_end_in_clear_errors() {
         println!("{} damages, {} objects left", report.damages.len(), report.objects);
         if report.set_aside.is_some() {
             let server = Server::start(options(folder.path(), None)).await.unwrap();
-            // The bucket may be among what was lost.
+            // The bucket may be among the lost entries.
             let _ = client(server.address()).create_bucket().bucket(BUCKET).send().await;
             assert_eq!(there(&client(server.address())).await.len() as u64, report.objects);
             server.stop().await;
             assert_eq!(check(folder.path(), false).unwrap().damages, []);
         }
-        // Back to the start.
+        // Restores the original state.
         for entry in fs::read_dir(folder.path()).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() { fs::remove_dir_all(path).unwrap() } else { fs::remove_file(path).unwrap() }
@@ -335,7 +335,7 @@ async fn thirty_flipped_bits_in_the_database_end_in_clear_errors() {
     }
 }
 
-/// A large store whose objects were deleted takes little room.
+/// A large store needs little space after its objects were deleted.
 #[tokio::test]
 async fn a_database_that_has_shrunk_by_half_is_compacted() {
     let Stage { server, client, folder } = stage().await;

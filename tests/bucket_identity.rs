@@ -1,5 +1,5 @@
-//! Sessions as clients meet them: AWS's own STS and S3 clients against the store. What a policy means is judged beside the
-//! code (`policy`); here it is that every request asks, and what the answers are.
+//! Sessions from the client's side: AWS's own STS and S3 clients against the store. The unit tests of `policy` check
+//! the meaning of policies. Here every request must check the policy, and the replies are verified.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
@@ -50,7 +50,7 @@ fn sts(server: &Server, credentials: Credentials) -> aws_sdk_sts::Client {
     aws_sdk_sts::Client::from_conf(config.build())
 }
 
-/// The keys of a session that may do what the statements say.
+/// Returns the keys of a session with these policy statements.
 async fn assume(server: &Server, statements: &str) -> Credentials {
     let policy = format!(r#"{{"Version":"2012-10-17","Statement":[{statements}]}}"#);
     let share = policy.chars().count() * 100 / 2_048;
@@ -84,7 +84,7 @@ async fn filled(server: &Server) -> aws_sdk_s3::Client {
     client
 }
 
-/// The status and the code, or "ok".
+/// Returns the status and the code, or "ok".
 fn outcome<T, E: ProvideErrorMetadata>(
     result: Result<T, SdkError<E, aws_sdk_s3::config::http::HttpResponse>>,
 ) -> String {
@@ -141,7 +141,7 @@ async fn a_session_outlives_the_server_and_needs_its_token() {
     let owners = Credentials::new("owner", "the owner's", Some("token".into()), None, "test");
     assert_eq!(get(&s3(&again, owners), "open/a").await, "400 InvalidToken");
 
-    // In a URL, token and all, for whoever has it.
+    // In a URL that includes the token, for any holder of the URL.
     let presigned = s3(&again, keys)
         .get_object()
         .bucket(BUCKET)
@@ -242,7 +242,7 @@ async fn what_no_statement_names_is_denied() {
         assert_eq!(outcome(client.list_objects().bucket(BUCKET).prefix(prefix).send().await), denied);
     }
     assert!(outcome(client.head_bucket().bucket(BUCKET).send().await) == "ok");
-    // To say who may read an object is a right of its own.
+    // Changing who may read an object needs a permission of its own.
     const SHARE: &str =
         r#"{"Effect":"Allow","Action":"s3:PutObjectAcl","Resource":"arn:aws:s3:::films/open/*"}"#;
     let sharer = s3(&server, assume(&server, &format!("{WRITE},{SHARE}")).await);
@@ -291,7 +291,7 @@ async fn whoever_may_not_assume_a_role_is_told_why() {
     server.stop().await;
 }
 
-/// AWS's own signer, told to sign what its clients would not.
+/// Uses AWS's own signer to sign requests that its clients would not send.
 #[tokio::test]
 async fn a_request_to_sts_is_signed_for_sts_and_with_its_body() {
     use aws_sigv4::http_request::{
@@ -340,7 +340,7 @@ async fn a_request_to_sts_is_signed_for_sts_and_with_its_body() {
     server.stop().await;
 }
 
-/// A request as it stands.
+/// Sends a request unchanged.
 async fn raw(server: &Server, line: &str, headers: &str, body: &str) -> String {
     let mut stream = tokio::net::TcpStream::connect(server.address()).await.unwrap();
     let request = format!(

@@ -1,6 +1,6 @@
-//! The object store is killed in the middle of its work: what it acknowledged is there, whole, and is told.
+//! The object store is killed while it works. Acknowledged objects exist completely, and their events are delivered.
 //!
-//! `RAYFOLD_BUCKET_PUTS=10000 cargo test -p rayfold-bucket --test bucket_kill` runs it at length.
+//! `RAYFOLD_BUCKET_PUTS=10000 cargo test -p rayfold-bucket --test bucket_kill` puts more objects.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 #![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]
@@ -20,10 +20,10 @@ use fastrand::Rng;
 use process::Process;
 use stage::{BUCKET, client, listener, notify};
 
-/// Requests at once.
+/// The number of concurrent requests.
 const WRITERS: usize = 32;
 
-/// Of the two kinds of bodies: rows and files.
+/// Sizes of both kinds of bodies: rows and files.
 const SIZES: [usize; 4] = [0, 100, 20_000, 200_000];
 
 fn puts() -> usize {
@@ -47,7 +47,7 @@ impl Fill for Rng {
     }
 }
 
-/// Puts objects until the store is gone; gives those that were acknowledged.
+/// Puts objects until the store is killed. Returns the acknowledged ones.
 async fn put_until_killed(process: Process, puts: usize) -> Vec<usize> {
     let client = client(process.address());
     let next = Arc::new(AtomicUsize::new(0));
@@ -96,7 +96,7 @@ async fn what_was_acknowledged_is_there_whole_and_told() {
 
     let process = Process::start(folder.path(), Some(&webhook), None);
     let client = client(process.address());
-    // What was not acknowledged may be there; then it is whole as well.
+    // An object that was not acknowledged may exist. Then it is complete too.
     let mut there = BTreeMap::new();
     let mut pages = client.list_objects_v2().bucket(BUCKET).into_paginator().send();
     while let Some(page) = pages.next().await {
@@ -132,7 +132,7 @@ async fn what_was_acknowledged_is_there_whole_and_told() {
     let untold: Vec<_> = there.keys().filter(|key| !told.contains(*key)).collect();
     assert!(untold.is_empty(), "never told: {untold:?}");
 
-    // Files: exactly those of the large objects.
+    // The files are exactly those of the large objects.
     let large = there.values().filter(|size| **size > 131_072).count();
     let files = || -> usize {
         let folders = std::fs::read_dir(folder.path().join("bodies")).unwrap();

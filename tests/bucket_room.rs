@@ -1,4 +1,4 @@
-//! Room: memory does not grow with an object, and a full disk is an error and no damage.
+//! Memory and disk: memory does not grow with an object, and a full disk causes an error and no damage.
 //!
 //! `RAYFOLD_BUCKET_MIB=4096 cargo test -p rayfold-bucket --test bucket_room` streams more.
 
@@ -18,7 +18,7 @@ use stage::{BUCKET, client, failure};
 
 const MIB: usize = 1024 * 1024;
 
-/// Far below the object, far above what a store needs besides it.
+/// Much less than the object, much more than a store needs besides it.
 const MEMORY: u64 = 64 * 1024 * 1024;
 
 #[tokio::test]
@@ -54,7 +54,7 @@ async fn memory_does_not_grow_with_an_object() {
 #[tokio::test]
 async fn a_full_disk_is_an_error_and_no_damage() {
     let folder = tempfile::tempdir().unwrap();
-    // No file beyond 6 MiB: the database, the journal and large bodies all meet it.
+    // No file can exceed 6 MiB. The database, the journal and large bodies all reach this limit.
     let process = Process::start(folder.path(), None, Some(6 * 1024));
     let store = client(process.address());
     store.create_bucket().bucket(BUCKET).send().await.unwrap();
@@ -83,7 +83,7 @@ async fn a_full_disk_is_an_error_and_no_damage() {
     }
     process.kill();
 
-    // With room again everything that was acknowledged is there, and writing goes on.
+    // With free space, every acknowledged object exists, and writes succeed.
     let process = Process::start(folder.path(), None, None);
     let store = client(process.address());
     let listed = store.list_objects_v2().bucket(BUCKET).send().await.unwrap();

@@ -1,21 +1,22 @@
-//! Chaos on the real parts. The store on board, the invoker and the unmodified functions run as processes that are killed
-//! again and again (`kill -9`), each by itself; a proxy stands before the store, another before the invoker, which slow, cut and
-//! lie; the disk is full for a while, clocks step, events are lost, doubled and late. A user changes animations meanwhile.
-//! In the end, in a calm world, each animation is what the uploaded set says, byte for byte, or says by name why it is not.
+//! Chaos tests of the real parts. The built-in store, the invoker and the unmodified functions run as processes, each
+//! of which is killed (`kill -9`) again and again. Proxies before the store and before the invoker delay and cut
+//! connections and falsify replies. The disk is full for a while, clocks step, events are lost, duplicated and late.
+//! Meanwhile a user changes animations. After the faults end, each animation equals the uploaded set byte for byte, or
+//! reports why it does not.
 //!
-//! A run is rounds, each of a seed and a folder of its own. `RAYFOLD_SEED` replays one: the same acts and the same dice;
-//! which request meets which of them is up to the machine. At length:
+//! A run consists of rounds, each with its own seed and folder. `RAYFOLD_SEED` replays one with the same user actions
+//! and the same random faults; their assignment to requests depends on the machine. For a long run:
 //!
 //! ```text
 //! RAYFOLD_CHAOS_MINUTES=10 cargo test -p rayfold-lambda --test chaos -- --nocapture
 //! ```
 //!
-//! and with `RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md` it writes what it saw there. With `RAYFOLD_CHAOS_STORE=minio` the
-//! store is MinIO, which does not believe in other clocks.
+//! and with `RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/chaos.md` it writes its results there. With
+//! `RAYFOLD_CHAOS_STORE=minio` the store is MinIO, which does not accept other clocks.
 //!
-//! A full disk is a limit on the size of files (`ulimit -f`), set where the largest one has nearly arrived: no file system of
-//! its own is needed, nor rights to mount one. Clocks step by `libfaketime` where that is installed (Debian's package); where
-//! it is not a line says that they did not.
+//! A full disk is a limit on the size of files (`ulimit -f`), slightly above the current size of the largest file. This
+//! needs no separate file system and no right to mount one. Clocks step by `libfaketime` if that is installed (Debian's
+//! package). If it is not, a line reports that they did not step.
 
 #![allow(clippy::print_stderr, reason = "says what a run was like")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -45,13 +46,13 @@ use tally::Tally;
 use wishes::{ANIMATIONS, Wishes, given_up, wrong};
 use world::World;
 
-/// How long things go wrong in a round.
+/// The duration of the faults in a round.
 const WILD: Duration = Duration::from_secs(20);
 
-/// By when a calm world must have come right.
+/// The time limit for recovery after the faults end.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// The test that parts are started as, too.
+/// The test, which is also the entry point of the parts.
 const TEST: &str = "animations_end_right_or_named_whatever_happens";
 
 fn number(variable: &str) -> Option<u64> {
@@ -84,7 +85,7 @@ async fn animations_end_right_or_named_whatever_happens() {
     }
 }
 
-/// One round: what was wrong in it, and how it came right.
+/// Runs one round. Returns its faults and the recovery.
 async fn round(seed: u64) -> Round {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Rng::with_seed(seed);
@@ -117,10 +118,11 @@ async fn round(seed: u64) -> Round {
     Round { seed, acts: wishes.acts, said_again, named, took, tally }
 }
 
-/// Waits until all animations are right; gives the names of what was given up on the way. That the user has tried again.
+/// Waits until all animations are right. Returns the names of the items that were given up in between, which the user
+/// has retried.
 async fn come_right(store: &rayfold_pipeline::store::S3Store, wishes: &Wishes) -> Vec<String> {
     let (start, mut named, mut quiet) = (Instant::now(), Vec::new(), 0);
-    // Twice in a row: it stays so.
+    // Twice in a row, to check that the state is stable.
     while quiet < 2 {
         tokio::time::sleep(Duration::from_millis(700)).await;
         let mut faults = Vec::new();

@@ -1,4 +1,4 @@
-//! The subcommands that talk to a bucket, against an S3 server, the local invoker and the unmodified function binaries.
+//! The subcommands that use a bucket, with an S3 server, the local invoker and the unmodified function binaries.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -18,7 +18,7 @@ use stage::{PATIENCE, Stage, built, drawn, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
-/// A bucket with its functions, and a folder to work in.
+/// A bucket with its functions, and a working folder.
 struct Cloud {
     stage: Stage,
     folder: tempfile::TempDir,
@@ -63,23 +63,24 @@ impl Cloud {
         output
     }
 
-    /// What a run says to people.
+    /// Returns the messages of a run.
     fn says(&self, args: &str, code: i32) -> String {
         String::from_utf8(self.rayfold(args, code).stderr).unwrap()
     }
 
-    /// What a run writes on standard output.
+    /// Returns the standard output of a run.
     fn prints(&self, args: &str) -> String {
         String::from_utf8(self.rayfold(args, 0).stdout).unwrap()
     }
 
-    /// The keys below a prefix.
+    /// Returns the keys below a prefix, without that of the running invoker.
     async fn keys(&self, prefix: &str) -> Vec<String> {
         let page = self.stage.store().list(ListRequest::all(prefix)).await.unwrap();
-        page.objects.into_iter().map(|object| object.key).collect()
+        let keys = page.objects.into_iter().map(|object| object.key);
+        keys.filter(|key| !key.starts_with("invokers/")).collect()
     }
 
-    /// Frames drawn and GIFs built since the last look.
+    /// Returns the number of frames drawn and GIFs built since the last call.
     async fn work(&mut self) -> (usize, u64) {
         self.stage.settle().await;
         let seen = self.stage.seen();
@@ -103,7 +104,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         let files = ["animation.json", "f1.txt", "f10.txt", "f2.txt"];
         assert_eq!(cloud.keys("scripts/").await, files.map(|name| format!("scripts/film/{name}")));
 
-        // The same again: no upload, no work.
+        // A repetition: no upload, no work.
         let said = cloud.says("submit film -o again.gif", 0);
         assert!(said.contains("up to date"), "{said}");
         assert_eq!(cloud.read("again.gif"), cloud.read("film.gif"));
@@ -120,7 +121,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
         assert_eq!(cloud.work().await.0, 2);
 
-        // Status, for people and for programs.
+        // The status, for users and for programs.
         let table = cloud.prints("status");
         assert!(table.starts_with("film  done       3 of 3 frames, GIF of "), "{table}");
         assert_eq!(cloud.prints("status film --watch"), table);
@@ -132,7 +133,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         let text = cloud.prints("status film --format json");
         assert_eq!(text.matches("\n      \"gif\": ").count(), 1, "a key that is there twice: {text}");
 
-        // Fetch: the GIF, and the frames as they are drawn locally.
+        // Fetches the GIF, and the frames, which equal those drawn locally.
         cloud.rayfold("fetch film -o fetched.gif", 0);
         assert_eq!(cloud.read("fetched.gif"), cloud.read("film.gif"));
         cloud.rayfold("fetch film -o c%d.png", 0);
@@ -142,7 +143,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
             assert_eq!(image("c"), image("l"), "frame {number}");
         }
 
-        // Drawn anew on demand, to the same picture.
+        // Frames are redrawn on demand, with the same picture.
         let said = cloud.says("retry film", 0);
         assert!(said.contains("nothing failed and nothing is missing"), "{said}");
         let said = cloud.says("retry film --all", 0);
@@ -163,8 +164,9 @@ async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
         cloud.write("b/f.txt", scene(9.0) + "Background 1 0 0\nTrace\n");
         cloud.rayfold("submit a --name film", 0);
         cloud.rayfold("submit b --name film/two", 0);
-        let said = cloud.says("submit b/f.txt", 2);
-        assert!(said.contains("b/f.txt is a file: expected a folder"), "{said}");
+        let said = cloud.says("submit b/f.txt", 0);
+        assert!(said.contains("/scripts/f/: 1 script uploaded"), "{said}");
+        cloud.rayfold("remove f --delete", 0);
         let said = cloud.says("remove film --delete", 0);
         assert!(said.starts_with("film: ") && said.contains("removed"), "{said}");
         cloud.stage.settle().await;
@@ -190,7 +192,8 @@ async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
     .await;
 }
 
-/// A marker of a folder was an animation that was new for ever, and what lay beside the folders was nowhere to be seen.
+/// Regression test: the marker of a folder counted as an animation that stayed new for ever, and files beside the
+/// folders were listed nowhere.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_ignored_misnamed_and_misplaced_is_what_the_status_says() {
     on_every_store(async |store| {
@@ -246,7 +249,7 @@ async fn what_fails_in_the_cloud_is_named_with_its_reason() {
         cloud.write("film/f1.txt", scene(8.0));
         cloud.write("film/f2.txt", scene(9.0));
         cloud.rayfold("submit film", 0);
-        // Somebody uploads a script that nobody has checked.
+        // A script is uploaded without a check.
         cloud.stage.put("scripts/film/f2.txt", "Screen 24 18\nSpere 1\nTrace\n").await;
         cloud.stage.until("film", Status::Failed).await;
         let output = cloud.rayfold("status film --watch", 1);
@@ -261,7 +264,7 @@ async fn what_fails_in_the_cloud_is_named_with_its_reason() {
         );
         let said = cloud.says("fetch film -o %d.png", 1);
         assert!(said.contains("f2.txt is not drawn"), "{said}");
-        // The same command as in the beginning mends it.
+        // The first command, repeated, corrects it.
         cloud.rayfold("submit film", 0);
         cloud.rayfold("render film -o local.gif", 0);
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
@@ -280,7 +283,7 @@ async fn watching_an_animation_that_does_not_exist_never_ended() {
             format!("error: there is no animation nothing in {}\n", cloud.stage.store().bucket())
         );
         assert!(start.elapsed() < PATIENCE);
-        // An upload that begins a moment later is waited for.
+        // The command waits for an upload that begins a moment later.
         let watching = cloud.command("status film --watch").stdout(Stdio::piped()).spawn().unwrap();
         tokio::time::sleep(Duration::from_millis(500)).await;
         cloud.stage.put("scripts/film/f1.txt", scene(8.0)).await;
@@ -431,7 +434,7 @@ async fn an_interrupted_submission_is_picked_up() {
             assert!(start.elapsed() < PATIENCE, "nothing is uploaded");
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
-        // Every script is there; what follows is waiting, for nobody draws.
+        // Every script is uploaded. The command now waits, because no function draws.
         tokio::time::sleep(Duration::from_millis(500)).await;
         assert!(submission.try_wait().unwrap().is_none(), "it does not wait");
         let id = submission.id().to_string();

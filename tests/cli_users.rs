@@ -1,5 +1,5 @@
-//! The subcommands that talk to a bucket, run under the policy of each kind of user, the document that Terraform gives out:
-//! each kind can do all that its name says, and what it may not do changes nothing.
+//! The subcommands that use a bucket, run under the policy of each kind of user in the document that Terraform prints.
+//! Each kind can do everything that its description promises, and denied operations change nothing.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -12,12 +12,12 @@ use std::process::{Command, Stdio};
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
 use stage::role::environment;
-use stage::stores::on_every_store;
+use stage::stores::on_every_store_with_roles;
 use stage::{Stage, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
-/// A kind of user, who is signed in to a bucket and has a folder to work in.
+/// A user of a kind, with access to a bucket and a folder.
 struct User<'a> {
     stage: &'a Stage,
     name: &'static str,
@@ -37,7 +37,7 @@ impl<'a> User<'a> {
         std::fs::write(path, text).unwrap();
     }
 
-    /// Whether the command succeeds, and what it says.
+    /// Returns whether the command succeeds, and its output.
     fn try_to(&self, args: &str) -> (bool, String) {
         let output = Command::new(RAYFOLD)
             .args(args.split_whitespace())
@@ -66,7 +66,7 @@ impl<'a> User<'a> {
     }
 }
 
-/// Every object with its version.
+/// Returns every object with its version.
 async fn objects(stage: &Stage) -> Vec<(String, String)> {
     let page = stage.store().list(ListRequest::all("")).await.unwrap();
     page.objects.into_iter().map(|object| (object.key, object.etag.as_str().to_owned())).collect()
@@ -74,14 +74,14 @@ async fn objects(stage: &Stage) -> Vec<(String, String)> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
-    on_every_store(async |store| {
+    on_every_store_with_roles(async |store| {
         let mut stage = stage::stage(store, functions_beside(Path::new(RAYFOLD)), |_| {}).await;
         {
             let uploader = User::new(&stage, "uploader").await;
             uploader.write("film/f1.txt", &scene(8.0));
             uploader.write("film/f2.txt", &scene(9.0));
             uploader.can("submit film -o first.gif");
-            // Of equal size: whether it has changed only the object itself can tell.
+            // The sizes are equal, so only the object itself shows whether it has changed.
             uploader.write("film/f2.txt", &scene(7.0));
             let said = uploader.can("submit film -o second.gif");
             assert!(said.contains("1 script uploaded"), "{said}");

@@ -1,4 +1,4 @@
-//! `rayfold dev` as a user meets it: started, fed by the SDK, interrupted, killed, started again.
+//! `rayfold dev` from the user's side: started, used through the SDK, interrupted, killed, started again.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -18,10 +18,11 @@ use stores::on_every_store;
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
-/// Longer than anything here takes on a loaded machine, a build of the functions included.
+/// Longer than anything here takes on a loaded machine, including a build of the functions.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// With the functions that were built with this test; without them `rayfold dev` builds them itself.
+/// Returns the command with the functions that were built with this test. Without them `rayfold dev` builds them
+/// itself.
 fn dev() -> Command {
     let mut command = Command::new(RAYFOLD);
     command.arg("dev");
@@ -43,14 +44,14 @@ impl Dev {
         let mut command = dev();
         command.arg("--data").arg(data).args(["--address", "127.0.0.1:0", "--concurrency", "4"]);
         match store {
-            // What a user gets who says nothing.
+            // The default, without an option.
             StoreKind::BuiltIn => {}
-            StoreKind::Minio => drop(command.args(["--store", "minio"])),
+            StoreKind::Minio | StoreKind::SeaweedFs => drop(command.args(["--store", store.name()])),
         }
         Self::of(command)
     }
 
-    /// Reads what it prints to be set, up to the line that says how to go on.
+    /// Reads the environment variables that the program prints, up to the line with the next step.
     fn of(mut command: Command) -> Self {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
@@ -77,7 +78,7 @@ impl Dev {
         S3Store::at(&connection, "rayfold")
     }
 
-    /// By process id, as a terminal's Ctrl-C or an administrator would.
+    /// Sends a signal to the process id, like a terminal's Ctrl-C or an administrator.
     fn signal(&self, signal: &str) {
         let status = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
         assert!(status.success());
@@ -106,7 +107,7 @@ async fn gif(store: &S3Store, key: &str) -> bytes::Bytes {
     }
 }
 
-/// The S3 server's answer; none when it is gone.
+/// Returns whether the S3 server replies.
 async fn answers(store: &S3Store) -> bool {
     store.check().await.is_ok()
 }
@@ -148,7 +149,7 @@ async fn it_goes_on_where_it_was_after_a_kill_and_leaves_nothing_behind() {
     .await;
 }
 
-/// A folder of scripts, a place for the GIF, and a folder for what is temporary.
+/// A folder of scripts, a path for the GIF, and a folder for temporary files.
 struct Once {
     folder: tempfile::TempDir,
 }
@@ -181,7 +182,7 @@ impl Once {
         names
     }
 
-    /// Nothing but what was there and, if there is to be one, the GIF.
+    /// Checks that there are no new files except the GIF, if there should be one.
     #[track_caller]
     fn leaves(&self, has_gif: bool) {
         assert_eq!(self.names("temporary"), [""; 0]);
@@ -212,7 +213,7 @@ fn one_command_makes_a_folder_into_its_gif_and_leaves_nothing_else() {
     assert!(made == std::fs::read(by_hand).unwrap(), "the GIF is another one than that of `rayfold render`");
 }
 
-/// The functions refuse it, or it is refused before anything starts.
+/// The functions reject the script, or it is rejected before anything starts.
 #[test]
 fn one_command_that_fails_says_why_and_leaves_nothing() {
     let once = Once::new(2, "24 16");

@@ -1,7 +1,7 @@
-//! Glass is drawn by the packets as the plain tracer draws it, whatever it is drawn with; and as the language says where
-//! that can be told without a tracer.
+//! The packets draw glass like the plain tracer does, with any instruction set and search structure. Simple scenes are
+//! also compared with results computed by hand from the language reference.
 //!
-//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+//! Scenes are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -28,7 +28,7 @@ use hold::{draw, hold, off, placed, scripted};
 const SEED: u64 = 20_261_123;
 
 impl Dice {
-    /// Glass, on its own or with a mirror, a highlight, a pattern.
+    /// Returns glass, alone or with a mirror, a highlight or a pattern.
     fn glass(&mut self) -> Material {
         let ior = [1.5, 1.33, 2.4, 0.7, 1.0, self.within(0.4, 3.0)][self.0.usize(0..6)];
         let glass = Some(Glass::new(0.4 + 0.6 * self.color(), ior).unwrap());
@@ -44,7 +44,7 @@ impl Dice {
         Material::finished(own, Finish { shine, glass, pattern })
     }
 
-    /// So many objects, half of them of glass, and a floor.
+    /// Returns a scene of this many objects, half of them of glass, and a floor.
     fn glass_scene(&mut self, count: usize) -> Scene {
         let mut objects: Vec<Object> = (0..count)
             .map(|_| {
@@ -53,7 +53,7 @@ impl Dice {
             })
             .collect();
         let at = self.0.usize(0..=count);
-        // Rays that refraction turns by no more than rounding are not in its plane.
+        // The floor is slightly inclined, so that no ray that refraction turns only by rounding lies in its plane.
         let upwards = DVec3::new(0.137, 1.0, 0.0713);
         let floor = Plane::new(DVec3::new(0.0, -2.5, 0.0), upwards, self.material()).unwrap();
         objects.insert(at, floor.into());
@@ -81,7 +81,7 @@ fn a_mesh_of_glass_and_many_balls_are_the_references() {
     let mut dice = Dice::new("meshes", SEED);
     let (glass, floor) = (dice.glass(), dice.material());
     let mut objects: Vec<Object> = vec![Plane::new(DVec3::NEG_Y, DVec3::Y, floor).unwrap().into()];
-    // A hilly sheet, and balls in and over it, more than masks have bits.
+    // A hilly sheet, and spheres in and over it: more objects than a mask has bits.
     let point = |x: i32, z: i32| {
         let (x, z) = (f64::from(x) * 0.5, f64::from(z) * 0.5);
         DVec3::new(x, 0.3 * (x * 3.0).sin() * (z * 2.0).cos(), z)
@@ -110,7 +110,7 @@ const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0.13 0.21 9  0.02 0.03 0  50\nB
                               Material dark glass 0.5 0.4 0.3  1.33\nMaterial matte diffuse 0.7 0.7 0.7 ambient 0.1 0.1 0.1\n\
                               Material blue diffuse 0.2 0.2 0.6\nMaterial floor diffuse 0.7 0.7 0.7 noise 0.5 blue";
 
-/// Places at which a formula that is nearly right is wrong.
+/// Cases in which an almost correct formula fails.
 const EDGES: [(&str, &str); 19] = [
     ("glass in glass", "Sphere 2  0 0 0  clear\nSphere 1  0.3 0 0  dark\nSphere 0.5  0.3 0.1 0  matte"),
     ("air in glass", "Sphere 2  0 0 0  clear\nMaterial air glass 1 1 1  0.667\nSphere 1.9  0 0 0  air"),
@@ -186,7 +186,7 @@ fn edges_of_glass_are_where_the_reference_has_them() {
     }
 }
 
-/// What a ray sees that goes straight down onto the middle of a floor that is white where no light is needed.
+/// Returns the colour of a vertical ray onto the centre of a floor that is white without any light.
 fn down(objects: &str) -> [u8; 3] {
     let view = "Screen 1 1\nLook 0 9 0  0 0 0  1\nDisc 9  0 0 0  0 1 0  1 1 1  0 0 0\nBackground 0 0 0";
     draw(&scripted(view, objects), RenderOptions::default()).get_pixel(0, 0).0
@@ -195,17 +195,17 @@ fn down(objects: &str) -> [u8; 3] {
 #[test]
 fn panes_let_through_what_they_do_not_mirror() {
     let pane = |color: &str| format!("Material pane glass {color}\n");
-    // An index of 1 mirrors nothing: each surface counts by its coefficient.
+    // An index of 1 reflects nothing: each surface contributes its coefficient.
     assert_eq!(down(&(pane("0.5 0.25 1  1") + "Disc 5  0 1 0  0 1 0  pane")), [128, 64, 255]);
     assert_eq!(down(&(pane("0.5 0.25 1  1") + "Box -5 1 -5  5 2 5  pane")), [64, 16, 255]);
     assert_eq!(down(&(pane("0.5 0.25 1  1") + "Sphere 2  0 3 0  pane")), [64, 16, 255]);
-    // What is at one place is passed together.
+    // Surfaces at one position are passed together.
     let stacked = "Box -5 1 -5  5 2 5  pane\nBox -5 2 -5  5 3 5  pane";
     assert_eq!(down(&(pane("0.5 0.25 1  1") + stacked)), [32, 4, 255]);
-    // 4 % at the front of a pane; what it mirrors is black here.
+    // 4 % at the front of a pane. It reflects black here.
     assert_eq!(down(&(pane("1 1 1  1.5") + "Disc 5  0 1 0  0 1 0  pane")), [245; 3]);
     assert_eq!(down(&(pane("1 1 1  1.5") + "Disc 5  0 0 0  0 1 0  pane")), [255; 3], "on the floor");
-    // Faint rays are not followed, under `Tone srgb` fainter ones.
+    // Faint rays are not traced; with `Tone srgb` the limit is lower.
     let bright = "Disc 5  0 0.5 0  0 1 0  4096 4096 4096  0 0 0\n";
     let faint =
         |share: f64| down(&format!("{bright}{}Disc 5  0 1 0  0 1 0  pane", pane(&format!("{share} 0 0  1"))));
@@ -221,7 +221,7 @@ fn shadows_are_as_dark_as_the_glass_on_the_way() {
                     Material pane glass 0.6 1 0.25  1.5";
         draw(&scripted(view, &format!("{light}\n{objects}")), RenderOptions::default()).get_pixel(0, 0).0
     };
-    // Both come from the side by 3 : 4, so that nothing stands before the eye.
+    // Both come from the side by 3 : 4, so that nothing is in front of the eye.
     for light in ["Ilight 1 1 1  -3 -4 0", "Plight 1 1 1  6 8 0"] {
         assert_eq!(lit(light, ""), [204; 3]);
         assert_eq!(lit(light, "Box 2 2 -1  4 5 1  pane"), [73, 204, 13]);
@@ -231,7 +231,7 @@ fn shadows_are_as_dark_as_the_glass_on_the_way() {
         assert_eq!(lit(light, "Sphere 1  3 4 0  pane\nDisc 0.5  3 4 0  3 4 0  0 0 0  1 1 1"), [0; 3]);
         assert_eq!(lit(light, "Disc 1  3 4 0  3 4 0  pane\nDisc 1  3 4 0  3 4 0  0 0 0  1 1 1"), [0; 3]);
     }
-    // Beyond the lamp nothing dims it.
+    // Objects beyond the lamp do not dim it.
     assert_eq!(lit("Plight 1 1 1  3 4 0", "Sphere 1  6 8 0  pane"), [204; 3]);
 }
 
@@ -257,7 +257,7 @@ fn what_bends_and_mirrors_nothing_cannot_be_seen() {
             objects.insert(at, dice.any(nothing.clone()));
         }
         scene.objects = objects.into();
-        // A line meets each of the two four times at most.
+        // A line hits each of the two four times at most.
         scene.depth = Depth::new(8).unwrap();
         let drawn = draw(&scene, RenderOptions::default());
         differ += off(&expected, &drawn);
@@ -304,7 +304,7 @@ fn a_power_of_two_changes_no_byte() {
 fn the_order_of_lines_and_the_number_of_threads_change_no_byte() {
     let mut dice = Dice::new("order", SEED);
     for count in [2, 5, 9] {
-        // Without planes that share one place.
+        // Without planes at the same position.
         let objects: Vec<Object> = (0..count)
             .map(|_| {
                 let (material, at) = (dice.glass(), dice.point(2.0));

@@ -1,6 +1,7 @@
-//! What version 2 of the language brings is drawn by the packets as the plain tracer draws it, whatever it is drawn with.
+//! The packets draw the features of version 2 of the language like the plain tracer does, with any instruction set and
+//! search structure.
 //!
-//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+//! Scenes are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -19,7 +20,7 @@ use hold::{draw, hold, off, placed, scripted};
 
 const SEED: u64 = 20_261_122;
 
-/// Holds `count` scenes against the reference; they have as many objects as `counts` says, in turn.
+/// Compares `count` scenes with the reference. The numbers of objects are those of `counts`, in turn.
 fn hold_each(
     dice: &mut Dice,
     (counts, count): (&[usize], usize),
@@ -61,7 +62,7 @@ fn groups_are_the_references() {
 }
 
 impl Dice {
-    /// A plane, a disc, a cylinder, a cone, a torus, or an object of version 1, any of which may be turned with a group.
+    /// Returns a plane, a disc, a cylinder, a cone, a torus, or an object of version 1, possibly rotated by a group.
     fn body(&mut self, kinds: u8) -> Object {
         let at = self.point(3.0);
         let material = self.material();
@@ -106,7 +107,7 @@ fn shapes_with_axes_of_their_own_are_the_references() {
     hold(&scenes);
 }
 
-/// Bodies that no ray meets: with them there are too many for the bits of a word.
+/// Returns bodies that no ray hits. With them there are too many for the bits of a word.
 fn specks() -> Vec<Object> {
     let material = Material::new(DVec3::ONE, DVec3::ONE, DVec3::ZERO).unwrap();
     let disc =
@@ -161,7 +162,7 @@ fn lamps_are_the_references() {
 }
 
 impl Dice {
-    /// Coefficients with highlights, a pattern, or both.
+    /// Returns a material with highlights, a pattern, or both.
     fn finished(&mut self) -> Material {
         let own = self.material().coefficients();
         let shine = if self.0.bool() {
@@ -208,7 +209,7 @@ const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0 0 9  0 0 0  50\nBackground 0.
 const PARALLEL: &str =
     "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
 
-/// Places at which a formula that is nearly right is wrong.
+/// Cases in which an almost correct formula fails.
 const EDGES: [(&str, &str, &str); 17] = [
     (
         "eye in a cylinder",
@@ -341,7 +342,7 @@ fn a_group_is_its_copy_written_out() {
 
 #[test]
 fn of_faces_in_one_plane_the_first_is_seen() {
-    // Each covers the middle of the picture at z = 0.3, up to x and y of 0.5 at least.
+    // Each covers the centre of the picture at z = 0.3, up to x and y of 0.5 at least.
     let flat = [
         "Plane 5 5 0.3  0 0 -7",
         "Disc 2  0 0 0.3  0 0 1",

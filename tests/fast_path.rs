@@ -1,6 +1,6 @@
-//! The picture is the same whatever it is drawn with: instruction set, tile, tree, threads; and it is the reference's.
+//! The picture does not depend on the instruction set, the tile, the tree or the threads, and equals the reference's.
 //!
-//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+//! Scenes are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -18,7 +18,7 @@ use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
 use dice::Dice;
 
-/// Pixels of a picture that rounding may put on the other side of an outline, as a share.
+/// The share of pixels at outlines that rounding may assign to another object.
 const ISOLATED: f64 = 1e-4;
 
 const SEED: u64 = 20_261_121;
@@ -56,7 +56,7 @@ impl Dice {
         scene
     }
 
-    /// Scenes for every kernel.
+    /// Returns scenes for every kernel.
     fn scenes(&mut self) -> Vec<Scene> {
         [(1, 1), (5, 1), (12, 2), (20, 3), (60, 3), (300, 3), (400, 1)]
             .map(|(n, kinds)| self.scene(n, kinds))
@@ -68,7 +68,7 @@ fn draw(scene: &Scene, options: RenderOptions) -> RgbImage {
     render(scene, &options).unwrap()
 }
 
-/// Share of the pixels that are off by more than one level in a channel.
+/// Returns the share of the pixels that are off by more than one level in a channel.
 fn off(a: &RgbImage, b: &RgbImage) -> f64 {
     off_by_more_than(1, a, b) as f64 / a.pixels().len() as f64
 }
@@ -113,7 +113,7 @@ fn widths_with_fused_multiply_add_agree_bit_for_bit_and_others_but_for_isolated_
     assert!(differ <= ISOLATED * pixels, "{differ} of {pixels}");
 }
 
-/// The animations in `scenes/`, a frame of each.
+/// Returns one frame of each animation in `scenes/`.
 fn examples() -> Vec<(&'static str, Scene)> {
     let frames = [
         ("sphere_light", "frame04"),
@@ -204,7 +204,7 @@ fn a_face_seen_edge_on_is_met_by_the_middle_column_and_a_level_one_by_no_row() {
     };
     for width in (3..120).step_by(2) {
         let middle = width / 2;
-        // A box without thickness in the plane of the eye, along the gaze: its face is met edge-on.
+        // A box without thickness in the plane of the eye, along the view direction: its face is edge-on.
         let face = "Box 0 -1 -3  0 1 3  1 0 0  0 0 0";
         for camera in [
             "Camera 0 0.2 6  0 -0.1 -1  0 1 0  1  -0.3 -0.225  0.3 0.225",
@@ -213,7 +213,7 @@ fn a_face_seen_edge_on_is_met_by_the_middle_column_and_a_level_one_by_no_row() {
         ] {
             each(&format!("Screen {width} 21\n{camera}\n{face}\nTrace"), (middle, 10), true);
         }
-        // A level gaze, not along an axis, above and below planes that are parallel to it.
+        // A horizontal view direction, not along an axis, above and below planes that are parallel to it.
         for level in [
             "Plane 0 0 0  0 1 0  1 0 0  0 0 0",
             "Box -90 -1 -90  90 0 90  1 0 0  0 0 0",
@@ -256,7 +256,7 @@ fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
             assert_eq!(chosen(&objects), expected, "{name}, {gap} apart");
             let objects = format!("Triangle {one} {red}\nTriangle {other} {red}");
             assert_eq!(chosen(&objects), far, "{name}, {gap} apart, of one colour");
-            // The same among many, found down a tree.
+            // The same triangles among many objects, found by a tree.
             let balls: String = (0..100).map(|k| format!("Sphere 0.01 {k} 3 -9 {red}\n")).collect();
             let objects = format!("Triangle {one} {red}\n{balls}Triangle {other} {green}");
             assert_eq!(chosen(&objects), expected, "{name}, {gap} apart, among many");
@@ -269,7 +269,7 @@ fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
             format!("Box -2 -2 -1  2 2 0 {red}\nTriangle -1 -1 {height:?}  1 -1 0  0 1 0  0 0.5 0  0 0 0");
         assert_eq!(chosen(&objects), expected, "on a box, one corner raised by {height}");
     }
-    // Neighbours that share an edge, or lie apart in one plane, are not in each other's way.
+    // Neighbours that share an edge, or are separate in one plane, do not shadow each other.
     for other in ["1 -1 0  3 1 0  0 1 1e-7", "2 -1 1e-7  4 -1 1e-7  3 1 1e-7"] {
         let objects = format!("Triangle -1 -1 0  1 -1 0  0 1 0 {red}\nTriangle {other} 0 0.5 0  0 0 0");
         assert_eq!(chosen(&objects), far, "{other}");
@@ -278,7 +278,7 @@ fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
 
 #[test]
 fn a_surface_is_not_in_the_shadow_of_what_touches_it_with_a_corner() {
-    // Column 0 and row 24 show a corner of the triangle, which lies on the box.
+    // Column 0 and row 24 show a corner of the triangle, which touches the box.
     let script = "Screen 33 33\nCamera 8 0 0  -1 0 0  0 1 0  1  -0.5 -0.5  0.5 0.5\nIlight 0.5 0.5 0.5  -1 -1 -1\n\
                   Box 4 2 -1  3 -3 3  0 0 0.2  0.4 0.6 0.1\nTriangle 0 -4 0  4 -1 2  -1 -3 -1  0.2 0.1 0.2  0.4 0.2 0.4\n\
                   Trace\n";
@@ -294,7 +294,7 @@ fn a_surface_is_not_in_the_shadow_of_what_touches_it_with_a_corner() {
 
 #[test]
 fn a_ray_that_starts_on_a_sphere_sees_it_from_within() {
-    // 5² + 12² = 13²: four pixels' rays start exactly on the sphere, four touch it as they go along.
+    // 5² + 12² = 13²: the rays of four pixels start exactly on the sphere, and those of four others touch it.
     let script = "Screen 27 27\nBackground 1 1 1\nSphere 13  13 13 -12  0 0 0  0.2 0.4 0.5  0.2 0.4 0.6\n\
                   Ilight 1 1 1  -0.6 -0.5 0.8\nTrace\n";
     let scene = parse("on.txt", script.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();

@@ -1,7 +1,7 @@
-//! Frames drawn at random through the encoder and another's decoder: all are there, in order, for their time, and exact
-//! where they have at most 256 colours.
+//! Random frames through the encoder and an independent decoder. All frames are present in order, for their time, and
+//! exact if they have at most 256 colours.
 //!
-//! A short slice of the fuzz target `gif`. A failure prints the seed; `RAYFOLD_SEED` tries another one.
+//! This is a short version of the fuzz target `gif`. A failure prints the seed; `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -10,7 +10,7 @@ use std::collections::HashSet;
 use image::{Rgb, RgbImage};
 use rayfold_gif::{Encoder, Settings};
 
-/// Animations that are tried.
+/// The number of animations.
 const ANIMATIONS: usize = 100;
 
 /// Draws the next frame over the last one.
@@ -39,7 +39,7 @@ fn draw(image: &mut RgbImage, dice: &mut fastrand::Rng) {
     }
 }
 
-/// What a viewer sees, and for how many hundredths of a second.
+/// Returns the frames that a viewer shows, and their times in hundredths of a second.
 fn decode(bytes: &[u8], size: (u32, u32)) -> Vec<(RgbImage, u64)> {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
@@ -62,7 +62,7 @@ fn decode(bytes: &[u8], size: (u32, u32)) -> Vec<(RgbImage, u64)> {
     shown
 }
 
-/// Mean squared.
+/// Returns the mean squared error.
 fn error(a: &RgbImage, b: &RgbImage) -> f64 {
     let sum = a.iter().zip(b.iter()).map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2)).sum::<f64>();
     sum / a.len() as f64

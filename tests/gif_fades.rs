@@ -1,7 +1,7 @@
-//! Slow fades through the encoder and another's decoder: no pixel of a frame is further off than a quarter more than the
-//! worst pixel of that frame encoded alone, however many frames came before. So no error adds up.
+//! Slow fades through the encoder and an independent decoder. No pixel of a frame is further off than 1.25 times the
+//! worst pixel of that frame encoded alone, however many frames precede it. So errors do not accumulate.
 //!
-//! A failure prints the seed; `RAYFOLD_SEED` tries another one, and `RAYFOLD_FADES=1000` that many animations.
+//! A failure prints the seed; `RAYFOLD_SEED` sets another one, and `RAYFOLD_FADES=1000` the number of animations.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -14,7 +14,7 @@ use generator::Fade;
 use image::{Rgb, RgbImage};
 use rayfold_gif::{Encoder, Settings};
 
-/// Animations that are tried.
+/// The number of animations.
 const ANIMATIONS: usize = 24;
 
 fn from_environment<T: std::str::FromStr>(name: &str, otherwise: T) -> T {
@@ -29,7 +29,7 @@ fn encode(frames: &[RgbImage]) -> Vec<u8> {
     bytes
 }
 
-/// What a viewer sees.
+/// Returns the frames that a viewer shows.
 fn decode(bytes: &[u8]) -> Vec<RgbImage> {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
@@ -49,17 +49,17 @@ fn decode(bytes: &[u8]) -> Vec<RgbImage> {
     shown
 }
 
-/// The largest difference of a level.
+/// Returns the largest difference of a level.
 fn worst(meant: &RgbImage, seen: &RgbImage) -> u8 {
     meant.iter().zip(seen.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap()
 }
 
-/// How far off the worst pixel of a frame is that is encoded alone.
+/// Returns the largest error of a frame that is encoded alone.
 fn worst_alone(frame: &RgbImage) -> u8 {
     worst(frame, &decode(&encode(std::slice::from_ref(frame)))[0])
 }
 
-/// The largest ratio of a frame's worst pixel to that of the frame alone; `None` where one is too far off.
+/// Returns the largest ratio of a frame's worst error to that of the frame alone; `None` if one is too far off.
 fn ratio(frames: &[RgbImage]) -> Option<f64> {
     let shown = decode(&encode(frames));
     assert_eq!(shown.len(), frames.len());
@@ -100,7 +100,7 @@ fn no_fade_is_further_off_than_its_frames_alone() {
     assert_eq!(failed, 0, "animations with a pixel that is too far off");
 }
 
-/// A floor under three lamps of different colours, which come up from black by about half a level a frame.
+/// A floor under three lamps of different colours, which brighten from black by about half a level per frame.
 #[test]
 fn a_slow_fade_leaves_no_fingerprints() {
     let lamps = [(40.0, 20.0), (120.0, 25.0), (80.0, 90.0)];

@@ -15,7 +15,7 @@ fn encode(frames: &[RgbImage], settings: Settings) -> Result<(Vec<u8>, Summary),
     Ok((bytes, summary))
 }
 
-/// What a viewer sees, and for how many hundredths of a second.
+/// Returns the frames that a viewer shows, and their times in hundredths of a second.
 fn decode(bytes: &[u8]) -> Vec<(RgbImage, u16)> {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
@@ -52,7 +52,7 @@ fn noise(width: u32, height: u32, seed: u32) -> RgbImage {
     })
 }
 
-/// A ball that moves over a gradient.
+/// Returns a ball that moves over a gradient.
 fn ball(width: u32, height: u32, at: u32) -> RgbImage {
     RgbImage::from_fn(width, height, |x, y| {
         let (dx, dy) = (x as f32 - (10 + 3 * at) as f32, y as f32 - height as f32 / 2.0);
@@ -117,7 +117,7 @@ fn a_frame_of_256_colours_after_another_is_exact() {
     }
 }
 
-/// A sky that becomes brighter by a level a frame, and a cut.
+/// Returns a sky that brightens by a level per frame, and a cut.
 fn brightening(width: u32, height: u32) -> Vec<RgbImage> {
     let sky = |time: u32| {
         let level = |x: u32, y: u32| (40 + (x + y) * 24 / (width + height) + time) as u8;
@@ -232,7 +232,7 @@ fn repeats_as_often_as_asked() {
     assert_eq!(repeat(Plays::Endless), gif::Repeat::Infinite);
     assert_eq!(repeat(Plays::repeated(0)), gif::Repeat::Infinite);
     assert_eq!(repeat(Plays::repeated(7)), gif::Repeat::Finite(7));
-    // The decoder says 0 repetitions both of a file that says so (for ever) and of one that says nothing.
+    // The decoder returns 0 repetitions both for a file with that number (endless) and for one without any.
     let says = |bytes: &[u8]| bytes.windows(11).any(|word| word == b"NETSCAPE2.0");
     assert!(says(&bytes(Plays::Endless)) && !says(&bytes(Plays::Once)));
 }

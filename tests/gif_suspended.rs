@@ -1,7 +1,7 @@
-//! An animation that is suspended between frames and gone on with has the bytes of one that was encoded in one go.
+//! An animation that is suspended between frames and resumed has the same bytes as one that is encoded at once.
 //!
-//! Frames are drawn at random, of the kinds that make the encoder remember: gradients that drift, noise, few colours, parts
-//! that stay while their colours are still being refined. A failure prints the seed; `RAYFOLD_SEED` tries another one.
+//! The frames are random, of kinds for which the encoder keeps state: gradients that drift, noise, few colours, parts
+//! that stay while their colours are still refined. A failure prints the seed; `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -18,16 +18,16 @@ use generator::Fade;
 use image::{Rgb, RgbImage};
 use rayfold_gif::{Encoder, Error, Plays, Settings, Summary};
 
-/// Animations that are tried.
+/// The number of animations.
 const ANIMATIONS: usize = 60;
 
-/// An animation drawn by lot.
+/// A random animation.
 struct Animation {
     settings: Settings,
     frames: Vec<RgbImage>,
 }
 
-/// How the next frame follows from the last one.
+/// Draws the next frame over the last one.
 fn draw(image: &mut RgbImage, dice: &mut fastrand::Rng) {
     let (width, height) = image.dimensions();
     let rgb = |dice: &mut fastrand::Rng| [dice.u8(..), dice.u8(..), dice.u8(..)];
@@ -50,7 +50,7 @@ fn draw(image: &mut RgbImage, dice: &mut fastrand::Rng) {
         }
         // A slow fade.
         4 | 5 => image.pixels_mut().for_each(|pixel| pixel.0 = pixel.0.map(|level| level.wrapping_add(1))),
-        // A block that moves over what stays: the rest is refined.
+        // A block moves over parts that stay: the rest is refined.
         6 | 7 => {
             let (left, top, colour) = (dice.u32(0..width), dice.u32(0..height), rgb(dice));
             for y in top..height.min(top + 12) {
@@ -69,12 +69,12 @@ fn animation(dice: &mut fastrand::Rng) -> Animation {
         1 => Plays::Once,
         _ => Plays::Repeated(NonZeroU16::new(dice.u16(1..)).unwrap()),
     };
-    // Above 50 a second frames are dropped.
+    // Above 50 per second frames are dropped.
     let fps = f64::from(dice.u32(1..9_000)) / 100.0;
     let last_delay_cs = dice.bool().then(|| dice.u16(..));
-    let settings = Settings { fps, plays, last_delay_cs, exact: dice.bool() };
+    let settings = Settings { fps, plays, last_delay_cs, exact: dice.bool(), ..Settings::default() };
     let mut image = RgbImage::new(dice.u32(1..120), dice.u32(1..120));
-    // So that there is something to refine from the beginning.
+    // Noise, so that there are errors to refine from the beginning.
     if dice.bool() {
         image.iter_mut().for_each(|level| *level = dice.u8(..));
     }
@@ -95,7 +95,7 @@ impl Animation {
         (bytes, summary)
     }
 
-    /// Suspended before each frame of `cuts`, which may be the end.
+    /// Encodes the animation, suspended before each frame of `cuts`, which may include the end.
     fn in_pieces(&self, cuts: impl Fn(usize) -> bool) -> (Vec<u8>, Summary) {
         let (mut bytes, mut state) = (Vec::new(), None::<Vec<u8>>);
         let mut at = 0;
@@ -140,7 +140,7 @@ fn whatever_an_animation_is_cut_after_its_bytes_are_the_same() {
     }
 }
 
-/// Frames that are large enough to drift, and that then do not.
+/// Frames that are large enough to drift, and then do not.
 #[test]
 fn a_large_slow_fade_that_is_cut_has_the_same_bytes() {
     let sky = |k: u32| {
@@ -158,8 +158,8 @@ fn a_large_slow_fade_that_is_cut_has_the_same_bytes() {
     }
 }
 
-/// A fade whose pixels are left until they are off by too much: what is decided once the frame before is drawn is decided
-/// in another process as well.
+/// A fade whose pixels are left until their error is too large. A decision that depends on the previous drawn frame is
+/// the same in another process.
 #[test]
 fn slow_fades_that_are_cut_have_the_same_bytes() {
     let mut dice = fastrand::Rng::with_seed(3);
@@ -196,8 +196,8 @@ fn a_state_of_another_version_is_refused_as_that() {
     assert!(matches!(refused(&state), Error::StateVersion));
 }
 
-/// Of a state that is cut off at any byte nothing is made, and of one with another bit nothing else: a few bits mean
-/// nothing.
+/// A state that is truncated at any byte is rejected. One with a flipped bit is rejected too, except for a few bits
+/// without meaning.
 #[test]
 fn a_damaged_state_is_refused() {
     let whole = state();
@@ -221,11 +221,11 @@ fn a_damaged_state_is_refused() {
         }
     }
     println!("{found} damages found, {missed} without effect");
-    // The time and the system in gzip's header, and what deflate fills up with.
+    // The time and the system in gzip's header, and deflate's padding.
     assert!(missed < 150 && found > 20 * missed, "{found} found, {missed} missed");
 }
 
-/// A state whose checksum is right, and whose content is any: refused, or gone on with to an end.
+/// A state with a correct checksum and random content is rejected or encoded to an end.
 #[test]
 fn a_state_of_any_content_breaks_nothing() {
     let mut dice = fastrand::Rng::with_seed(11);
@@ -237,7 +237,7 @@ fn a_state_of_any_content_breaks_nothing() {
     for _ in 0..20_000 {
         let mut body = body.clone();
         for _ in 0..dice.usize(1..4) {
-            // Mostly the numbers that come before the pixels.
+            // Usually the numbers before the pixels.
             let most = if dice.u8(0..4) > 0 { body.len().min(140) } else { body.len() };
             let at = dice.usize(0..most);
             body[at] = [dice.u8(..), 0, 0x7f, 0xff][dice.usize(0..4)];
@@ -258,7 +258,7 @@ fn a_state_of_any_content_breaks_nothing() {
     assert!(refused > 1_000 && finished > 1_000, "{refused} refused, {finished} finished");
 }
 
-/// What a later frame meets does not depend on the cut.
+/// The errors for later frames do not depend on the suspension.
 #[test]
 fn a_resumed_animation_refuses_what_it_refused_before() {
     let mut encoder = Encoder::resume(Vec::new(), &state()).unwrap();

@@ -1,8 +1,9 @@
 //! Golden frames: small pictures of the scenes in `scenes/`, committed in `tests/golden/`.
 //!
-//! Every frame must agree with its golden one within one level in each channel, drawn by the renderer and by the
-//! reference alike. A failure writes golden, drawn and difference side by side. After a change of the picture that is
-//! meant: `RAYFOLD_RENEW=1 cargo test -p rayfold-tracer --test golden`, then look at what `git diff` brings.
+//! Every frame must agree with its golden one within one level in each channel, both for the renderer and for the
+//! reference. A failure writes the golden frame, the drawn one and their difference side by side. After an intended
+//! change of the picture run `RAYFOLD_RENEW=1 cargo test -p rayfold-tracer --test golden`, then check the changes in
+//! `git diff`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,9 +14,9 @@ use image::{GenericImage as _, Rgb, RgbImage};
 use rayfold_scene::{Limits, Samples, Scene, Screen, parse};
 use rayfold_tracer::{RenderOptions, reference, render};
 
-/// Levels that a channel may be off: a result that lies on the border between two levels may round either way.
+/// The tolerance in levels: a result at the border between two levels may round either way.
 const TOLERANCE: u8 = 1;
-/// Side of a golden frame in pixels.
+/// The side of a golden frame in pixels.
 const SIDE: u32 = 96;
 
 #[test]
@@ -88,14 +89,14 @@ fn every_scene_is_shown_and_has_golden_frames() {
     assert_eq!(count, 10);
 }
 
-/// Of a folder with a script a frame, some of them.
+/// Checks some frames of a folder with a script per frame.
 fn check(folder: &str, scripts: &[&str]) {
     for script in scripts {
         compare_all(folder, script, &load(&format!("scenes/{folder}/{script}.txt"), 0));
     }
 }
 
-/// Of a folder with one script for all frames, some of them, counted from 1.
+/// Checks some frames, counted from 1, of a folder with one script for all frames.
 fn check_curves(folder: &str, frames: &[usize]) {
     for frame in frames {
         let scene = load(&format!("scenes/{folder}/{folder}.txt"), frame - 1);
@@ -124,14 +125,14 @@ fn by_reference(scene: &Scene) -> RgbImage {
     reference::render(scene, &RenderOptions::default()).unwrap()
 }
 
-/// Frame `k`, counted from 0, of a script, at the size of golden frames.
+/// Loads frame `k`, counted from 0, of a script, at the size of golden frames.
 fn load(script: &str, k: usize) -> Scene {
     let text = fs::read(root().join(script)).unwrap_or_else(|e| panic!("{script}: {e}"));
     let parsed = parse(script, &text, &Limits::default());
     let parsed_script = parsed.script.unwrap_or_else(|| panic!("{script}: {:?}", parsed.diagnostics));
     let mut scene = parsed_script.frame(k).unwrap();
     scene.screen = Screen::new(SIDE, SIDE).unwrap();
-    // One ray a pixel: of means `tests/sampled.rs` tells.
+    // One ray per pixel: `tests/sampled.rs` tests several.
     scene.samples = Samples::default();
     scene
 }

@@ -1,5 +1,5 @@
-//! The hard cases at their quick sizes, every backend within its bounds: a test a case. The figures are printed:
-//! `cargo test --test hard_cases -- --nocapture`.
+//! The hard cases at their quick sizes, every backend within its bounds: one test per case. To see the figures: `cargo
+//! test --test hard_cases -- --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 

@@ -1,5 +1,6 @@
-//! The roles' policies, enforced by the store: every operation on a key of every kind, by either role. What the protocol
-//! needs is allowed, all else is denied. That it is enough the end-to-end tests show, which run under the same documents.
+//! The roles' policies, enforced by the store: every operation on a key of every kind, by every role. Operations that
+//! the protocol needs are allowed, all others are denied. The end-to-end tests, which use the same documents, show that
+//! the allowed operations suffice.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -14,12 +15,12 @@ use rayfold_pipeline::store::{ListRequest, PutOptions, S3Store, Store, Upload};
 use rayfold_pipeline::{Error, Result};
 
 use stage::role::assume;
-use stage::stores::on_every_store;
+use stage::stores::on_every_store_with_roles;
 
 const BUCKET: &str = "films";
 
-/// One of each kind, and some that the pipeline knows nothing of.
-const KEYS: [&str; 25] = [
+/// One key of each kind, and some keys outside the pipeline.
+const KEYS: [&str; 26] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
@@ -36,6 +37,7 @@ const KEYS: [&str; 25] = [
     "frames/a/1@v-p1.begun-2",
     "frames/a/1@v-p1/2.begun-2",
     "frames/a/@assembler.json",
+    "frames/a/@sweep.json",
     "manifests/a.json",
     "manifests/a.json~0123456789abcdef",
     "assemblies/a/1-g.json",
@@ -64,7 +66,7 @@ const PREFIXES: [&str; 11] = [
 /// The functions, and the kinds of users.
 const ROLES: [&str; 5] = ["render", "assemble", "viewer", "uploader", "operator"];
 
-/// What a role may do, operation by operation. Whatever is not here must be denied.
+/// Returns the permissions of a role by operation. All others must be denied.
 fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
     let keys = |starts: &[&str]| -> Vec<&'static str> {
         KEYS.into_iter()
@@ -74,8 +76,9 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
     };
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
     let receipts = || keys(&["frames/"]).into_iter().filter(|key| !key.ends_with('/'));
-    // All but the assembler's lease.
-    let results: Vec<&str> = receipts().filter(|key| !key.ends_with("@assembler.json")).collect();
+    // All except the leases.
+    let leases = ["frames/a/@assembler.json", "frames/a/@sweep.json"];
+    let results: Vec<&str> = receipts().filter(|key| !leases.contains(key)).collect();
     let frames: Vec<&str> = receipts().filter(|key| key.ends_with(".png")).collect();
     let bands = ["frames/a/1@v-p1.2-of-3.band", "frames/a/1@v-p1/2.2-of-3.band"];
     match role {
@@ -88,7 +91,7 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
         ],
         "assemble" => {
             let written = keys(&["manifests/", "animations/", "retries/", "assemblies/", "checkpoints/"]);
-            let written = [written, errors.to_vec(), vec!["frames/a/@assembler.json"]].concat();
+            let written = [written, errors.to_vec(), leases.to_vec()].concat();
             vec![
                 ("list", keys(&["scripts/", "parts/", "frames/", "manifests/", "retries/"])),
                 ("read", keys(&["scripts/", "frames/", "manifests/", "checkpoints/", "animations/"])),
@@ -170,7 +173,7 @@ async fn filled(server: &S3Server, bucket: &str) -> S3Store {
 
 #[tokio::test]
 async fn a_role_may_do_what_it_needs_and_nothing_else() {
-    on_every_store(async |store| {
+    on_every_store_with_roles(async |store| {
         let (server, _data) = started(store).await;
         let owner = filled(&server, BUCKET).await;
         for role in ROLES {
@@ -211,7 +214,7 @@ async fn a_role_may_do_what_it_needs_and_nothing_else() {
 
 #[tokio::test]
 async fn a_role_ends_at_its_bucket() {
-    on_every_store(async |store| {
+    on_every_store_with_roles(async |store| {
         let (server, _data) = started(store).await;
         filled(&server, BUCKET).await;
         let other = filled(&server, "films-of-others").await;
@@ -232,10 +235,10 @@ async fn a_role_ends_at_its_bucket() {
     .await;
 }
 
-/// A function that is told "forbidden" where nothing is would take each first manifest for a failure.
+/// A function that got "forbidden" for an absent key would treat each first manifest as a failure.
 #[tokio::test]
 async fn what_is_not_there_is_said_to_be_absent() {
-    on_every_store(async |store| {
+    on_every_store_with_roles(async |store| {
         let (server, _data) = started(store).await;
         filled(&server, BUCKET).await;
         for (role, keys) in [
@@ -259,6 +262,6 @@ async fn what_is_not_there_is_said_to_be_absent() {
 
 fn is_denial(error: &Error) -> bool {
     let source = std::error::Error::source(error).map(ToString::to_string).unwrap_or_default();
-    // An answer to HEAD has no body that could say so.
+    // A reply to HEAD has no body that could contain the code.
     matches!(error, Error::Refused { .. }) && (source.contains("AccessDenied") || source.contains("403"))
 }

@@ -1,4 +1,4 @@
-//! The invoker's terms, tried with a function that does as it is told.
+//! The invoker's behaviour, tested with a function that follows instructions in its event.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
@@ -29,7 +29,7 @@ async fn stage(change: impl FnOnce(&mut Settings)) -> Stage {
         symlink(program, folder.path().join(function.binary())).unwrap();
     }
     let mut settings =
-        Settings::new(Functions::in_folder(folder.path()), any_port(), any_port(), "secret".into());
+        Settings::new(Functions::in_folder(folder.path()), Some(any_port()), any_port(), "secret".into());
     settings.retry_pauses = vec![Duration::from_millis(10), Duration::from_millis(20)];
     settings.sweep_every = None;
     change(&mut settings);

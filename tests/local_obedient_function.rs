@@ -1,5 +1,5 @@
-//! A function that does as its event says, to try the invoker's terms. It speaks the Runtime API over a bare socket: no
-//! runtime library stands between the invoker and what is tested.
+//! A function that follows instructions in its event, to test the invoker. It implements the Runtime API over a plain
+//! socket, so no runtime library affects the results.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ fn main() {
     let api = std::env::var("AWS_LAMBDA_RUNTIME_API").unwrap_or_default();
     let mut served = 0;
     loop {
-        // An invoker that is gone ends its processes this way.
+        // If the invoker has ended, the call fails, and this process ends.
         let Some((head, event)) = call(&api, "GET", "invocation/next", "") else { exit(0) };
         let id = header(&head, "lambda-runtime-aws-request-id").unwrap_or_default();
         let deadline = header(&head, "lambda-runtime-deadline-ms").unwrap_or_default();

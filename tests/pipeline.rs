@@ -1,4 +1,5 @@
-//! The pipeline from end to end: uploads through the SDK, events through the store's webhook, unmodified function binaries.
+//! The pipeline from end to end: uploads through the SDK, events through the store's webhook, unmodified function
+//! binaries.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -10,7 +11,7 @@ use std::time::Duration;
 
 use rayfold_lambda::raytracer::RayTracer;
 use rayfold_local::StoreKind;
-use rayfold_local::invoker::{Chaos, Settings};
+use rayfold_local::invoker::{Chaos, Listing, Settings};
 use rayfold_local::observation::{RequestKind, Seen};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::keys::ScriptName;
@@ -65,14 +66,14 @@ async fn only_what_changed_is_drawn_again() {
         stage.until_gif_of("film", &files).await;
         assert_eq!(drawn(&stage.seen()), 3);
 
-        // One changed: one rendering, a new GIF.
+        // One changed: one frame is drawn, and a new GIF built.
         files[1].1 = scene(13.0);
         stage.upload("film", &files[1..2]).await;
         stage.until_gif_of("film", &files).await;
         let seen = stage.seen();
         assert_eq!((drawn(&seen), built(&seen)), (1, 1));
 
-        // One deleted: the animation is assembled without it.
+        // One deleted: the GIF is built without it.
         let deleted = files.remove(0);
         stage.remove("film", deleted.0).await;
         let manifest = stage.until_gif_of("film", &files).await;
@@ -86,7 +87,7 @@ async fn only_what_changed_is_drawn_again() {
         stage.until_gif_of("film", &files).await;
         assert_eq!(drawn(&stage.seen()), 1);
 
-        // The same folder again: no work, no new GIF, and at most four requests an event.
+        // A repeated upload: no work, no new GIF, and at most four requests per event.
         let before = stage.gif_info("film").await.unwrap();
         stage.upload("film", &files).await;
         stage.settle().await;
@@ -98,7 +99,7 @@ async fn only_what_changed_is_drawn_again() {
         }
         assert_eq!(stage.gif_info("film").await.unwrap(), before);
 
-        // The last one gone: no GIF.
+        // The last one deleted: no GIF.
         for (name, _) in &files {
             stage.remove("film", name).await;
         }
@@ -222,7 +223,7 @@ async fn two_animations_at_once_keep_apart() {
         let mut stage = stage(store, |_| {}).await;
         let one = vec![("a.txt", scene(4.0)), ("b.txt", scene(8.0)), frames(2)];
         let two = vec![("a.txt", scene(12.0)), ("b.txt", scene(16.0)), ("c.txt", scene(20.0)), frames(3)];
-        // One below the other, too: an animation's name may be a folder of another's.
+        // Also one below the other: the name of one animation may be a folder of another.
         let below = vec![("a.txt", scene(2.0)), frames(1)];
         tokio::join!(
             stage.upload("one", &one),
@@ -270,7 +271,7 @@ async fn three_hundred_tiny_frames_at_a_concurrency_of_fifty() {
         let seen = stage.seen();
         assert_eq!(drawn(&seen), 300);
         let billed: u64 = Function::ALL.iter().flat_map(|f| requests(&seen, *f)).map(|r| r.billed()).sum();
-        // The assembler's own reading of each frame is one; the protocol's share is what the contract bounds.
+        // One request is the assembler's read of each frame. The contract bounds the rest, the protocol's requests.
         let per_frame = (billed as f64 - 300.0) / 300.0;
         assert!(per_frame <= 12.0, "{per_frame} requests a frame");
         assert_eq!(built(&seen), 1, "with `frames` given no GIF is made too early");
@@ -308,7 +309,7 @@ async fn the_requests_of_a_lonely_frame_are_these() {
             keys.collect::<Vec<_>>()
         };
         assert_eq!(kinds(Function::Render), ["frames", "manifests", "assemblies"]);
-        // Its lease, the GIF, and in the manifest which GIF that is.
+        // Its lease, the GIF, and the reference to the GIF in the manifest.
         assert_eq!(kinds(Function::Assemble), ["frames", "animations", "manifests"]);
     })
     .await;
@@ -351,6 +352,8 @@ async fn nothing_is_written_where_it_does_not_belong() {
         let mut prefixes: Vec<&str> =
             page.objects.iter().map(|object| object.key.split('/').next().unwrap()).collect();
         prefixes.dedup();
+        // The invoker's own object, where it lists the bucket.
+        prefixes.retain(|prefix| *prefix != "invokers");
         assert_eq!(prefixes, ["animations", "assemblies", "frames", "manifests", "scripts"]);
         for observation in stage.seen() {
             if let Seen::Requested { attempt, request } = observation.seen
@@ -396,7 +399,7 @@ async fn a_script_beyond_the_limits_of_the_stack_is_named_with_the_limit() {
     .await;
 }
 
-/// What a function of a little memory cannot hold is drawn by several: no byte shows it.
+/// If a frame does not fit into the memory of one function, several functions draw it. The bytes are the same.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frame_too_big_for_one_invocation_is_drawn_in_bands_with_the_same_bytes() {
     on_every_store(async |store| {
@@ -406,7 +409,7 @@ async fn a_frame_too_big_for_one_invocation_is_drawn_in_bands_with_the_same_byte
             big_scene(70.0).replace("Trace\n", "Trace\nSphere 9 20 20 -50 .9 .2 .2 .3 .3 .3\nTrace\n");
         let files = [("a.txt", big_scene(30.0)), ("b.txt", small), ("c.txt", several), frames(4)];
         stage.upload("film", &files).await;
-        // The GIF is the one that is made locally, in one piece.
+        // The GIF equals the one that is made locally, in one piece.
         let manifest = stage.until_gif_of("film", &files).await;
         let seen = stage.seen();
         let outcomes = outcomes(&seen);
@@ -422,7 +425,7 @@ async fn a_frame_too_big_for_one_invocation_is_drawn_in_bands_with_the_same_byte
             let Drawing::Frame(whole) = whole else { panic!("{key}") };
             assert!(there == whole, "{key}");
         }
-        // The same again costs no more than any frame that is there.
+        // A repeated upload costs no more than for any existing frame.
         stage.upload("film", &files[..1]).await;
         stage.settle().await;
         for requests in requests(&stage.seen(), Function::Render) {
@@ -447,4 +450,18 @@ async fn a_frame_that_fits_in_no_number_of_bands_is_named_with_what_it_takes() {
         assert!(reason.message.starts_with(expected), "{}", reason.message);
     })
     .await;
+}
+
+/// The webhook says that there is news; what it is comes from the listing.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_webhook_hastens_the_listing() {
+    let mut stage = stage(StoreKind::BuiltIn, |_| {}).await;
+    let never = Duration::from_secs(100_000);
+    let listing = Listing { every: never, ..Listing::new(stage.store().clone(), "lister") };
+    stage.platform.settings_mut().listing = Some(listing);
+    stage.restart_invoker().await;
+    let files = vec![("1.txt", scene(8.0)), ("2.txt", scene(12.0)), frames(2)];
+    stage.upload("film", &files).await;
+    stage.until_gif_of("film", &files).await;
+    assert_eq!(drawn(&stage.seen()), 2);
 }

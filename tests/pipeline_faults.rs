@@ -1,5 +1,5 @@
-//! The pipeline when things go wrong at a chosen moment: processes killed between two requests, answers lost, the invoker
-//! down, events lost. After each the animation is what the uploaded set says, or says why it is not.
+//! The pipeline with faults at a chosen moment: processes killed between two requests, replies lost, the invoker down,
+//! events lost. After each fault the animation equals the uploaded set, or reports why it does not.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -23,7 +23,7 @@ async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     stage::stage(store, Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change).await
 }
 
-/// The fate of the first `times` puts below a prefix by a function.
+/// Returns a fate for the first `times` puts below a prefix by a function.
 fn at_put(of: Function, prefix: &'static str, times: usize, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
     let met = Arc::new(AtomicUsize::new(0));
     let count = met.clone();
@@ -55,8 +55,8 @@ async fn a_render_process_killed_in_the_middle_is_made_good() {
                 let mut stage = stage(store, |settings| settings.fates = Some(fates)).await;
                 stage.upload("film", &film()).await;
                 stage.until_gif_of("film", &film()).await;
-                // A manifest whose put took effect stands, whether or not anyone heard of it: the next attempt at the event
-                // finds its own commit, lists once more, and puts another only if something has come meanwhile.
+                // A manifest whose put took effect stays, even if the reply was lost. The next attempt at the event
+                // finds its own commit, lists once more, and puts another one only if there are new results.
                 let again = prefix != "manifests/" || fate == Fate::KillBefore;
                 let met = met.load(Ordering::SeqCst);
                 assert!(met > usize::from(again), "{fate:?} at {prefix}: written {met} times");
@@ -68,7 +68,7 @@ async fn a_render_process_killed_in_the_middle_is_made_good() {
     .await;
 }
 
-/// The first put of a key that ends so.
+/// Returns a fate for the first put of a key with this ending.
 fn at_put_of(ending: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
     let met = Arc::new(AtomicUsize::new(0));
     let count = met.clone();
@@ -156,7 +156,7 @@ async fn a_frame_that_takes_too_long_is_named() {
     let mut stage = stage(store, |settings| {
         settings.timeout = Duration::from_secs(3);
         settings.retry_pauses = vec![Duration::from_millis(10), Duration::from_millis(10)];
-        // In bands it would be drawn, and named at once if it had more pixels.
+        // In bands it would be drawn. With more pixels it would be reported at once.
         settings.environment.push(("RAYFOLD_MAX_BANDS".into(), "1".into()));
     })
     .await;
@@ -176,7 +176,7 @@ async fn a_frame_that_takes_too_long_is_named() {
     }).await;
 }
 
-/// Enough to trace for a minute.
+/// Returns a script that takes a minute to trace.
 fn mirrors() -> String {
     let mut script = String::new();
     for number in 0..400 {
@@ -202,7 +202,7 @@ async fn uploads_while_the_invoker_is_down_are_caught_up_with() {
         stage.until_gif_of("film", &files).await;
         stage.until_gif_of("other", &film()).await;
 
-        // And what is done is left alone by the next start.
+        // The next start does not repeat completed work.
         stage.seen();
         stage.restart_invoker().await;
         stage.settle().await;
@@ -219,7 +219,7 @@ async fn lost_events_are_found_by_the_sweep() {
             settings.chaos = Chaos { seed: 3, drop: 0.4, ..Chaos::default() };
             settings.sweep_every = Some(Duration::from_millis(500));
             settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "1000".into()));
-            // Wakings are events too, and lost as often: with three attempts some frames would be given up.
+            // Wake-ups are events too, and are lost as often. With three attempts some frames would be given up.
             settings.environment.push(("RAYFOLD_ATTEMPTS".into(), "20".into()));
         })
         .await;
@@ -251,8 +251,8 @@ async fn a_storm_of_everything_ends_in_the_right_gif() {
         let mut stage = stage(store, |settings| {
             settings.concurrency = 8;
             settings.fates = Some(fates);
-            // The assembler reads thirty frames: where one request in a hundred is deadly, three tries of it all die one
-            // time in forty, and the animation is rightly refused.
+            // The assembler reads thirty frames. If one request in a hundred is fatal, all of three attempts fail in
+            // one case of forty, and the animation is rightly rejected.
             settings.retry_pauses = vec![Duration::from_millis(50); 5];
             settings.sweep_every = Some(Duration::from_secs(1));
             settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), "3000".into()));

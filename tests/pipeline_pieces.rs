@@ -1,7 +1,8 @@
-//! GIFs that several invocations build, one after the other, with the real encoder, stores and function binaries: the bytes
-//! are those that are made locally in one go.
+//! GIFs that several invocations build, one after the other, with the real encoder, stores and function binaries. Their
+//! bytes equal those of a GIF made locally at once.
 //!
-//! The assemblers are told to keep so much of their time free that each takes a frame and leaves the rest to the next one.
+//! The assemblers are configured to keep so much of their time free that each adds a frame and leaves the rest to the
+//! next one.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -29,7 +30,7 @@ async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     stage::stage(store, functions, settings).await
 }
 
-/// A scene with many colours, so that the encoder has something to remember.
+/// Returns a scene with many colours, so that the encoder has state to keep.
 fn clouds(size: (u32, u32), x: f64) -> String {
     let (width, height) = size;
     let (radius, left, top) = (height / 2, f64::from(width) / 2.0 + x, height / 2);
@@ -47,19 +48,19 @@ fn film(size: (u32, u32), count: usize) -> Vec<(&'static str, String)> {
     files
 }
 
-/// After how many frames GIFs were left unfinished, in order.
+/// Returns the numbers of frames after which GIFs were left unfinished, in order.
 fn left(seen: &[Observation]) -> Vec<u64> {
     logged(seen).iter().filter_map(|line| line["left_after"].as_u64()).collect()
 }
 
-/// Neither a checkpoint nor a lease is left.
+/// Checks that neither a checkpoint nor a lease is left.
 async fn assert_tidy(stage: &Stage) {
     let checkpoints = stage.store().list(ListRequest::all("checkpoints/")).await.unwrap();
     assert_eq!(checkpoints.objects, []);
     assert!(stage.store().head("frames/film/@assembler.json").await.unwrap_err().is_not_found());
 }
 
-/// Each invocation takes one frame.
+/// Each invocation adds one frame.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_gif_in_pieces_has_the_bytes_of_one_in_one_piece() {
     on_every_store(async |store| {
@@ -74,7 +75,7 @@ async fn a_gif_in_pieces_has_the_bytes_of_one_in_one_piece() {
     .await;
 }
 
-/// The fate of the request of a kind that comes at `number` below a prefix of the assemblers'.
+/// Returns a fate for the `number`th request of a kind below a prefix by assemblers.
 fn at(number: usize, kind: RequestKind, prefix: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
     let met = Arc::new(AtomicUsize::new(0));
     let count = met.clone();
@@ -118,15 +119,14 @@ async fn an_assembler_that_dies_between_two_pieces_is_made_good() {
     .await;
 }
 
-/// What is written down is of a set that is no more, or is no checkpoint at all.
+/// The checkpoint is that of another set, or is malformed.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_left_of_another_set_or_cannot_be_read_is_begun_anew() {
     on_every_store(async |store| {
         let mut stage = stage(store, |_| {}).await;
         let mut files = film((160, 120), 4);
         stage.upload("film", &files).await;
-        // As soon as a part of it is written down the first script is another one, and then what is written down is not
-        // readable.
+        // At the first checkpoint the first script changes. At the next one the checkpoint becomes malformed.
         let mut changed = 0;
         while changed < 2 {
             let _ = stage.next().await;

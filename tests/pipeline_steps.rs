@@ -1,5 +1,5 @@
-//! The steps with the real renderer and encoder on a store in memory, events delivered by hand: what a bucket holds
-//! after the things that users do.
+//! The steps with the real renderer and encoder on a store in memory, with events delivered by hand: the contents of a
+//! bucket after users' actions.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
@@ -21,7 +21,7 @@ use rayfold_pipeline::{
     Clock, Invocation, Policy, Randomness, Result, Timestamp, assemble, record_failure, render_frame, sweep,
 };
 
-/// A clock that jumps to wherever someone waits for.
+/// A clock that jumps to the end of each wait.
 #[derive(Clone, Default)]
 struct JumpingClock(Arc<AtomicU64>);
 
@@ -70,7 +70,7 @@ impl World {
         self.event(key).await
     }
 
-    /// Delivers an event for the render function, and then those that it causes.
+    /// Delivers an event to the render function, and then the events that this causes.
     async fn event(&mut self, key: &str) -> Outcome {
         self.events += 1;
         let id = format!("request-{}", self.events);
@@ -82,7 +82,7 @@ impl World {
         outcome
     }
 
-    /// Delivers what is new below `parts/`, `retries/` and `assemblies/`.
+    /// Delivers the new keys below `parts/`, `retries/` and `assemblies/`.
     async fn deliver(&mut self) {
         for prefix in ["parts/", "retries/", "assemblies/"] {
             for listed in self.store.list(ListRequest::all(prefix)).await.unwrap().objects {
@@ -104,7 +104,7 @@ impl World {
         self.store.put(key, body.into(), PutOptions::always()).await.unwrap();
     }
 
-    /// Sweeps, and delivers what that leads to; says what was done for the animation `a`.
+    /// Sweeps, and delivers the events that this causes. Returns the result for the animation `a`.
     async fn sweep(&mut self) -> Visit {
         self.events += 1;
         let id = format!("sweep-{}", self.events);
@@ -112,7 +112,7 @@ impl World {
         let swept = require_send(sweep(&invocation)).await.unwrap();
         let of_a = |(animation, visit)| (Animation::as_str(&animation) == "a").then_some(visit);
         let visit: Result<Visit> = swept.visits.into_iter().find_map(of_a).unwrap();
-        // What is put again fires again.
+        // A key that is put again sends another event.
         self.delivered.retain(|key| key.starts_with("parts/"));
         let visit = visit.unwrap();
         if visit.claimed || visit.woken > 0 {
@@ -142,7 +142,7 @@ fn script(x: u32, traces: usize) -> String {
     format!("{sphere}Trace\n{more}")
 }
 
-/// What rendering the same scripts in one process gives.
+/// Returns the GIF of the same scripts, made in one process.
 fn local_gif(scripts: &[String], fps: f64) -> Vec<u8> {
     let mut file = Vec::new();
     let settings = rayfold_gif::Settings::new(fps, 0);
@@ -272,13 +272,14 @@ async fn frames_of_unlike_sizes_are_refused_by_name() {
     assert!(world.gif("a").await.is_some());
 }
 
-/// What an invocation puts first that this retry woke.
+/// Returns the key that an invocation woken by this retry puts first.
 fn begun(retry: &str) -> String {
     let Ok(Key::Retry { animation, name, tag, part, attempt }) = retry.parse() else { panic!("{retry}") };
     animation.receipt(&Receipt::Begun { name, tag, part, attempt })
 }
 
-/// A frame that waited behind those of another animation was given up after three wakings, though none had begun.
+/// Regression test: a frame that waited behind those of another animation was given up after three wake-ups, though no
+/// attempt had begun.
 #[tokio::test]
 async fn a_frame_that_waits_in_the_queue_is_not_given_up() {
     let mut world = World::new();
@@ -321,7 +322,7 @@ async fn the_sweep_wakes_what_was_lost_and_gives_up_in_the_end() {
         assert_eq!((visit.woken, visit.given_up), expected, "attempt {attempt}");
         let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
         assert_eq!(retries.len() as u64, attempt.min(3));
-        // Each waking begins an invocation, which dies.
+        // Each wake-up starts an invocation, which is killed.
         for retry in &retries {
             world.store.put(&begun(&retry.key), "".into(), PutOptions::always()).await.unwrap();
         }
@@ -363,7 +364,8 @@ async fn the_sweep_deletes_what_is_long_superseded() -> Result<()> {
     Ok(())
 }
 
-/// Garbage, an empty file, a later schema: uploads, sweeps, `status` and `retry` all failed until it was deleted by hand.
+/// Garbage, an empty file, a later schema. Regression test: uploads, sweeps, `status` and `retry` all failed until the
+/// manifest was deleted by hand.
 #[tokio::test]
 async fn a_manifest_that_cannot_be_read_is_made_anew_and_set_aside() {
     let mut world = World::new();
@@ -399,7 +401,7 @@ async fn a_manifest_that_cannot_be_read_is_made_anew_and_set_aside() {
             assert_eq!(world.store.get(&aside).await.unwrap().body, body, "{place}");
             world.store.delete(&aside).await.unwrap();
         }
-        // The manifest that an event has made anew names no GIF, which the sweep notices.
+        // The manifest that an event has rebuilt refers to no GIF, which the sweep detects.
         assert_eq!(world.sweep().await, Visit { claimed: true, ..Visit::default() }, "{place}");
         assert_eq!(world.sweep().await, Visit::default(), "{place}: nothing is left to do");
     }
@@ -439,7 +441,8 @@ async fn a_faulty_script_whose_name_starts_with_an_at_sign_is_named() {
     assert_eq!(world.sweep().await, Visit::default());
 }
 
-/// `x@<etag of x>-p1.txt`, uploaded first, kept `x.txt` pending: its receipt was taken for one of `x`.
+/// Regression test: `x@<etag of x>-p1.txt`, uploaded first, kept `x.txt` pending, because its receipt was mistaken for
+/// one of `x`.
 #[tokio::test]
 async fn a_script_that_is_called_like_anothers_receipts_does_not_stand_for_it() {
     let mut world = World::new();
@@ -472,7 +475,7 @@ async fn what_is_too_large_is_named_and_not_read_whole() {
     assert!(reason.message.contains("200 bytes"), "{}", reason.message);
 }
 
-/// A frame that was none was refused without its name, and `retry` went round in circles.
+/// Regression test: an invalid frame was rejected without its name, and `retry` had no effect.
 #[tokio::test]
 async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
     let mut world = World::new();
@@ -480,7 +483,7 @@ async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
     let frames = world.store.list(ListRequest::all("frames/a/1@")).await.unwrap().objects;
     let key = &frames[0].key;
     let whole = world.store.get(key).await.unwrap().body;
-    // Of the next set it is a part.
+    // It is a part of the next set.
     for (number, garbage) in
         ["".into(), "garbage".into(), whole.slice(..whole.len() / 2)].into_iter().enumerate()
     {
@@ -492,7 +495,7 @@ async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
         assert!(world.gif("a").await.unwrap() == expected, "{number}");
         assert!(world.store.get(key).await.unwrap().body == whole, "{number}");
     }
-    // As often as a frame may be tried: from now on it is named.
+    // This is the last attempt at a frame: from now on it is reported.
     world.put(key, "garbage").await;
     world.upload("scripts/a/2.txt", &script(9, 1)).await;
     world.deliver().await;
@@ -511,7 +514,7 @@ async fn a_frame_that_is_none_is_drawn_anew_and_in_the_end_named() {
     assert!(world.gif("a").await.unwrap() == local_gif(&[script(1, 1), script(9, 1)], 10.0));
 }
 
-/// Half of it stood there as current, for its metadata said so.
+/// Regression test: half of the GIF was considered current because of its metadata.
 #[tokio::test]
 async fn a_gif_that_was_cut_off_with_its_metadata_is_built_anew() {
     let mut world = World::new();
@@ -529,14 +532,14 @@ async fn a_gif_that_was_cut_off_with_its_metadata_is_built_anew() {
     cut(&world).await;
     assert!(world.sweep().await.claimed);
     assert!(world.gif("a").await.unwrap() == whole.body);
-    // The set becomes another one and this one again, before a GIF of the other is built.
+    // The set changes and changes back before a GIF of the other set is built.
     cut(&world).await;
     world.upload("scripts/a/animation.json", r#"{"frames": 9}"#).await;
     world.remove("scripts/a/animation.json").await;
     assert!(world.gif("a").await.unwrap() == whole.body);
 }
 
-/// One animation of millions of frames, or one script of them, could be drawn at others' cost.
+/// One animation of millions of frames, or one script of them, could be drawn at the cost of other users.
 #[tokio::test]
 async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {
     let mut world = World::new();
@@ -571,7 +574,8 @@ async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {
     assert!(world.gif("a").await.unwrap() == local_gif(&[script(4, 1), script(5, 1)], 10.0));
 }
 
-/// What an older function could not read stayed a fault for good, though a newer one can.
+/// Regression test: settings that an older function could not read stayed a fault, though a newer function can read
+/// them.
 #[tokio::test]
 async fn settings_that_could_not_be_read_are_read_again() {
     let mut world = World::new();
@@ -589,7 +593,8 @@ async fn settings_that_could_not_be_read_are_read_again() {
     assert_eq!((head.status, head.settings.fault), (Status::Done, None));
 }
 
-/// Three restarts counted as three attempts: then 75 s of a busy store failed a frame for good, and so did the next sweep.
+/// Regression test: three restarts counted as three attempts. Then 75 s of a busy store made a frame fail for good, and
+/// so did the next sweep.
 #[tokio::test]
 async fn restarts_are_no_attempts_at_a_frame() {
     let world = World::new();
@@ -606,7 +611,7 @@ async fn restarts_are_no_attempts_at_a_frame() {
         let visit = *swept.visits[0].1.as_ref().unwrap();
         assert_eq!((visit.woken, visit.given_up), (1, 0), "restart {restart}");
         assert_eq!(begun_attempts(&world).await, 0, "restart {restart}");
-        // The woken invocation begins, and is cut off with the next restart.
+        // The woken invocation begins, and is ended by the next restart.
         let retries = world.store.list(ListRequest::all("retries/")).await.unwrap().objects;
         world.put(&begun(&retries.last().unwrap().key), "").await;
     }

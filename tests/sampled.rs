@@ -1,5 +1,5 @@
-//! Pictures whose pixels are means: drawn by the packets as the plain tracer draws them, the same whatever they are drawn with,
-//! and means of what the language says.
+//! Pictures with several samples per pixel. The packets draw them like the plain tracer does, with any instruction set
+//! and search structure, and their pixels are the means that the language defines.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -8,7 +8,8 @@ use rayfold_scene::{Limits, Samples, Scene, Script, parse};
 use rayfold_tracer::reference::{self, estimate};
 use rayfold_tracer::{Drawing, Exposure, Level, Precision, RenderOptions, render, render_exposed};
 
-/// Balls, bricks, a tent, a floor, mirrors; `extra` goes before the lights, which it may replace.
+/// Returns a script with spheres, boxes, a tent, a floor and mirrors. `extra` goes before the lights, which it may
+/// replace.
 fn table(size: &str, extra: &str, sun: &str) -> String {
     format!(
         "Screen {size}\nLook 0 3.4 8  0 .7 0  34\nBackground .55 .65 .8\n{extra}\n{sun}\n\
@@ -24,7 +25,7 @@ const SUN: &str = "Ilight .6 .6 .55  1 -1.7 -1";
 const WIDE_SUN: &str = "Ilight .6 .6 .55  1 -1.7 -1  9";
 const LAMP: &str = "Plight .9 .8 .6  -2.5 4 3  .6";
 
-/// Every effect alone, and all together.
+/// Returns scripts with every effect alone, and with all together.
 fn effects(size: &str) -> Vec<(&'static str, String)> {
     let bodies = "Cone .5 .1  2.6 0 .8  2.6 1 .8  .1 .1 .1 .5 .3 .6\nTorus .5 .15  -.3 .6 -2  0 1 1  .1 .1 .1 .3 .6 .6 .2 .2 .2\n\
                   Material tiles ambient .1 .1 .1 diffuse .6 .6 .6 shine .5 .5 .5 40 checker .3 dark\n\
@@ -68,7 +69,7 @@ fn effects(size: &str) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// A frame with its script.
+/// A frame and its script.
 struct Frame {
     script: Script,
     scene: Scene,
@@ -93,7 +94,7 @@ impl Frame {
     }
 }
 
-/// The share of pixels of which a channel differs by more than so many levels.
+/// Returns the share of pixels of which a channel differs by more than `levels`.
 fn apart(a: &RgbImage, b: &RgbImage, levels: u8) -> f64 {
     assert_eq!(a.dimensions(), b.dimensions());
     let differ =
@@ -110,7 +111,7 @@ fn packets_take_the_samples_that_the_plain_tracer_takes() {
             frame.with(|exposure| reference::render_exposed(exposure, &RenderOptions::default())).unwrap();
         for precision in [Precision::Auto, Precision::F64] {
             let drawn = frame.draw(&RenderOptions { precision, ..Default::default() });
-            // A ray in sixteen that falls on the other side of an edge is a few levels.
+            // If one ray of sixteen hits the other side of an edge, the pixel changes by a few levels.
             let (some, many) = (apart(&drawn, &plain, 1), apart(&drawn, &plain, 16));
             println!(
                 "{name}, {precision:?}: {:.2} % of the pixels differ by more than a level",
@@ -135,7 +136,8 @@ fn means_are_those_of_independent_samples() {
                     rayfold_scene::Tone::Plain => level,
                     rayfold_scene::Tone::Srgb => linear(level),
                 };
-                // Beside the error of the truth that of the picture, of its rounding, and of what no sample has seen.
+                // Besides the error of the true value: the error of the picture, of its rounding, and of details that
+                // no sample has hit.
                 let error = error[channel].hypot(1.5 / 255.0);
                 sum += ((level - mean[channel]) / error).powi(2);
                 count += 1.0;
@@ -192,7 +194,7 @@ fn what_does_not_change_does_not_flicker() {
     let (before, after) = (text("Sphere .3 3 .3 2 1 0 0 0 0 0"), text("Sphere .3 3.1 .3 2 1 0 0 0 0 0"));
     let draw = |text: &str| Frame::new(text, 64, 1.0).draw(&RenderOptions::default());
     let (before, after) = (draw(&before), draw(&after));
-    // The ball moves at the right edge: nothing left of the middle sees it.
+    // The ball moves at the right edge: no pixel left of the centre changes.
     for (x, y, pixel) in before.enumerate_pixels().filter(|(x, ..)| *x < 48) {
         assert_eq!(pixel, after.get_pixel(x, y), "{x} {y}");
     }
@@ -227,7 +229,7 @@ fn a_shutter_smears_what_moves_and_nothing_else() {
     let sharp = Frame::new(&table("96 72", "", SUN), 64, 0.0);
     let smeared = Frame::new(&table("96 72", "Shutter 1", SUN), 64, 0.0);
     let (sharp, smeared) = (sharp.draw(&RenderOptions::default()), smeared.draw(&RenderOptions::default()));
-    // The ball passes the middle; the tent at the left edge stands.
+    // The ball passes the centre; the tent at the left edge does not move.
     let differs = |columns: std::ops::Range<u32>| {
         sharp.enumerate_pixels().any(|(x, y, pixel)| columns.contains(&x) && pixel != smeared.get_pixel(x, y))
     };

@@ -1,8 +1,8 @@
-//! What is smaller than a pixel has its light whatever error is asked for: thin things of all shapes, their shadows, what is seen of
-//! them in mirrors and through glass, sparks, stars that drift, narrow highlights, and pictures of one pixel. And patterned
-//! floors and whatever scenes have the error that was asked for.
+//! Objects smaller than a pixel contribute their light, whatever the requested error: thin objects of all shapes, their
+//! shadows, their images in mirrors and through glass, sparks, stars that drift, narrow highlights, and pictures of one
+//! pixel. Patterned floors and random scenes have the requested error.
 //!
-//! Scenes are drawn at random; a failure prints the seed. `RAYFOLD_SEED` tries another one.
+//! Scenes are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it measured")]
 
@@ -17,7 +17,7 @@ use rayfold_tracer::{Exposure, RenderOptions, render_exposed};
 
 const SEED: u64 = 20_261_125;
 
-/// A white wire on black, so many pixels wide, in a picture of 320 x 120.
+/// Returns a white wire on black, this many pixels wide, in a picture of 320 x 120.
 fn wire(width: f64) -> String {
     let radius = width / 120.0 * 5.0 * (22.5f64).to_radians().tan();
     format!("Screen 320 120\nLook 0 0 5 0 0 0 45\nCylinder {radius} -5 .35 0 5 -.35 0 1 1 1 0 0 0\nTrace\n")
@@ -38,24 +38,24 @@ fn draw(text: &str, samples: u32, error: f64) -> RgbImage {
     frame(&script(text), 0, samples, error)
 }
 
-/// The sum of all levels.
+/// Returns the sum of all levels.
 fn light(image: &RgbImage) -> f64 {
     image.as_raw().iter().map(|&level| f64::from(level)).sum()
 }
 
-/// The root mean square of the differences of levels.
+/// Returns the root mean square of the differences of levels.
 fn apart(a: &RgbImage, b: &RgbImage) -> f64 {
     let squares = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
     (squares.sum::<f64>() / a.as_raw().len() as f64).sqrt()
 }
 
-/// The mean of the differences of levels.
+/// Returns the mean of the differences of levels.
 fn off(a: &RgbImage, b: &RgbImage) -> f64 {
     let sum: f64 = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| f64::from(*a) - f64::from(*b)).sum();
     sum / a.as_raw().len() as f64
 }
 
-/// How much two pictures without what is thin and with it differ, as a picture: what the thin thing does.
+/// Returns the sum of the differences between the pictures with and without the thin object: its effect.
 fn effect(with: &RgbImage, without: &RgbImage) -> f64 {
     with.as_raw().iter().zip(without.as_raw()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum()
 }
@@ -92,7 +92,7 @@ fn a_wire_has_no_gap_where_samples_are_enough() {
     }
 }
 
-/// Each shape as thin as a tenth of a pixel, in a picture of 160 x 120 that shows 4 x 3 at the origin.
+/// Each shape with a thickness of a tenth of a pixel, in a picture of 160 x 120 that shows 4 x 3 at the origin.
 const THIN: [(&str, &str); 12] = [
     (
         "balls",
@@ -128,7 +128,8 @@ fn thin_things_of_all_shapes_have_their_light() {
     }
 }
 
-/// What thin things do that are not seen themselves: a shadow on a floor and a wall, a picture in a mirror, one behind panes.
+/// Effects of thin objects that are not visible themselves: a shadow on a floor and a wall, an image in a mirror, an
+/// object behind panes.
 const BEHIND: [(&str, &str); 5] = [
     (
         "a shadow",
@@ -201,7 +202,7 @@ fn narrow_highlights_of_small_balls_have_their_light() {
 #[test]
 fn a_picture_of_one_pixel_is_the_mean_of_what_is_in_it() {
     let text = "Screen 1 1\nLook 0 0 5 0 0 0 20\nSphere .5 0 0 0 1 0 0 0 0 0\nTrace\n";
-    // So many levels may the samples themselves be off.
+    // The tolerance for the samples' own noise, in levels.
     for (samples, noise) in [(64, 12), (256, 5), (1024, 3)] {
         let level = i32::from(draw(text, samples, 1.0).get_pixel(0, 0)[0]);
         println!("{samples}: {level}");
@@ -221,7 +222,7 @@ fn a_star_that_drifts_is_there_in_every_frame() {
     }
 }
 
-/// Two pixels and more from one moment that is looked at to the next.
+/// The stars move by two pixels and more from one sampled moment to the next.
 #[test]
 fn stars_that_are_fast_leave_traces_without_gaps() {
     for way in [2.0, 30.0, 90.0] {
@@ -267,7 +268,7 @@ impl Dice {
         format!("{:.3} {:.3} {:.3}", self.within(low, high), self.within(low, high), self.within(low, high))
     }
 
-    /// A checkered or striped floor to the horizon, with balls on it or not, a lens or not, soft light or not.
+    /// Returns a checkered or striped floor to the horizon, with or without spheres, a lens and soft light.
     fn floor(&mut self) -> String {
         let mut text = format!("Screen 80 60\nTone srgb\nBackground {}\n", self.rgb(0.2, 0.9));
         let (height, target) = (self.within(0.6, 2.0), self.within(0.2, 0.9));
@@ -307,7 +308,7 @@ impl Dice {
     }
 }
 
-/// What is asked for, and what rounding to levels adds.
+/// The error is at most the requested one plus that of rounding to levels.
 #[test]
 fn patterned_floors_have_the_error_that_is_asked_for() {
     let mut dice = Dice::new("patterned floors", SEED);
@@ -325,7 +326,7 @@ fn patterned_floors_have_the_error_that_is_asked_for() {
     }
 }
 
-/// By the plain tracer 230, which takes numbers of any size.
+/// The plain tracer, which accepts numbers of any size, draws 230.
 #[test]
 fn a_faint_lamp_of_a_far_reach_lights_as_it_says() {
     let text = "Screen 9 9\nLook 0 0 5 0 0 0 40\nPlight 1e-200 1e-200 1e-200 0 0 1 0 1e100\nBox -9 -9 -1 9 9 0 0 0 0 .9 .9 .9\nTrace\n";

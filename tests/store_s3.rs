@@ -1,4 +1,4 @@
-//! The S3 store against S3 servers that are none of AWS's: the one built in, and MinIO where there is one.
+//! The S3 store against S3 servers other than AWS: the built-in one, and MinIO if it is installed.
 
 #![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
@@ -13,11 +13,12 @@ use aws_smithy_http_client::Builder as HttpBuilder;
 use bytes::{Bytes, BytesMut};
 use rayfold_local::{S3Server, StoreKind, any_port};
 use rayfold_pipeline::manifest::Reason;
-use rayfold_pipeline::store::{Connection, ListRequest, PutOptions, S3Store, Store, Upload, conformance};
+use rayfold_pipeline::store::{Connection, ListRequest, PutOptions, S3Store, Store, Upload};
 use rayfold_pipeline::{
     Animator, Clock, Encoding, Error, Invocation, Policy, Randomness, SystemClock, Unfit, assemble,
 };
 use rayfold_scene::AnimationSettings;
+use rayfold_simulation::conformance;
 use stores::on_every_store;
 
 async fn started(store: StoreKind) -> (S3Server, tempfile::TempDir) {
@@ -40,7 +41,7 @@ async fn the_s3_store_conforms() {
     .await;
 }
 
-/// What is put together of frames that are parts of an upload by themselves.
+/// A joiner of frames that are parts of an upload by themselves.
 struct Joiner;
 
 struct Joined(BytesMut);
@@ -71,7 +72,7 @@ impl Encoding for Joined {
     }
 }
 
-/// The parts of one upload are sent by one invocation after the other, each with a client of its own.
+/// The invocations that send the parts of one upload run one after the other, each with its own client.
 #[tokio::test]
 async fn an_animation_of_many_parts_is_assembled_by_several_invocations() {
     on_every_store(async |store| {
@@ -136,7 +137,7 @@ async fn an_upload_that_may_not_finish_leaves_no_parts() {
     .await;
 }
 
-/// Uploads of a key that were begun and neither finished nor given up.
+/// Returns the number of uploads of a key that were begun and neither completed nor aborted.
 async fn unfinished(server: &S3Server, bucket: &str, key: &str) -> usize {
     let owner = server.connection();
     let config = aws_sdk_s3::Config::builder()

@@ -1,19 +1,29 @@
-//! The studio's page in a real browser, against the real program: what `crates/studio/web/tests` does.
+//! The studio's page in a real browser with the real program: runs `crates/studio/web/tests`.
 //!
-//! It takes Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). Where one of them is not there one
-//! line says that the page was not tested; nothing is installed here.
+//! The test needs Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). If one of them is missing,
+//! a line reports that the page was not tested. Nothing is installed here.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 4] = ["tests/page.mjs", "tests/files.mjs", "tests/runs.mjs", "tests/time.mjs"];
+const TESTS: [&str; 9] = [
+    "tests/logic.mjs",
+    "tests/page.mjs",
+    "tests/language.mjs",
+    "tests/script.mjs",
+    "tests/edit.mjs",
+    "tests/arrange.mjs",
+    "tests/files.mjs",
+    "tests/runs.mjs",
+    "tests/time.mjs",
+];
 
 /// The names of the browser, in the order in which they are tried.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
-/// The first Node that knows all that the tests use.
+/// The first version of Node with all features that the tests use.
 const NODE: u32 = 20;
 
 #[test]
@@ -22,7 +32,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
     let browser = match tools(&web) {
         Ok(browser) => browser,
         Err(missing) => {
-            // Not by `eprintln!`, which a test that passes keeps to itself.
+            // `eprintln!` would print nothing in a test that passes.
             writeln!(std::io::stderr(), "studio: the page was NOT TESTED: {missing}")
                 .expect("standard error");
             return;
@@ -30,10 +40,10 @@ fn the_page_does_in_a_browser_what_it_promises() {
     };
     let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
     let mut node = Command::new("node");
-    // One after the other: each draws on all cores.
+    // One after the other, because each uses all cores.
     node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
     if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
-        // Built with this test; without them `rayfold dev` builds them itself.
+        // The functions were built with this test. Without them `rayfold dev` builds them itself.
         node.env("RAYFOLD_FUNCTIONS", beside);
     }
     node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", browser).stdin(Stdio::null());
@@ -41,7 +51,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
     assert!(status.success(), "see above which of the page's tests failed");
 }
 
-/// The browser, or what is missing.
+/// Returns the browser, or the missing tool.
 fn tools(web: &Path) -> Result<PathBuf, String> {
     let node = Command::new("node").arg("--version").output().map_err(|_| "there is no node".to_owned())?;
     let version = String::from_utf8_lossy(&node.stdout).trim().trim_start_matches('v').to_owned();

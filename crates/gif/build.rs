@@ -11,12 +11,16 @@ const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
 fn main() -> io::Result<()> {
-    let (sources, versions) = (Path::new("src"), Path::new("../../Cargo.lock"));
+    let sources = Path::new("src");
     println!("cargo::rerun-if-changed={}", sources.display());
-    println!("cargo::rerun-if-changed={}", versions.display());
+    // A published package has its own; in the repository there is one for all crates.
+    let versions = ["Cargo.lock", "../../Cargo.lock"].map(Path::new).into_iter().find(|file| file.exists());
     let mut files = fs::read_dir(sources)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
     files.sort();
-    files.push(versions.into());
+    if let Some(versions) = versions {
+        println!("cargo::rerun-if-changed={}", versions.display());
+        files.push(versions.into());
+    }
     let mut hash = OFFSET;
     for file in files {
         let name = file.file_name().unwrap_or_default().as_encoded_bytes();

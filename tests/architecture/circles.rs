@@ -1,52 +1,88 @@
-//! Which modules of a crate use one another in a circle.
+//! Finds cyclic dependencies between the modules of a crate.
 //!
 //! Two modules that use each other are one module in two files: neither can be read, tested or changed alone. A module
-//! uses another one that it names by a path, in an import or anywhere in its code. A re-export is looked through: who
-//! names it uses the module where the thing stands. Tests do not count.
+//! uses another one if it names it by a path, in an import or elsewhere in its code. Re-exports are resolved: the
+//! module that defines the item counts as used. Tests do not count.
 //!
-//! Parent and child: to declare or to re-export a child is not to use it, but to call it is. A child may use its
-//! parents' types and constants (names that begin with a capital), as a room is furnished by the house that it is in;
-//! a parent's function is a use like any other.
+//! Parents and children: a declaration or a re-export of a child does not count as a use, but a call does. A child may
+//! use its parents' types and constants (names that begin with a capital), because these are its context. A use of a
+//! parent's function counts like any other.
 //!
-//! Knows tokens and no types: what is used without being named (a method of another module's type) is not seen.
+//! The search knows tokens and no types. Uses without a name (a method of another module's type) are not found.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
-/// The modules of a crate as its files declare them, by their paths from the crate's root.
+/// The modules of a crate according to its files, by their paths from the crate's root.
 type Modules = BTreeMap<Vec<String>, Module>;
 
-/// What a module's tokens say.
+/// The contents of a module, from its tokens.
 #[derive(Debug, Default)]
 struct Module {
     children: BTreeSet<String>,
     imports: Vec<Import>,
-    /// Paths in its code, and all single names.
+    /// The paths in its code, and all single names.
     mentions: BTreeSet<Vec<String>>,
 }
 
-/// A name that a `use` brings in; `*` for a glob.
+/// A name that a `use` imports; `*` for a glob.
 #[derive(Debug)]
 struct Import {
     name: String,
     path: Vec<String>,
-    /// Whether others see it, too.
+    /// Whether the import is a re-export.
     exported: bool,
 }
 
 /// A module, and for each module that it uses a path by which it names it.
 type Uses = BTreeMap<Vec<String>, BTreeMap<Vec<String>, String>>;
 
-/// The circles among the modules of the crate whose root is the file `root`, each told as a way around:
-/// `a -> b (crate::b::Thing) -> a (crate::a)`. `read` gives the text of a file that there is.
-pub(crate) fn circles(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Vec<String> {
+/// Returns what each module of the crate with the root file `root` uses. `read` returns the text of a file, if it exists.
+fn uses(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Uses {
     let mut modules = Modules::new();
     let text = read(root).unwrap_or_else(|| panic!("no file {}", root.display()));
     let folder = root.parent().expect("a file is in a folder");
     File { path: root, folder, read }.load(&text, &[], &mut modules);
-    let uses: Uses = modules.keys().map(|path| (path.clone(), used_by(path, &modules))).collect();
+    modules.keys().map(|path| (path.clone(), used_by(path, &modules))).collect()
+}
+
+/// Returns the uses among the children of `parent` that lead from one of `rooms` to a later one, and the children that
+/// `rooms` lacks. `rooms` is in the order of the data flow: a room uses only those before it.
+pub(crate) fn upward(
+    root: &Path,
+    read: &dyn Fn(&Path) -> Option<String>,
+    parent: &str,
+    rooms: &[&str],
+) -> Vec<String> {
+    let uses = uses(root, read);
+    let room = |module: &[String]| match module {
+        [first, room, ..] if first == parent => Some(room.clone()),
+        _ => None,
+    };
+    let floor = |name: &str| rooms.iter().position(|room| *room == name);
+    let mut found: Vec<String> =
+        uses.keys().filter_map(|module| room(module)).filter(|name| floor(name).is_none()).collect();
+    found.dedup();
+    for (module, used) in &uses {
+        for (place, path) in used {
+            let floors =
+                (room(module).and_then(|name| floor(&name)), room(place).and_then(|name| floor(&name)));
+            if let (Some(from), Some(to)) = floors
+                && from < to
+            {
+                found.push(format!("{} -> {} (`{path}`)", module.join("::"), place.join("::")));
+            }
+        }
+    }
+    found
+}
+
+/// Returns the cycles among the modules of the crate with the root file `root`, each in the form `a -> b
+/// (crate::b::Thing) -> a (crate::a)`. `read` returns the text of a file, if it exists.
+pub(crate) fn circles(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Vec<String> {
+    let uses = uses(root, read);
     let mut told = Vec::new();
     let mut seen = BTreeSet::new();
     for start in uses.keys().filter(|path| !path.is_empty()).chain(uses.keys().filter(|path| path.is_empty()))
@@ -61,7 +97,7 @@ pub(crate) fn circles(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Ve
     told
 }
 
-/// A file with a module, and where those of its children lie.
+/// A file with a module, and the folder of its children.
 struct File<'a> {
     path: &'a Path,
     folder: &'a Path,
@@ -76,7 +112,7 @@ impl File<'_> {
         self.scan(tokens, module, modules);
     }
 
-    /// Takes in the tokens of a module, or of a part of it.
+    /// Adds the tokens of a module, or of a part of it.
     fn scan(&self, tokens: TokenStream, module: &[String], modules: &mut Modules) {
         let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let mut at = 0;
@@ -113,7 +149,7 @@ impl File<'_> {
                     }
                     at = end - 1;
                 }
-                // `pub(in crate::a)` names who may see something.
+                // The path in `pub(in crate::a)` is a visibility.
                 TokenTree::Group(_) if is_exported(&tokens[..=at]) => {}
                 TokenTree::Group(group) => self.scan(group.stream(), module, modules),
                 TokenTree::Punct(_) | TokenTree::Literal(_) => {}
@@ -140,13 +176,13 @@ fn is_punct(token: Option<&TokenTree>, sign: char) -> bool {
     matches!(token, Some(TokenTree::Punct(punct)) if punct.as_char() == sign)
 }
 
-/// `#[cfg(test)]`.
+/// Returns whether the tokens are `#[cfg(test)]`.
 fn is_test_attribute(tokens: &[TokenTree]) -> bool {
     let group = matches!(tokens.get(1), Some(TokenTree::Group(g)) if g.delimiter() == Delimiter::Bracket);
     is_punct(tokens.first(), '#') && group && tokens[1].to_string().replace(' ', "") == "[cfg(test)]"
 }
 
-/// Behind the item that starts at `at`: its last token.
+/// Returns the position after the last token of the item that starts at `at`.
 fn after_item(tokens: &[TokenTree], at: usize) -> usize {
     let is_use = |token: &TokenTree| matches!(token, TokenTree::Ident(word) if *word == "use");
     let ends = |token: &TokenTree, with_braces: bool| match token {
@@ -164,7 +200,7 @@ fn after_item(tokens: &[TokenTree], at: usize) -> usize {
     tokens.len()
 }
 
-/// Whether what follows is `pub`, or `pub(crate)` and the like.
+/// Returns whether the next token follows `pub`, `pub(crate)` or the like.
 fn is_exported(before: &[TokenTree]) -> bool {
     let is_pub = |token: &TokenTree| matches!(token, TokenTree::Ident(word) if *word == "pub");
     match before {
@@ -176,7 +212,7 @@ fn is_exported(before: &[TokenTree]) -> bool {
     }
 }
 
-/// Whether what follows is a part of something else: after a dot or `::`.
+/// Returns whether the next token is a part of a longer expression, after a dot or `::`.
 fn is_part(before: &[TokenTree]) -> bool {
     match before {
         [.., last] if is_punct(Some(last), '.') => true,
@@ -185,7 +221,7 @@ fn is_part(before: &[TokenTree]) -> bool {
     }
 }
 
-/// `a::b::c` from `at`, and where it ends.
+/// Returns the path `a::b::c` that starts at `at`, and its end.
 fn path_at(tokens: &[TokenTree], at: usize) -> (Vec<String>, usize) {
     let mut path = vec![tokens[at].to_string()];
     let mut end = at + 1;
@@ -199,7 +235,7 @@ fn path_at(tokens: &[TokenTree], at: usize) -> (Vec<String>, usize) {
     (path, end)
 }
 
-/// The names that a tree of `use` brings in.
+/// Collects the names that a `use` tree imports.
 fn import(tokens: &[TokenTree], before: &[String], exported: bool, imports: &mut Vec<Import>) {
     for tree in tokens.split(|token| is_punct(Some(token), ',')).filter(|tree| !tree.is_empty()) {
         let mut path = before.to_vec();
@@ -229,12 +265,12 @@ fn import(tokens: &[TokenTree], before: &[String], exported: bool, imports: &mut
     }
 }
 
-/// Where a path ends: a module, and the first name in it that is no module.
+/// The target of a path: a module, and the first name in it that is no module.
 type Place = (Vec<String>, Option<String>);
 
-/// What `path` means in `module`; `None` for what is of another crate, or no path at all.
+/// Resolves `path` in `module`. Returns `None` for an item of another crate, and for tokens that are no path.
 fn resolved(module: &[String], path: &[String], modules: &Modules, depth: usize) -> Option<Place> {
-    // Imports of one another's imports end; a circle of them would not compile.
+    // Chains of imports are finite: a cycle of them would not compile.
     if depth > 20 {
         return None;
     }
@@ -277,7 +313,7 @@ fn resolved(module: &[String], path: &[String], modules: &Modules, depth: usize)
     Some((place, None))
 }
 
-/// The modules that a module uses, each with a path by which it names it.
+/// Returns the modules that a module uses, each with a path by which it names it.
 fn used_by(module: &[String], modules: &Modules) -> BTreeMap<Vec<String>, String> {
     let this = &modules[module];
     let mut used = BTreeMap::new();
@@ -292,7 +328,7 @@ fn used_by(module: &[String], modules: &Modules) -> BTreeMap<Vec<String>, String
     used
 }
 
-/// A shortest way from a module along what is used back to it.
+/// Returns a shortest cycle of uses through a module.
 fn way_back(start: &Vec<String>, uses: &Uses) -> Option<Vec<Vec<String>>> {
     let mut from: BTreeMap<&Vec<String>, &Vec<String>> = BTreeMap::new();
     let mut open = VecDeque::from([start]);
@@ -329,7 +365,7 @@ fn tell(circle: &[Vec<String>], uses: &Uses) -> String {
 mod tests {
     use super::*;
 
-    /// The circles of a crate that is made up of files with these texts.
+    /// Compares the cycles of a crate that consists of these files with the expected ones.
     fn check(files: &[(&str, &str)], expect: &[&str]) {
         let read = |path: &Path| {
             files.iter().find(|(name, _)| Path::new(name) == path).map(|(_, text)| (*text).to_owned())
@@ -410,5 +446,23 @@ mod tests {
     #[should_panic(expected = "no file a.rs or a/mod.rs")]
     fn a_module_that_is_not_found_is_an_error() {
         check(&[("lib.rs", "mod a;")], &[]);
+    }
+
+    #[test]
+    fn a_room_uses_only_those_before_it() {
+        let files = [
+            ("lib.rs", "mod house;"),
+            ("house/mod.rs", "mod cellar; mod hall; mod attic; fn f() { attic::g(); }"),
+            ("house/cellar.rs", "use crate::house::hall::Lamp; struct Wine;"),
+            ("house/hall.rs", "use super::cellar::Wine; struct Lamp;"),
+            ("house/attic.rs", "fn g() { super::hall::Lamp; }"),
+        ];
+        let read = |path: &Path| {
+            files.iter().find(|(name, _)| Path::new(name) == path).map(|(_, text)| (*text).to_owned())
+        };
+        assert_eq!(
+            upward(Path::new("lib.rs"), &read, "house", &["cellar", "hall"]),
+            ["attic", "house::cellar -> house::hall (`crate::house::hall::Lamp`)"]
+        );
     }
 }

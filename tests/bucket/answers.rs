@@ -1,4 +1,4 @@
-//! What answers say besides what was asked for, and what is refused at the edges: field by field, as S3 has it.
+//! Fields of replies beyond the requested data, and requests that are rejected: field by field, like S3.
 
 use std::time::{Duration, SystemTime};
 
@@ -15,7 +15,7 @@ use crate::stage::{BUCKET, Stage, client, failure, options, path, stage};
 
 const PART: usize = 5 * 1024 * 1024;
 
-/// Within a minute of now.
+/// Returns whether the time is within a minute of now.
 fn is_recent(moment: &DateTime) -> bool {
     let moment = SystemTime::try_from(*moment).unwrap();
     let now = SystemTime::now();
@@ -83,7 +83,7 @@ async fn a_bucket_is_where_the_store_is_and_the_owners_alone() {
     assert_eq!(grant.permission().unwrap().as_str(), "FULL_CONTROL");
 }
 
-/// As ever: an empty location is us-east-1.
+/// For historical reasons an empty location stands for us-east-1.
 #[tokio::test]
 async fn a_buckets_location_is_the_region_unless_it_is_the_first_one() {
     for (region, told) in [("us-east-1", ""), ("eu-central-1", "eu-central-1")] {
@@ -110,7 +110,7 @@ async fn a_read_on_the_very_second_of_a_change_sees_it() {
     assert_eq!(failure(head().if_modified_since(modified).send().await).0, 304);
     let before = DateTime::from_secs(modified.secs() - 1);
     assert_eq!(failure(head().if_unmodified_since(before).send().await).0, 412);
-    // A 304 says which version it is of, a 412 does not.
+    // A 304 contains the version, a 412 does not.
     let get = async |name: &str, value: &str| {
         let url =
             stage.client.get_object().bucket(BUCKET).key("a").presigned(stage.presigning()).await.unwrap();
@@ -143,7 +143,7 @@ async fn when_a_body_expires_and_what_it_is_are_told() {
         let got = stage.client.get_object().bucket(BUCKET).key(key).send().await.unwrap();
         assert_eq!(got.expires_string.as_deref(), Some(text), "{key}");
     }
-    // Without a media type, which no client of AWS leaves out.
+    // Without a media type, which every client of AWS sends.
     let url =
         stage.client.put_object().bucket(BUCKET).key("raw").presigned(stage.presigning()).await.unwrap();
     let request = format!(
@@ -269,7 +269,7 @@ async fn attributes_are_those_that_were_asked_for() {
     assert_eq!(last.is_truncated, Some(false));
 }
 
-/// Uploads parts in their order.
+/// Uploads parts in order.
 async fn upload(
     stage: &Stage,
     key: &str,
@@ -316,7 +316,7 @@ const ALGORITHMS: [ChecksumAlgorithm; 5] = [
     ChecksumAlgorithm::Sha256,
 ];
 
-/// The values that an answer has under their names, in that order.
+/// Returns the values of a reply by name, in this order.
 macro_rules! sums {
     ($answer:expr) => {{
         let answer = &$answer;
@@ -421,7 +421,7 @@ async fn uploads_refuse_checksums_that_do_not_fit_together() {
     assert_eq!(failure(part(ChecksumAlgorithm::Sha256).send().await), (400, "InvalidRequest".into()));
     let kept = part(ChecksumAlgorithm::Sha1).send().await.unwrap();
 
-    // What is said at the end must be so, too.
+    // The sums at the end are verified too.
     let listed = || CompletedPart::builder().part_number(1).set_e_tag(kept.e_tag.clone());
     let complete = |part: CompletedPart| {
         let parts = CompletedMultipartUpload::builder().parts(part).build();
@@ -441,7 +441,7 @@ async fn uploads_refuse_checksums_that_do_not_fit_together() {
     ] {
         assert_eq!(failure(wrong.send().await), (400, "BadDigest".into()));
     }
-    // The SHA-1 of the SHA-1 of "hello", as Python's hashlib has it: with the count of parts or without.
+    // The SHA-1 of the SHA-1 of "hello", computed by Python's hashlib, with and without the number of parts.
     let whole = "a0+JpU4tJ+zX6NoFtKuP2dHYsRk=";
     let right = complete(listed().set_checksum_sha1(kept.checksum_sha1.clone()).build());
     let right = right.checksum_type(ChecksumType::Composite).mpu_object_size(5).checksum_sha1(whole);
@@ -449,7 +449,8 @@ async fn uploads_refuse_checksums_that_do_not_fit_together() {
     assert_eq!(told.checksum_sha1, Some(format!("{whole}-1")));
 }
 
-/// Without an algorithm of its own an upload takes parts with any; of what they are the client may be reminded, or not.
+/// An upload without its own algorithm accepts parts with any. At the end the client may state the parts' checksums and
+/// their type, or omit them.
 #[tokio::test]
 async fn an_upload_without_an_algorithm_takes_any() {
     let stage = stage().await;
@@ -475,7 +476,7 @@ async fn a_puts_checksum_is_told_under_its_own_name_and_of_its_kind() {
     }
 }
 
-/// Bodies in parts are files of which the later ones are opened late.
+/// Bodies in parts are several files. The later ones are opened late.
 #[tokio::test]
 async fn a_body_in_parts_is_read_to_its_end_while_it_is_deleted() {
     let stage = stage().await;
@@ -496,7 +497,8 @@ async fn a_body_in_parts_is_read_to_its_end_while_it_is_deleted() {
     panic!("parts that were read are still there");
 }
 
-/// Names of bodies begin with the number of the start: no later run overwrites what an earlier one kept.
+/// Names of body files begin with the number of the server's start, so no later run overwrites a file of an earlier
+/// one.
 #[tokio::test]
 async fn what_a_later_run_keeps_is_not_in_the_place_of_what_an_earlier_one_kept() {
     let folder = tempfile::tempdir().unwrap();

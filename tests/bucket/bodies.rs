@@ -1,5 +1,5 @@
-//! Bodies as clients send them: in chunks without a length, in forms of browsers, with digests that are right, wrong,
-//! missing, or of an algorithm that the store does not have.
+//! Bodies in the forms that clients send: in chunks without a length, in browser forms, with digests that are right,
+//! wrong, missing, or of an unsupported algorithm.
 
 use std::time::{Duration, SystemTime};
 
@@ -10,7 +10,7 @@ use crate::stage::{BUCKET, Stage, raw, stage};
 
 const CHUNKED: Signed = Signed::As("STREAMING-UNSIGNED-PAYLOAD-TRAILER");
 
-/// In chunks of HTTP, of which none has anything to do with those of the body.
+/// Returns the body in HTTP chunks, whose boundaries are unrelated to the chunks of the body.
 fn in_pieces(body: &str, piece: usize) -> Vec<u8> {
     let mut sent = String::new();
     for piece in body.as_bytes().chunks(piece) {
@@ -19,7 +19,7 @@ fn in_pieces(body: &str, piece: usize) -> Vec<u8> {
     (sent + "0\r\n\r\n").into_bytes()
 }
 
-/// A body in chunks of S3, with its CRC-32 behind it.
+/// Returns the body in S3 chunks, followed by its CRC-32.
 fn in_chunks(body: &str, trailer: &str) -> String {
     let mut sent = String::new();
     for chunk in body.as_bytes().chunks(8192) {
@@ -40,7 +40,7 @@ async fn put_in_chunks(stage: &Stage, target: &str, body: &str, crc: &str, piece
     send_signed(stage, "PUT", target, &headers, &sent, CHUNKED).await
 }
 
-/// As the client for JavaScript sends a stream: without a `Content-Length`.
+/// The JavaScript client sends a stream without a `Content-Length`.
 #[tokio::test]
 async fn a_stream_has_no_length_but_that_of_its_bytes() {
     let stage = stage().await;
@@ -59,7 +59,7 @@ async fn a_stream_has_no_length_but_that_of_its_bytes() {
     let target = format!("/films/a?partNumber=1&uploadId={}", upload.element("UploadId"));
     let part = put_in_chunks(&stage, &target, "123456789", "y/Q5Jg==", 5).await;
     assert_eq!((part.status, part.header("x-amz-checksum-crc32")), (200, "y/q5jg=="), "{part:?}");
-    // The length that was said is that of the bytes.
+    // The declared length must be that of the bytes.
     for length in ["8", "10", "", "-1"] {
         let headers = [
             ("transfer-encoding", "chunked"),
@@ -70,7 +70,7 @@ async fn a_stream_has_no_length_but_that_of_its_bytes() {
         let answer = send_signed(&stage, "PUT", "/films/b", &headers, &sent, CHUNKED).await;
         assert!((400..500).contains(&answer.status), "{length}: {answer:?}");
     }
-    // And a body that is not in S3's chunks must have a length.
+    // A body that is not in S3 chunks must have a length.
     let headers = [("transfer-encoding", "chunked")];
     let sent = in_pieces("hello", 2);
     let answer =
@@ -83,7 +83,7 @@ fn iso(time: SystemTime) -> String {
     DateTime::from(time).fmt(DateTimeFormat::DateTime).unwrap()
 }
 
-/// Posts a form that is signed as a page would get it, with a file.
+/// Posts a form with a file, signed like for a web page.
 async fn post(stage: &Stage, extra: &[(&str, &str)], conditions: &str, age: Duration, file: &[u8]) -> Answer {
     let signed = SystemTime::now() - age;
     let date: String = iso(signed).chars().filter(|c| !matches!(c, '-' | ':')).collect();
@@ -138,7 +138,7 @@ async fn a_page_uploads_a_file_by_a_signed_form() {
     }
     let told = post(&stage, &[("success_action_status", "201")], "", now, b"hello").await;
     assert_eq!((told.status, told.element("Key")), (201, "up/film.txt"), "{told:?}");
-    // It is valid until its policy expires, not for a quarter of an hour.
+    // The form is valid until its policy expires, not for a quarter of an hour.
     assert_eq!(post(&stage, &[], "", Duration::from_secs(3000), b"hello").await.status, 204);
     let late = post(&stage, &[], "", Duration::from_secs(3700), b"hello").await;
     assert_eq!(late.failure(), (403, "AccessDenied"));
@@ -263,7 +263,7 @@ async fn a_checksum_of_an_algorithm_that_is_not_there_is_not_passed_over() {
     assert_eq!(stage.client.list_objects_v2().bucket(BUCKET).send().await.unwrap().key_count, Some(0));
 }
 
-/// As MinIO's clients do.
+/// MinIO's clients name only the algorithm.
 #[tokio::test]
 async fn an_algorithm_that_is_named_alone_is_what_the_checksum_is_made_by() {
     let stage = stage().await;
@@ -277,7 +277,7 @@ async fn an_algorithm_that_is_named_alone_is_what_the_checksum_is_made_by() {
     assert_eq!(other.failure(), (400, "InvalidRequest"));
 }
 
-/// Its checksum would not be there to be compared.
+/// The checksum would not be compared, so the request is rejected.
 #[tokio::test]
 async fn a_trailer_of_a_body_that_is_not_in_chunks_is_refused() {
     let stage = stage().await;
@@ -285,7 +285,8 @@ async fn a_trailer_of_a_body_that_is_not_in_chunks_is_refused() {
         let put = send(&stage, "PUT", "/films/a", &[header], b"hello").await;
         assert_eq!(put.failure(), (400, "InvalidRequest"), "{header:?}");
     }
-    // What asks for more in an answer may be passed over, and a request without a body has a checksum, too: of nothing.
+    // A header that requests more in the reply may be ignored. A request without a body has a checksum too: that of no
+    // bytes.
     stage.put("a", "hello").await;
     for (crc, status) in [("AAAAAA==", 200), ("AAAAAQ==", 400)] {
         let headers = [("x-amz-checksum-crc32", crc), ("x-amz-sdk-checksum-algorithm", "CRC32")];

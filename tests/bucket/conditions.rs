@@ -1,4 +1,4 @@
-//! If-Match and If-None-Match, alone and against each other.
+//! If-Match and If-None-Match, alone and combined.
 
 use std::time::{Duration, SystemTime};
 
@@ -39,7 +39,7 @@ async fn a_read_on_a_condition_is_answered_304_or_412() {
     assert_eq!(failure(get().if_unmodified_since(at(-60)).send().await).0, 412);
     assert_eq!(failure(get().if_none_match(&etag).send().await).0, 304);
     assert_eq!(failure(get().if_modified_since(at(0)).send().await).0, 304);
-    // The entity tag wins over the date of the same sense.
+    // An ETag condition overrides the date condition of the same kind.
     get().if_match(&etag).if_unmodified_since(at(-60)).send().await.unwrap();
     get().if_none_match(other).if_modified_since(at(0)).send().await.unwrap();
     let head = || stage.client.head_object().bucket(BUCKET).key("a");
@@ -47,7 +47,7 @@ async fn a_read_on_a_condition_is_answered_304_or_412() {
     assert_eq!(failure(head().if_none_match(&etag).send().await).0, 304);
 }
 
-/// `RAYFOLD_BUCKET_ROUNDS=200 cargo test -p rayfold-bucket --test bucket writers` runs it at length.
+/// `RAYFOLD_BUCKET_ROUNDS=200 cargo test -p rayfold-bucket --test bucket writers` runs more rounds.
 #[tokio::test(flavor = "multi_thread")]
 async fn of_200_writers_one_wins_each_round() {
     let rounds = std::env::var("RAYFOLD_BUCKET_ROUNDS").map_or(5, |rounds| rounds.parse().unwrap());

@@ -1,4 +1,4 @@
-//! Pages of other sites: a bucket's CORS rules, and what a browser is told by them.
+//! Pages of other sites: a bucket's CORS rules, and the replies to browsers.
 
 use aws_sdk_s3::types::{CorsConfiguration, CorsRule};
 
@@ -25,7 +25,7 @@ async fn raw(stage: &Stage, line: &str, headers: &str, body: &str) -> Answer {
     Answer::parse(&stage.raw(&request).await)
 }
 
-/// What a browser does for a page that was given a presigned URL.
+/// The requests of a browser for a page with a presigned URL.
 #[tokio::test]
 async fn a_page_uploads_by_a_presigned_url() {
     let stage = stage().await;
@@ -56,7 +56,7 @@ async fn a_page_uploads_by_a_presigned_url() {
     assert_eq!(put.header("access-control-expose-headers"), "etag");
     assert_eq!(stage.get("a b").await, b"hello");
 
-    // A page sees why it was refused, and another page sees nothing.
+    // The page can read the error; another page can read nothing.
     let refused = raw(&stage, "PUT /films/c", from, "hello").await;
     assert_eq!(
         (refused.status, refused.header("access-control-allow-origin")),
@@ -93,7 +93,7 @@ async fn rules_that_cannot_be_are_refused_and_others_are_kept() {
         none.cors_configuration(CorsConfiguration::builder().set_cors_rules(Some(vec![])).build().unwrap());
     assert_eq!(failure(none.send().await).0, 400);
     set(&stage, rule("*", "GET")).await.unwrap();
-    // They are the bucket's, and outlive the process.
+    // The rules belong to the bucket and persist across restarts.
     stage.server.stop().await;
     let server =
         rayfold_bucket::Server::start(crate::stage::options(stage.folder.path(), None)).await.unwrap();
@@ -101,7 +101,7 @@ async fn rules_that_cannot_be_are_refused_and_others_are_kept() {
     assert_eq!(client.get_bucket_cors().bucket(BUCKET).send().await.unwrap().cors_rules().len(), 1);
 }
 
-/// A presigned URL may have parameters in place of headers, as S3 reads them; no other request may.
+/// A presigned URL may have parameters in place of headers, like in S3. No other request may.
 #[tokio::test]
 async fn what_a_presigned_url_says_in_place_of_headers_holds() {
     let stage = stage().await;
@@ -114,7 +114,8 @@ async fn what_a_presigned_url_says_in_place_of_headers_holds() {
     assert_eq!(meta.status, 200, "{meta:?}");
     let head = stage.client.head_object().bucket(BUCKET).key("a").send().await.unwrap();
     assert_eq!(head.metadata().unwrap()["colour"], "red");
-    // Clients for JavaScript put the checksum of no bytes there, before there are any; another one is one of the body.
+    // JavaScript clients put the checksum of an empty body there before they know the body. Another checksum is that of
+    // the body.
     let of_nothing = "?x-amz-checksum-crc32=AAAAAA%3D%3D&x-amz-sdk-checksum-algorithm=CRC32";
     assert_eq!(put(of_nothing, "hello, too").await.status, 200);
     assert_eq!(put("?x-amz-checksum-crc32=y%2FQ5Jg%3D%3D", "123456789").await.status, 200);
@@ -132,7 +133,7 @@ async fn what_a_presigned_url_says_in_place_of_headers_holds() {
     assert_eq!(stage.get("a").await, b"123456789");
     assert_eq!(put("?X-Amz-Copy-Source=%2Ffilms%2Fsource", "").await.status, 200);
     assert_eq!(stage.get("a").await, b"from elsewhere");
-    // Not part of what was signed.
+    // These are not part of the signed request.
     let target = presigned(&stage, "PUT", "/films/a");
     for more in ["x-amz-meta-a=b", "annotation", "X-Amz-Annex=1"] {
         let answer = raw(&stage, &format!("PUT {target}&{more}"), "", "other").await;

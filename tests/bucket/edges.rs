@@ -1,4 +1,4 @@
-//! What S3's clients meet at the edges: odd keys in XML, errors' messages, dates, connections, access lists.
+//! Rare cases for S3 clients: odd keys in XML, error messages, dates, connections, access lists.
 
 use std::time::{Duration, SystemTime};
 
@@ -12,7 +12,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use crate::signed::{Answer, md5, send};
 use crate::stage::{BUCKET, failure, path, raw, stage};
 
-/// macOS has a file `Icon\r`; an XML parser reads a bare carriage return as a line feed.
+/// macOS has a file `Icon\r`. An XML parser reads a bare carriage return as a line feed.
 #[tokio::test]
 async fn keys_with_control_characters_come_back_from_every_listing() {
     let stage = stage().await;
@@ -40,7 +40,7 @@ async fn keys_with_control_characters_come_back_from_every_listing() {
     assert_eq!(left.key_count, Some(1), "{left:?}");
 }
 
-/// Also where `s3s` says a code alone.
+/// This includes errors for which `s3s` sets only a code.
 #[tokio::test]
 async fn every_error_has_a_message() {
     let stage = stage().await;
@@ -74,7 +74,8 @@ async fn every_error_has_a_message() {
     }
 }
 
-/// Botocore sends `Expect` also with an empty body, and waits for ever on a connection that stays open after a refusal.
+/// Botocore sends `Expect` also with an empty body, and waits for ever on a connection that stays open after a
+/// rejection.
 #[tokio::test]
 async fn a_refusal_ends_the_connection_of_a_client_that_waits_to_send() {
     let stage = stage().await;
@@ -140,7 +141,7 @@ async fn a_request_may_be_dated_by_date_alone() {
             .fmt(DateTimeFormat::HttpDate)
             .unwrap()
     };
-    // The second may turn between two looks at the clock.
+    // The second may change between two reads of the clock.
     let mut answers = Vec::new();
     for _ in 0..3 {
         answers.push(ask(http(0), 0).await.status);

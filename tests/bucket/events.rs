@@ -1,4 +1,4 @@
-//! Events: every change is told, at least once, in the order of an object's changes, also across restarts.
+//! Events: every change is delivered at least once, in the order of an object's changes, also across restarts.
 
 use std::time::{Duration, Instant};
 
@@ -75,7 +75,7 @@ async fn an_objects_events_stay_in_order_while_the_listener_refuses() {
     }
 }
 
-/// The pauses are doubled, from 20 ms on: within half a second it is asked five times, not thousands.
+/// The pauses double, from 20 ms on. Within half a second there are five attempts, not thousands.
 #[tokio::test]
 async fn a_listener_that_refuses_is_not_pressed() {
     let (webhook, heard) = listener(usize::MAX).await;
@@ -98,7 +98,7 @@ async fn a_server_that_is_dropped_tells_nothing_more() {
     drop(stage.server);
     tokio::time::sleep(Duration::from_millis(50)).await;
     let asked = heard.refused();
-    // The next pauses would be of 40 to 320 ms.
+    // The next pauses would take 40 to 320 ms.
     tokio::time::sleep(Duration::from_millis(700)).await;
     assert_eq!(heard.refused(), asked);
 }
@@ -116,7 +116,7 @@ async fn events_wait_for_a_listener_across_restarts() {
     let mut keys: Vec<_> = heard.wait(50).await.into_iter().map(|(_, key)| key).collect();
     keys.sort();
     assert_eq!(keys, (0..50).map(|number| format!("{number:02}")).collect::<Vec<_>>());
-    // What was delivered is forgotten, in time.
+    // Delivered events are deleted after a while.
     tokio::time::sleep(Duration::from_millis(100)).await;
     server.stop().await;
     let server = Server::start(options(stage.folder.path(), Some(webhook))).await.unwrap();
@@ -170,7 +170,7 @@ async fn an_event_is_told_within_moments() {
         }
         slowest = slowest.max(put.elapsed());
     }
-    // Far above what it takes, far below a poll.
+    // Far above the usual time, far below a polling interval.
     assert!(slowest < Duration::from_secs(1), "{slowest:?}");
     println!("slowest of 20 events: {slowest:?}");
 }

@@ -1,4 +1,4 @@
-//! Listings against a model: a sorted map, and S3's rules in a few lines.
+//! Compares listings with a model: a sorted map, and S3's rules in a few lines.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,14 +7,14 @@ use fastrand::Rng;
 
 use crate::stage::{BUCKET, Stage, failure, stage};
 
-/// What a whole listing says.
+/// The contents of a complete listing.
 #[derive(Debug, Default, PartialEq)]
 struct Listing {
     keys: Vec<String>,
     prefixes: Vec<String>,
 }
 
-/// S3's rules, on all keys at once.
+/// Applies S3's rules to all keys at once.
 fn expected(keys: &BTreeMap<String, String>, prefix: &str, delimiter: &str, after: &str) -> Listing {
     let mut listing = Listing::default();
     for key in keys.keys().filter(|key| key.starts_with(prefix) && key.as_str() > after) {
@@ -33,7 +33,7 @@ fn expected(keys: &BTreeMap<String, String>, prefix: &str, delimiter: &str, afte
     listing
 }
 
-/// All pages of a listing, each checked by itself.
+/// Returns all pages of a listing. Checks each page.
 async fn listed(stage: &Stage, prefix: &str, delimiter: &str, after: &str, most: i32) -> Listing {
     let mut listing = Listing::default();
     let mut token = None;
@@ -63,7 +63,7 @@ async fn listed(stage: &Stage, prefix: &str, delimiter: &str, after: &str, most:
     }
 }
 
-/// The same by the first version, whose marker is a name.
+/// Returns all pages of a listing by version 1 of the operation, whose marker is a name.
 async fn listed_v1(stage: &Stage, prefix: &str, delimiter: &str, most: i32) -> Listing {
     let mut listing = Listing::default();
     let mut marker = None;
@@ -90,7 +90,7 @@ async fn listed_v1(stage: &Stage, prefix: &str, delimiter: &str, most: i32) -> L
     }
 }
 
-/// The same by versions, of which every object has the one that is called `null`.
+/// Returns all pages of a listing of versions. Every object has the version `null`.
 async fn versions_listed(stage: &Stage, prefix: &str, delimiter: &str, most: i32) -> Listing {
     let mut listing = Listing::default();
     let mut markers = (None, None);
@@ -128,7 +128,7 @@ fn name(random: &mut Rng) -> String {
         .collect()
 }
 
-/// `RAYFOLD_SEED` replays one; `RAYFOLD_BUCKET_ROUNDS` runs more.
+/// `RAYFOLD_SEED` replays one run; `RAYFOLD_BUCKET_ROUNDS` sets the number of rounds.
 #[tokio::test]
 async fn listings_are_as_the_model_says() {
     let seed = std::env::var("RAYFOLD_SEED").map_or_else(|_| fastrand::u64(..), |seed| seed.parse().unwrap());
@@ -169,7 +169,7 @@ async fn listings_are_as_the_model_says() {
     }
 }
 
-/// All pages of a listing of uploads, as key and id; each page checked by itself.
+/// Returns all pages of a listing of uploads, as keys and ids. Checks each page.
 async fn uploads_listed(
     stage: &Stage,
     prefix: &str,
@@ -198,7 +198,7 @@ async fn uploads_listed(
         );
         assert_eq!(page.delimiter().unwrap_or_default(), delimiter);
         assert_eq!(page.key_marker(), Some(&*markers.0));
-        // An id alone says nothing.
+        // An id without a key has no effect.
         let id = if markers.0.is_empty() { "" } else { &markers.1 };
         assert_eq!(page.upload_id_marker(), Some(id));
         let count = page.uploads().len() + page.common_prefixes().len();
@@ -245,7 +245,7 @@ async fn listings_of_uploads_are_as_the_model_says() {
         let Listing { keys: alone, prefixes } = expected(&keys, &prefix, delimiter, after.0);
         let is_told = |(key, id): &(String, String)| {
             let is_behind = key == after.0 && !after.1.is_empty() && id.as_str() > after.1;
-            // A key that stands for a common prefix is told as that.
+            // A key below a common prefix is listed as that prefix.
             let is_alone = |rest: &str| delimiter.is_empty() || !rest.contains(delimiter);
             alone.contains(key) || (is_behind && key.strip_prefix(&prefix).is_some_and(is_alone))
         };
@@ -282,7 +282,7 @@ async fn the_edges_of_a_page() {
     let versions = || stage.client.list_object_versions().bucket(BUCKET);
     let without_key = versions().version_id_marker("null").send().await;
     assert_eq!(failure(without_key), (400, "InvalidArgument".into()));
-    // A page that ends with a common prefix names no version.
+    // A page that ends with a common prefix contains no version marker.
     for (most, version) in [(1, None), (2, Some("null"))] {
         let page = versions().delimiter("/").max_keys(most).send().await.unwrap();
         assert_eq!((page.delimiter(), page.next_version_id_marker()), (Some("/"), version));

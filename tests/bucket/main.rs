@@ -1,4 +1,4 @@
-//! The object store from outside: what S3's clients see of it.
+//! The object store as S3 clients see it.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 

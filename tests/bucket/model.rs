@@ -1,5 +1,5 @@
-//! Every operation and parameter of S3's service model, sent as it is: what the store does not know is refused before
-//! anything is done. `service-model.txt` is written by `service-model.py` out of botocore's model.
+//! Every operation and parameter of S3's service model, sent unchanged. The store rejects unsupported ones before it
+//! changes anything. `service-model.py` writes `service-model.txt` from botocore's model.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,8 @@ use crate::stage::{BUCKET, Stage, stage};
 
 const MODEL: &str = include_str!("service-model.txt");
 
-/// The operations that are there (ListDirectoryBuckets is the same request as ListBuckets, to another host), with the parameters that they obey or that change nothing here. All others are refused.
+/// The supported operations, with the parameters that they obey or that have no effect here. (ListDirectoryBuckets is
+/// the same request as ListBuckets, to another host.) All others are rejected.
 const KNOWN: &str = "
     ListBuckets max-buckets continuation-token prefix bucket-region
     ListDirectoryBuckets continuation-token
@@ -79,8 +80,8 @@ const KNOWN: &str = "
     ListParts max-parts part-number-marker uploadId
 ";
 
-/// What is kept with an object or compared with its body, on the operations that write one or complete it; on those with a
-/// body of XML it is compared with that.
+/// Parameters that are stored with an object or compared with its body, on the operations that write or complete an
+/// object. For an operation with an XML body they are compared with that body.
 const OF_A_BODY: [&str; 11] = [
     "cache-control",
     "content-disposition",
@@ -137,7 +138,7 @@ fn operations() -> Vec<Operation> {
     all
 }
 
-/// Whether the store has it, by the table above.
+/// Returns whether the store supports it, by the table above.
 fn is_known(operation: &str, parameter: Option<&str>) -> bool {
     let mut current = "";
     for line in KNOWN.lines() {
@@ -162,7 +163,7 @@ fn is_known(operation: &str, parameter: Option<&str>) -> bool {
     })
 }
 
-/// A request of an operation with some of its parameters.
+/// Sends a request of an operation with some of its parameters.
 async fn ask(stage: &Stage, operation: &Operation, with: &[&Parameter]) -> (u16, String) {
     let mut target = operation.uri.replace("{Bucket}", BUCKET).replace("{Key+}", "a");
     let mut headers: Vec<(String, String)> = Vec::new();
@@ -214,7 +215,7 @@ async fn ask(stage: &Stage, operation: &Operation, with: &[&Parameter]) -> (u16,
     (answer.status, code.to_owned())
 }
 
-/// All that there is, with its time.
+/// Returns all contents of the store with their times.
 async fn state(stage: &Stage) -> String {
     let client = &stage.client;
     let mut told = String::new();
@@ -282,7 +283,7 @@ async fn what_the_store_does_not_know_of_the_service_model_is_refused_and_change
     );
 }
 
-/// A request that a later version of S3 may have: no word of it is in any model.
+/// A request like those of a later version of S3, with words that are in no model.
 #[tokio::test]
 async fn a_word_that_nobody_knows_is_refused_wherever_it_stands() {
     let stage = stage().await;

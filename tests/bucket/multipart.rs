@@ -1,4 +1,4 @@
-//! Uploads in parts.
+//! Multipart uploads.
 
 use aws_sdk_s3::types::{
     ChecksumAlgorithm, ChecksumMode, ChecksumType, CompletedMultipartUpload, CompletedPart, ObjectAttributes,
@@ -29,7 +29,7 @@ async fn parts_become_one_object() {
     let id = begin(&stage, "film").await;
     let bodies = [vec![1; PART], vec![2; PART + 1], b"the end".to_vec()];
     let mut parts = Vec::new();
-    // Uploaded in any order, one of them twice, one for nothing.
+    // The parts arrive out of order, one of them twice, one without need.
     upload(&stage, "film", &id, 9, vec![9; PART]).await;
     upload(&stage, "film", &id, 2, vec![0; PART]).await;
     for number in [2, 1, 3] {
@@ -143,7 +143,7 @@ async fn an_upload_that_is_aborted_leaves_nothing() {
     let late = stage.client.upload_part().bucket(BUCKET).key("film").upload_id(&id).part_number(1);
     assert_eq!(failure(late.body(vec![1; 500_000].into()).send().await), (404, "NoSuchUpload".into()));
     assert_eq!(stage.files(), 0);
-    // A bucket that is deleted takes its unfinished uploads with it.
+    // Deleting a bucket also deletes its unfinished uploads.
     let id = begin(&stage, "film").await;
     upload(&stage, "film", &id, 1, vec![1; 500_000]).await;
     stage.client.delete_bucket().bucket(BUCKET).send().await.unwrap();

@@ -1,4 +1,4 @@
-//! Objects: what was put comes back, whole and in ranges, copied and gone.
+//! Objects: put, get, ranges, copy and delete.
 
 use aws_sdk_s3::types::{
     ChecksumAlgorithm, ChecksumMode, Delete, MetadataDirective, ObjectAttributes, ObjectIdentifier,

@@ -1,4 +1,4 @@
-//! The object store as a process of its own, which can be killed, starved and looked at.
+//! The object store as a separate process, which can be killed, limited and measured.
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
@@ -13,11 +13,11 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts it and waits until it answers. `largest_file` is in blocks of 1024 bytes: beyond it, a write fails as on a full
-    /// disk.
+    /// Starts the process and waits until it replies. `largest_file` is in blocks of 1024 bytes: a write beyond it
+    /// fails like on a full disk.
     pub(crate) fn start(data: &Path, webhook: Option<&Webhook>, largest_file: Option<u64>) -> Self {
         let binary = env!("CARGO_BIN_EXE_rayfold-bucket");
-        // The shell's limit outlives it, and so does the signal that it ignores.
+        // The limit that the shell sets persists after it, like the ignored signal.
         let limit = largest_file.map_or("unlimited".to_owned(), |blocks| blocks.to_string());
         let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$0\" \"$@\"");
         let mut command = Command::new("bash");
@@ -37,13 +37,13 @@ impl Process {
         self.address
     }
 
-    /// As `kill -9` does.
+    /// Kills the process by `kill -9`.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
 
-    /// The most memory that it ever had, in bytes.
+    /// Returns its peak memory in bytes.
     pub(crate) fn peak_memory(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
         let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();

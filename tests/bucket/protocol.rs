@@ -1,4 +1,5 @@
-//! What clients do not send by themselves: unsigned requests, expired URLs, hosts, headers that ask for more than there is.
+//! Requests that clients do not send by themselves: unsigned requests, expired URLs, hosts, headers for unsupported
+//! features.
 
 use std::time::Duration;
 
@@ -44,7 +45,7 @@ async fn presigned_urls_work_until_they_expire() {
     assert!(answer.starts_with("HTTP/1.1 403") && answer.contains("AccessDenied"), "{answer}");
 }
 
-/// Whoever is given a URL could else read by it what its signer may read.
+/// The recipient of a URL could otherwise use it to read other data that its signer may read.
 #[tokio::test]
 async fn a_presigned_url_takes_no_header_that_was_not_signed() {
     let stage = stage().await;
@@ -66,7 +67,7 @@ async fn a_presigned_url_takes_no_header_that_was_not_signed() {
         assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
     }
     assert_eq!(stage.get("a").await, b"");
-    // What the signer has signed is to be sent.
+    // The headers that were signed must be sent.
     let named = stage.client.put_object().bucket(BUCKET).key("named").metadata("kind", "film");
     let named = named.presigned(stage.presigning()).await.unwrap();
     let headers: Vec<String> = named.headers().map(|(name, value)| format!("{name}: {value}")).collect();
@@ -103,7 +104,8 @@ async fn unsigned_requests_are_denied() {
     }
 }
 
-/// Found by fuzzing: `s3s` 0.14 subtracts before it has seen that there is a digit. Where such a subtraction is checked it panics.
+/// Found by fuzzing: `s3s` 0.14 subtracts before it has checked that there is a digit. If overflow is checked, the
+/// subtraction panics.
 #[tokio::test]
 async fn a_credential_of_no_date_is_refused_and_the_store_goes_on() {
     let stage = stage().await;
@@ -125,7 +127,7 @@ async fn a_bucket_may_stand_in_the_host() {
     let stage = stage().await;
     stage.put("dir/a", "hello").await;
     for base in ["localhost", "s3.localhost"] {
-        // A client that addresses by host signs the path without the bucket.
+        // A client that uses virtual-hosted addressing signs the path without the bucket.
         let config = stage.client.config().to_builder().force_path_style(false);
         let port = stage.server.address().port();
         let config = config.endpoint_url(format!("http://{base}:{port}")).build();
@@ -182,7 +184,7 @@ async fn a_body_that_is_not_what_its_headers_say_is_not_kept() {
     );
     let answer = stage.raw(&request).await;
     assert!(answer.starts_with("HTTP/1.1 400") && answer.contains("XAmzContentSHA256Mismatch"), "{answer}");
-    // A client that goes away in the middle of a large body.
+    // A client that disconnects in the middle of a large body.
     let request = format!(
         "PUT {} HTTP/1.1\r\nHost: {}\r\nContent-Length: 9000000\r\nConnection: close\r\n\r\n",
         path(url.uri()),
@@ -220,7 +222,7 @@ async fn one_store_at_a_time_uses_a_folder_and_all_comes_back() {
     server.stop().await;
 }
 
-/// The checksum behind a body is compared with the body, as one in a header is.
+/// The checksum after a body is compared with the body, like one in a header.
 #[tokio::test]
 async fn a_checksum_behind_the_body_is_compared() {
     use aws_sigv4::http_request::{

@@ -1,4 +1,4 @@
-//! Requests that no client makes, signed as the owner's: any method, target, headers and body.
+//! Requests that no client sends, signed as the owner's: any method, target, headers and body.
 
 use std::time::{Duration, SystemTime};
 
@@ -11,7 +11,7 @@ use aws_sigv4::sign::v4::SigningParams;
 
 use crate::stage::{Stage, raw};
 
-/// An answer as text.
+/// A reply as text.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -27,7 +27,7 @@ impl Answer {
         Self { status, head: head.to_lowercase(), body: body.to_owned() }
     }
 
-    /// The text of the first element of a name.
+    /// Returns the text of the first element with a name.
     pub(crate) fn element(&self, name: &str) -> &str {
         let start = self.body.split_once(&format!("<{name}>")).map_or("", |(_, rest)| rest);
         start.split_once("</").map_or("", |(text, _)| text)
@@ -38,22 +38,22 @@ impl Answer {
         line.and_then(|line| line.split_once(": ")).map_or("", |(_, value)| value)
     }
 
-    /// Status and S3's code.
+    /// Returns the status and S3's error code.
     pub(crate) fn failure(&self) -> (u16, &str) {
         (self.status, self.element("Code"))
     }
 }
 
-/// What a signature covers of a body.
+/// The part of a body that a signature covers.
 #[derive(Clone, Copy)]
 pub(crate) enum Signed {
-    /// Its hash.
+    /// The hash of the body.
     Hash,
-    /// Nothing, as this value of `x-amz-content-sha256` says.
+    /// Nothing. This is the value of `x-amz-content-sha256`.
     As(&'static str),
 }
 
-/// Sends a request; the body gets a `Content-Length` unless the headers say how it is sent.
+/// Sends a request. Adds a `Content-Length` for the body unless the headers define the transfer.
 pub(crate) async fn send(
     stage: &Stage,
     method: &str,
@@ -64,7 +64,7 @@ pub(crate) async fn send(
     send_signed(stage, method, target, headers, body, Signed::Hash).await
 }
 
-/// A target that is signed by what it says, for a minute.
+/// Returns a presigned target, valid for a minute.
 pub(crate) fn presigned(stage: &Stage, method: &str, target: &str) -> String {
     let mut settings = settings();
     settings.signature_location = SignatureLocation::QueryParams;
@@ -93,7 +93,7 @@ fn settings() -> SigningSettings {
     settings
 }
 
-/// AWS's own signer, as the owner.
+/// Signs as the owner with AWS's own signer.
 fn signed_as(settings: SigningSettings, request: SignableRequest<'_>) -> SigningInstructions {
     let identity = Credentials::new("root", "secret-key", None, None, "test").into();
     let params = SigningParams::builder()
@@ -135,7 +135,7 @@ pub(crate) async fn send_signed(
     Answer::parse(&raw(stage.server.address(), &request).await)
 }
 
-/// The MD5 of a body as `Content-MD5` has it.
+/// Returns the MD5 of a body in the form of `Content-MD5`.
 pub(crate) fn md5(body: &[u8]) -> String {
     use s3s::crypto::{Checksum as _, Md5};
     base64_simd::STANDARD.encode_to_string(Md5::checksum(body))

@@ -1,4 +1,4 @@
-//! A store in a fresh folder, its client, a listener for its events, and requests that no client would send.
+//! A store in a new folder, its client, a listener for its events, and requests that no client would send.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -48,7 +48,7 @@ pub(crate) fn options(data: &Path, webhook: Option<Webhook>) -> Options {
     }
 }
 
-/// A store with one bucket.
+/// Starts a store with one bucket.
 pub(crate) async fn stage() -> Stage {
     stage_with(None).await
 }
@@ -72,23 +72,23 @@ impl Stage {
         got.body.collect().await.unwrap().to_vec()
     }
 
-    /// Files of large bodies on the disk.
+    /// Returns the number of files of large bodies on the disk.
     pub(crate) fn files(&self) -> usize {
         let folders = std::fs::read_dir(self.folder.path().join("bodies")).unwrap();
         folders.map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap().count()).sum()
     }
 
-    /// Tells every change to the webhook.
+    /// Sends an event to the webhook for every change.
     pub(crate) async fn notify(&self) {
         notify(&self.client).await;
     }
 
-    /// A URL that may do what the request would.
+    /// Returns the options for a presigned URL.
     pub(crate) fn presigning(&self) -> PresigningConfig {
         PresigningConfig::expires_in(Duration::from_secs(60)).unwrap()
     }
 
-    /// Sends a request as it stands; gives status, headers and body as text.
+    /// Sends a request unchanged. Returns status, headers and body as text.
     pub(crate) async fn raw(&self, request: &str) -> String {
         raw(self.server.address(), request.as_bytes()).await
     }
@@ -114,13 +114,13 @@ pub(crate) async fn raw(address: SocketAddr, request: &[u8]) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// The path and query of a URL.
+/// Returns the path and query of a URL.
 pub(crate) fn path(url: &str) -> &str {
     let rest = url.strip_prefix("http://").unwrap();
     &rest[rest.find('/').unwrap()..]
 }
 
-/// S3's code of an error, and the status.
+/// Returns the status and S3's error code.
 pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::Debug>(
     answer: Result<T, SdkError<E>>,
 ) -> (u16, String) {
@@ -129,12 +129,12 @@ pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::De
     (status, error.code().unwrap_or_default().to_owned())
 }
 
-/// What a listener heard.
+/// The events that a listener received.
 #[derive(Clone, Default)]
 pub(crate) struct Heard {
-    /// Names and keys of the events that it took, in order.
+    /// The names and keys of the accepted events, in order.
     told: Arc<Mutex<Vec<(String, String)>>>,
-    /// How many it did not take.
+    /// The number of rejected requests.
     refused: Arc<AtomicUsize>,
 }
 
@@ -147,7 +147,7 @@ impl Heard {
         self.refused.load(Ordering::Relaxed)
     }
 
-    /// Waits until so many were told.
+    /// Waits until this many events were accepted.
     pub(crate) async fn wait(&self, count: usize) -> Vec<(String, String)> {
         for _ in 0..1000 {
             if self.all().len() >= count {
@@ -159,7 +159,7 @@ impl Heard {
     }
 }
 
-/// Listens for events. `refuse` answers 503 to as many at first.
+/// Listens for events. Replies 503 to the first `refuse` requests.
 pub(crate) async fn listener(refuse: usize) -> (Webhook, Heard) {
     use http_body_util::{BodyExt, Empty};
     use hyper::body::{Bytes, Incoming};

@@ -1,6 +1,7 @@
-//! A proxy that slows, cuts and lies, by the dice of a seed. It passes bytes on and understands none of them.
+//! A proxy that delays, cuts and falsifies connections at random, by a seed. It forwards bytes without interpreting
+//! them.
 //!
-//! It outlives whoever it leads to, so that its address stays when that is killed and comes back on another port.
+//! It outlives its upstream, so that the address stays the same if the upstream is killed and restarts on another port.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
@@ -14,31 +15,31 @@ use tokio::sync::watch;
 
 use crate::tally::Tally;
 
-/// After so long without a byte a wild connection ends, so that the next request meets the dice anew.
+/// A connection with faults ends after this time without a byte, so that the next request draws a new fault.
 const IDLE: Duration = Duration::from_millis(300);
 
-/// What a liar says of a request that arrived.
+/// The false reply to a request that arrived.
 const LIE: &[u8] = b"HTTP/1.1 500 Internal Server Error\r\ncontent-length: 0\r\nconnection: close\r\n\r\n";
 
-/// What becomes of a connection.
+/// The fate of a connection.
 #[derive(Debug, Clone, Copy)]
 enum Fate {
     Pass,
-    /// Every piece waits so many milliseconds.
+    /// Every piece is delayed by this number of milliseconds.
     Slow(u64),
-    /// Requests are cut after so many bytes.
+    /// Requests are cut after this number of bytes.
     CutRequests(usize),
-    /// Answers are cut after so many bytes.
+    /// Replies are cut after this number of bytes.
     CutAnswers(usize),
-    /// The first request arrives, its answer does not.
+    /// The first request arrives, and its reply is lost.
     LoseAnswer,
-    /// The first request arrives, and the answer says that something went wrong.
+    /// The first request arrives, and the reply is a false error.
     Lie,
-    /// The first request arrives twice, and the answer is that to the second.
+    /// The first request arrives twice, and the reply is that to the second.
     Twice,
 }
 
-/// Where the gate leads; nowhere while it is shut.
+/// The upstream of the gate, if it is open.
 type Way = Option<SocketAddr>;
 
 /// A listening proxy.
@@ -49,7 +50,7 @@ pub(crate) struct Gate {
 }
 
 impl Gate {
-    /// Listens until the runtime ends; `name` is what its faults are counted under.
+    /// Listens until the runtime ends. Its faults are counted under `name`.
     pub(crate) async fn open(name: &'static str, tally: &Tally) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
@@ -63,7 +64,7 @@ impl Gate {
         self.address
     }
 
-    /// Leads elsewhere, or nowhere, from now on: what goes through it is cut.
+    /// Changes the upstream, or closes the gate. Cuts the current connections.
     pub(crate) fn lead(&self, way: Way) {
         self.way.send_replace(way);
     }
@@ -72,7 +73,7 @@ impl Gate {
         *self.way.borrow()
     }
 
-    /// Does what the dice say from now on; without any all passes.
+    /// Draws faults from `dice` from now on; without dice there are none.
     pub(crate) fn roll(&self, dice: Option<Rng>) {
         *self.dice.lock().unwrap() = dice;
     }
@@ -126,7 +127,7 @@ async fn serve(
     }
 }
 
-/// When it ends both sides are closed.
+/// Forwards a connection. At its end both sides are closed.
 async fn pass(mut client: TcpStream, upstream: SocketAddr, fate: Option<Fate>) {
     let Ok(mut server) = TcpStream::connect(upstream).await else { return };
     let idle = if fate.is_some() { IDLE } else { Duration::MAX };
@@ -143,7 +144,7 @@ async fn pass(mut client: TcpStream, upstream: SocketAddr, fate: Option<Fate>) {
         let there = copy(&mut from_client, &mut to_server, 0, usize::MAX);
         tokio::select! { () = there => return, _ = from_server.readable() => {} }
         if let Some(Fate::Lie) = fate {
-            // Who has gone hears no lie.
+            // The client may have disconnected.
             let _ = to_client.write_all(LIE).await;
         }
         return;
@@ -154,8 +155,8 @@ async fn pass(mut client: TcpStream, upstream: SocketAddr, fate: Option<Fate>) {
     tokio::select! { () = there => {}, () = back => {}, () = idle_for(idle, &seen) => {} }
 }
 
-/// Sends what comes to two connections, and gives back what the second one answers, once the first has answered, too: so
-/// nothing of it lands after the answer.
+/// Sends the request to two connections and returns the reply of the second, after the first has replied too. So
+/// nothing takes effect after the reply.
 async fn pass_twice(mut client: TcpStream, first: TcpStream, upstream: SocketAddr) {
     let Ok(second) = TcpStream::connect(upstream).await else { return };
     let (mut from_client, mut to_client) = client.split();

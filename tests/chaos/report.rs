@@ -1,4 +1,4 @@
-//! What a run was like, for a terminal and for `docs/reports/chaos.md`.
+//! The report of a run, for a terminal and for `docs/reports/chaos.md`.
 
 use std::fmt::{self, Write as _};
 use std::time::Duration;
@@ -7,16 +7,16 @@ use rayfold_local::StoreKind;
 
 use crate::tally::Tally;
 
-/// One round.
+/// The results of a round.
 pub(crate) struct Round {
     pub(crate) seed: u64,
-    /// What the user did.
+    /// The number of the user's actions.
     pub(crate) acts: u64,
-    /// Files that the user put or deleted once more, not knowing whether they had arrived.
+    /// The number of files that the user put or deleted again, because their state was unknown.
     pub(crate) said_again: usize,
-    /// What was given up for what the world did, by the names that it was given.
+    /// The items that were given up because of faults, by the names that they were reported with.
     pub(crate) named: Vec<String>,
-    /// From the calm to the time when all was right.
+    /// The time from the end of the faults until all animations were right.
     pub(crate) took: Duration,
     pub(crate) tally: Tally,
 }
@@ -27,13 +27,14 @@ impl fmt::Display for Round {
         let seconds = took.as_secs_f64();
         write!(
             f,
-            "seed {seed}: {acts} acts, {said_again} files said again; right after {seconds:.1} s, {} given up by name {named:?}; {tally}",
+            "seed {seed}: {acts} actions, {said_again} files repeated; right after {seconds:.1} s, {} given up by name \
+             {named:?}; {tally}",
             named.len()
         )
     }
 }
 
-/// What comes before the figures.
+/// Returns the text before the figures.
 fn header(store: StoreKind) -> String {
     let (title, command, clocks) = match store {
         StoreKind::BuiltIn => ("Chaos on the real parts", "chaos.md", "clocks step"),
@@ -41,6 +42,11 @@ fn header(store: StoreKind) -> String {
             "Chaos on the real parts, with MinIO",
             "chaos-minio.md RAYFOLD_CHAOS_STORE=minio",
             "clocks of all but MinIO step",
+        ),
+        StoreKind::SeaweedFs => (
+            "Chaos on the real parts, with SeaweedFS",
+            "chaos-seaweedfs.md RAYFOLD_CHAOS_STORE=seaweedfs",
+            "clocks of all but SeaweedFS step",
         ),
     };
     format!(
@@ -50,20 +56,20 @@ Written by
 
     RAYFOLD_CHAOS_MINUTES=11 RAYFOLD_CHAOS_REPORT=$PWD/docs/reports/{command} cargo test -p rayfold-lambda --test chaos -- --nocapture
 
-A round has a seed and a bucket of its own. For 20 s {store}, the invoker and the function processes are killed
-(`kill -9`), each by itself; proxies before the store and before the invoker slow connections, cut them in the middle of a
-request or an answer, lose answers, answer 500 to what was done, and send requests twice; files cannot grow (`ulimit -f`),
-{clocks} by up to 30 s or an hour (libfaketime), events are lost, doubled and late. A user puts, overwrites, deletes and
-changes back scripts and settings of three animations meanwhile, faulty ones and scripts of three frames among them; one
-animation's frames are drawn in bands, and in half of the rounds each GIF is built by several assemblers. Then all is calm, and
-within 240 s every manifest must say what the files say, and every GIF must have the bytes that the same files give without a
-bucket. What a function gave up for what was done to it must say so by name, and comes right when the user tries again.
-`RAYFOLD_SEED` replays a round's acts and dice; which request meets which is up to the machine.
+Each round has its own seed and bucket. For 20 s {store}, the invoker and the function processes are killed (`kill -9`)
+separately. Proxies before the store and before the invoker delay connections, cut them in the middle of a request or a reply,
+lose replies, reply 500 to requests that succeeded, and send requests twice. Files cannot grow (`ulimit -f`), {clocks} by up to
+30 s or an hour (libfaketime), and events are lost, duplicated and late. Meanwhile a user puts, overwrites, deletes and changes
+back scripts and settings of three animations, including faulty ones and scripts of three frames. One animation's frames are
+drawn in bands, and in half of the rounds each GIF is built by several assemblers. Then the faults end. Within 240 s every
+manifest must match the files, and every GIF must have the bytes that the same files give without a bucket. If a function gave
+up an item because of faults, the manifest must report it by name, and a retry by the user must succeed. `RAYFOLD_SEED` replays
+a round's user actions and random faults; their assignment to requests depends on the machine.
 "
     )
 }
 
-/// The whole report.
+/// Returns the whole report.
 pub(crate) fn page(store: StoreKind, rounds: &[Round], took: Duration) -> String {
     let mut page = header(store);
     let all = Tally::default();
@@ -73,7 +79,9 @@ pub(crate) fn page(store: StoreKind, rounds: &[Round], took: Duration) -> String
     write(
         &mut page,
         format_args!(
-            "\n## A run\n\n{} rounds in {:.0} minutes, {acts} acts of the user. Every animation ended right in every round.\n\n",
+            "\n\
+             ## A run\n\n\
+             {} rounds in {:.0} minutes, {acts} actions of the user. Every animation ended right in every round.\n\n",
             rounds.len(),
             took.as_secs_f64() / 60.0
         ),
@@ -85,7 +93,9 @@ pub(crate) fn page(store: StoreKind, rounds: &[Round], took: Duration) -> String
     write(
         &mut page,
         format_args!(
-            "\n| seed | acts | said again | right after, s | given up by name |\n| --- | --- | --- | --- | --- |\n"
+            "\n\
+             | seed | actions | repeated | right after, s | given up by name |\n\
+             | --- | --- | --- | --- | --- |\n"
         ),
     );
     for Round { seed, acts, said_again, named, took, .. } in rounds {

@@ -1,4 +1,4 @@
-//! What went wrong, and how often.
+//! Counts of the faults.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Counts by name. Clones are the same.
+/// Counts by name. Clones share the counts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tally(Arc<Mutex<BTreeMap<String, u64>>>);
 
@@ -20,7 +20,7 @@ impl Tally {
         self.0.lock().unwrap().get(what).copied().unwrap_or(0)
     }
 
-    /// Adds all of another one.
+    /// Adds all counts of another tally.
     pub(crate) fn add_all(&self, other: &Tally) {
         for (what, count) in other.counts() {
             *self.0.lock().unwrap().entry(what).or_default() += count;
@@ -31,7 +31,7 @@ impl Tally {
         self.0.lock().unwrap().clone()
     }
 
-    /// Adds what a process noted that may be dead by now.
+    /// Adds the notes of processes, which may have ended.
     pub(crate) fn add_notes(&self, folder: &Path) {
         for line in std::fs::read_to_string(notes(folder)).unwrap_or_default().lines() {
             self.add(line);
@@ -51,7 +51,8 @@ fn notes(folder: &Path) -> PathBuf {
     folder.join("notes")
 }
 
-/// A way to note something that is counted although the process dies: one write a line.
+/// Returns a function that notes a fault so that it is counted even if the process is killed: it writes each line in
+/// one call.
 pub(crate) fn noting(folder: &Path) -> impl Fn(&str) + Clone + Send + Sync + use<> {
     let file = OpenOptions::new().create(true).append(true).open(notes(folder)).unwrap();
     let file = Arc::new(Mutex::new(file));

@@ -1,4 +1,4 @@
-//! The user: changes animations without end, knows what arrived, and says what is wrong with what came of it.
+//! The user: changes animations continually, records which changes arrived, and checks the results.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -12,33 +12,33 @@ use rayfold_scene::parse_settings;
 
 use crate::stage::{big_scene, locally, scene};
 
-/// How often the user asks again.
+/// The number of attempts of a request.
 const ASKS: usize = 5;
 
-/// How long an answer is waited for.
+/// The time limit for a reply.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 pub(crate) const ANIMATIONS: [&str; 3] = ["one", "two", "deep/three"];
 
-/// The one whose frames are drawn in bands.
+/// The animation whose frames are drawn in bands.
 const BIG: &str = "deep/three";
 
 const SCRIPTS: [&str; 4] = ["1.txt", "2.txt", "10.txt", "3.txt"];
 const SETTINGS: &str = "animation.json";
 
-/// What cannot be drawn, so that it must be named.
+/// A script that cannot be drawn, so its error must be reported.
 const FAULTY: &str = "Screen 24 18\nSpere 6\nTrace\n";
 
-/// What cannot be understood.
+/// Settings that cannot be parsed.
 const FAULTY_SETTINGS: &str = "{\"fps\": ";
 
-/// How a script of several frames says so.
+/// The line by which a script has several frames.
 const THREE: &str = "Frames 3\n";
 
-/// How functions say that they gave up a frame, or a set, for what the world did to them.
+/// The messages by which functions report that they gave up a frame or a set because of faults.
 const GIVEN_UP: [&str; 3] = ["in each of", "is no frame, though drawn", "frames were assembled in the"];
 
-/// What the user wants to be there, and which of it may not have arrived.
+/// The files that the user wants, and those of them that may not have arrived.
 #[derive(Default)]
 pub(crate) struct Wishes {
     files: BTreeMap<String, String>,
@@ -46,17 +46,17 @@ pub(crate) struct Wishes {
     pub(crate) acts: u64,
 }
 
-/// How a request of the user's ended.
+/// The outcome of a request of the user.
 #[derive(PartialEq, Eq)]
 enum Sent {
     Done,
     Refused,
-    /// It may still be on its way, behind what the user does next.
+    /// The request may still take effect, after the user's next action.
     Unknown,
 }
 
 impl Wishes {
-    /// Changes something. What is answered is there; of what is not answered nobody knows.
+    /// Changes something. If there is no reply, the state of the file is unknown.
     pub(crate) async fn act(&mut self, random: &mut Rng, store: &S3Store) {
         let animation = random.choice(ANIMATIONS).unwrap();
         let is_settings = random.u32(0..10) == 0;
@@ -67,7 +67,7 @@ impl Wishes {
             3 => Some(if is_settings { FAULTY_SETTINGS.to_owned() } else { FAULTY.to_owned() }),
             4 if !is_settings => Some(three_frames(animation)),
             _ if is_settings => Some(format!("{{\"frames\": {}, \"fps\": 5}}", random.u32(1..4))),
-            // Few contents, so that changes are often back to what was.
+            // There are few contents, so that changes often restore a former state.
             _ => Some(frame(animation, f64::from(random.u32(1..4)) * 4.0)),
         };
         match text {
@@ -99,7 +99,7 @@ impl Wishes {
         }
     }
 
-    /// Says once more what may not have arrived; gives how much that was.
+    /// Repeats the requests that may not have arrived. Returns their number.
     pub(crate) async fn make_sure(&mut self, store: &S3Store) -> usize {
         for key in &self.unsure {
             assert!(self.send(key, store).await == Sent::Done, "{key} cannot be sent in a calm world");
@@ -107,7 +107,7 @@ impl Wishes {
         std::mem::take(&mut self.unsure).len()
     }
 
-    /// The files of an animation.
+    /// Returns the files of an animation.
     pub(crate) fn of(&self, animation: &str) -> Vec<(&str, String)> {
         let prefix = format!("scripts/{animation}/");
         let mine =
@@ -116,7 +116,7 @@ impl Wishes {
     }
 }
 
-/// A script of one frame, which differs by `x`. All of an animation have one size.
+/// Returns a script of one frame, which depends on `x`. All frames of an animation have one size.
 fn frame(animation: &str, x: f64) -> String {
     if animation == BIG { big_scene(10.0 * x) } else { scene(x) }
 }
@@ -131,13 +131,14 @@ fn three_frames(animation: &str) -> String {
     moved.collect::<Vec<_>>().join(" ").replace("Trace\n", &format!("{THREE}Trace\n"))
 }
 
-/// How an animation of these files must end.
+/// Returns the status that an animation of these files must reach.
 fn expected(files: &[(&str, String)]) -> Status {
     let scripts: Vec<&str> =
         files.iter().filter(|(name, _)| *name != SETTINGS).map(|(_, text)| text.as_str()).collect();
     let settings = files.iter().find(|(name, _)| *name == SETTINGS);
     let settings = settings.map(|(name, text)| parse_settings(name, text.as_bytes()).settings);
-    let awaited = settings.flatten().and_then(|settings| settings.frames()).unwrap_or(0);
+    let awaited =
+        settings.as_ref().and_then(Option::as_ref).and_then(|settings| settings.frames()).unwrap_or(0);
     let frames: u64 = scripts.iter().map(|text| if text.contains(THREE) { 3 } else { 1 }).sum();
     let is_faulty = settings == Some(None) || scripts.contains(&FAULTY);
     match (scripts.is_empty(), frames < awaited, is_faulty) {
@@ -148,7 +149,7 @@ fn expected(files: &[(&str, String)]) -> Status {
     }
 }
 
-/// What is still wrong with an animation; nothing when it is as the files say.
+/// Describes the remaining difference between an animation and its files. Returns `None` if there is none.
 pub(crate) async fn wrong(store: &S3Store, name: &str, files: &[(&str, String)]) -> Option<String> {
     let animation = Animation::new(name).unwrap();
     let gif = store.get(&animation.gif()).await.ok();
@@ -162,7 +163,7 @@ pub(crate) async fn wrong(store: &S3Store, name: &str, files: &[(&str, String)])
     }
     let generation = generation_of(gif.as_ref().map(|gif| &gif.info)).map(str::to_owned);
     match (expected, gif) {
-        // While more is to come the last GIF stays.
+        // While files are missing, the last GIF stays.
         (Status::Waiting, _) => None,
         (Status::Done, Some(gif)) if gif.body == locally(files) => {
             (generation.as_deref() != Some(head.generation.as_str())).then(|| format!("{name}: an old GIF"))
@@ -180,7 +181,7 @@ async fn manifest(store: &S3Store, animation: &Animation) -> Option<Manifest> {
     Manifest::decode(animation, &object.body).ok()
 }
 
-/// What functions have given up of an animation for what the world did to them, by name.
+/// Returns the names of the items of an animation that functions have given up because of faults.
 pub(crate) async fn given_up(store: &S3Store, name: &str, files: &[(&str, String)]) -> Vec<String> {
     let Some(manifest) = manifest(store, &Animation::new(name).unwrap()).await else { return Vec::new() };
     let is_good =

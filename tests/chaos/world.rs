@@ -1,4 +1,4 @@
-//! The world: the parts, the gates before them, and the disasters that befall them.
+//! The world: the parts, the gates before them, and the faults.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,13 +10,13 @@ use crate::gate::Gate;
 use crate::parts::{Ground, InvokerTold, Part, lying_clock, set_clock};
 use crate::tally::Tally;
 
-/// How many more blocks of 1,024 bytes the largest file may grow by on a full disk.
+/// The number of blocks of 1,024 bytes that the largest file may still grow by on a full disk.
 const LEFT_ON_DISK: std::ops::Range<u64> = 1..200;
 
-/// How far a clock steps mostly, in seconds.
+/// The usual range of clock steps, in seconds.
 const STEP: std::ops::RangeInclusive<i64> = -30..=30;
 
-/// And how far seldom: further than a store believes in a signature.
+/// The rare clock steps, which exceed the limit for signatures of a store.
 const FAR: [i64; 2] = [-3_600, 3_600];
 
 /// The real parts.
@@ -32,7 +32,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// Starts everything, in a calm that ends when this returns.
+    /// Starts everything, without faults until this returns.
     pub(crate) async fn start(folder: &Path, tally: Tally, mut dice: Rng) -> Self {
         for name in ["store", "invoker"] {
             set_clock(folder, name, 0);
@@ -73,12 +73,12 @@ impl World {
         world
     }
 
-    /// The bucket as the user reaches it: through the gate.
+    /// Returns the bucket as the user reaches it: through the gate.
     pub(crate) fn store(&self) -> S3Store {
         S3Store::at(&self.connection, "rayfold")
     }
 
-    /// One thing goes wrong, and is over when this returns.
+    /// Causes one fault, which is over when this returns.
     pub(crate) async fn disaster(&mut self, dice: &mut Rng) {
         let pause = Duration::from_millis(dice.u64(0..1_500));
         match dice.u32(0..10) {
@@ -133,7 +133,7 @@ impl World {
         }
     }
 
-    /// From now on nothing goes wrong.
+    /// Ends all faults.
     pub(crate) async fn calm_down(&mut self) {
         self.kill_invoker();
         self.kill_store();
@@ -165,7 +165,7 @@ impl World {
         }
     }
 
-    /// On a full disk it may not start; then the gate leads nowhere.
+    /// Starts the store. On a full disk it may not start; then the gate is closed.
     fn start_store(&mut self, largest_file: Option<u64>) {
         let (webhook, ground) = (self.to_invoker.address(), self.ground(largest_file));
         let started = tokio::task::block_in_place(|| Part::store(&self.folder, webhook, ground));
@@ -188,13 +188,13 @@ fn address(connection: &Connection) -> std::net::SocketAddr {
     connection.endpoint.trim_start_matches("http://").parse().unwrap()
 }
 
-/// Bytes of the largest file in a folder, or below it.
+/// Returns the size in bytes of the largest file in a folder or below it.
 fn largest_file(folder: &Path) -> u64 {
     let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
     let sizes = entries.flatten().map(|entry| match entry.metadata() {
         Ok(metadata) if metadata.is_dir() => largest_file(&entry.path()),
         Ok(metadata) => metadata.len(),
-        // Gone meanwhile.
+        // The file was deleted in between.
         Err(_) => 0,
     });
     sizes.max().unwrap_or(0)

@@ -1,10 +1,10 @@
-//! Every way in which input can be bad is told as what it is, with exit code 1, and nothing is written.
+//! Every kind of bad input is reported precisely, with exit code 1, and nothing is written.
 
 use snapbox::str;
 
 use crate::{BALL, Folder};
 
-/// Renders `script`, which must fail, and returns what was said.
+/// Renders `script`, which must fail. Returns the output.
 fn render(script: impl AsRef<[u8]>) -> snapbox::cmd::OutputAssert {
     let folder = Folder::with("a.txt", script);
     let assert = folder.rayfold("render a.txt -o a.gif").assert().code(1).stdout_eq("");
@@ -214,6 +214,8 @@ error: the radius must be greater than zero
   |
 4 | Sphere 0  0 0 0  .1 .1 .1  .8 .2 .1
   |        ^ expected a number greater than 0
+  |
+  = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
 
 error: nothing was written: 1 error
 
@@ -420,7 +422,7 @@ error: cannot write out.gif: it is a folder
 "#]]);
 }
 
-/// The superuser may write everywhere, but not even they where the system shows its processes.
+/// Root may write almost everywhere, but not into `/proc`.
 #[cfg(target_os = "linux")]
 #[test]
 fn output_folder_not_writable() {

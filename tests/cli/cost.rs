@@ -1,4 +1,4 @@
-//! `rayfold cost`, and the figures that docs/cost.md gives.
+//! `rayfold cost`, and the figures in docs/cost.md.
 
 use serde_json::Value;
 use snapbox::str;
@@ -121,7 +121,7 @@ fn nonsense_is_wrong_usage() {
     }
 }
 
-/// Each `$ rayfold cost ...` of the page is run, and must say what stands below it.
+/// Runs each `$ rayfold cost ...` of the page, and compares the output with the text below it.
 #[test]
 fn the_page_gives_what_the_program_says() {
     let folder = Folder::new();

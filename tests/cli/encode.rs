@@ -51,11 +51,11 @@ fn all_that_cannot_be_used_is_told_before_anything_is_encoded() {
         .code(1)
         .stdout_eq("")
         .stderr_eq(str![[r#"
-error: cannot read text.png: it is neither a PNG nor a TIFF image
-error: cannot read empty.tif: it is neither a PNG nor a TIFF image
+error: cannot read text.png: it is no image: expected PNG, APNG, JPEG, GIF, WebP, TIFF or .y4m
+error: cannot read empty.tif: it is no image: expected PNG, APNG, JPEG, GIF, WebP, TIFF or .y4m
 error: cannot read frames: it is a folder, expected its images, such as frames/*.png
 error: cannot read none.png: No such file or directory
-error: cannot read photo.png: it is neither a PNG nor a TIFF image
+error: cannot read photo.png: [..]
 error: 5 of 6 files cannot be used
 
 "#]]);

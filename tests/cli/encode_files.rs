@@ -1,20 +1,20 @@
-//! `rayfold encode` of files that hold several frames, or say how they are to be shown.
+//! `rayfold encode` with files that hold several frames, or metadata about their display.
 
 use image::RgbImage;
 use snapbox::str;
 
 use crate::{Folder, ball_at, decode_gif};
 
-/// A page of a TIFF file, of one colour but for its first pixel, which is white.
+/// A page of a TIFF file. It has one colour, except for a white first pixel.
 #[derive(Clone, Default)]
 struct Page {
     size: (u16, u16),
     colour: [u8; 3],
-    /// NewSubfileType.
+    /// The value of NewSubfileType.
     subfile: u16,
     orientation: u16,
     is_planar: bool,
-    /// Tiles of 16 x 16, compressed by LZW.
+    /// Whether the page has tiles of 16 x 16, compressed by LZW.
     is_tiled: bool,
 }
 
@@ -27,7 +27,7 @@ impl Page {
         if (x, y) == (0, 0) { 255 } else { self.colour[channel] }
     }
 
-    /// The strips or tiles.
+    /// Returns the strips or tiles.
     fn chunks(&self) -> Vec<Vec<u8>> {
         let (width, height) = (usize::from(self.size.0), usize::from(self.size.1));
         let (across, down) = if self.is_tiled { (16, 16) } else { (width, height) };
@@ -53,7 +53,7 @@ fn lzw(bytes: &[u8]) -> Vec<u8> {
     weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8).encode(bytes).unwrap()
 }
 
-/// A file of pages, in either byte order, with offsets of four bytes or eight.
+/// Returns a file of pages, in either byte order, with offsets of four bytes or eight.
 fn tiff(pages: &[Page], is_big_endian: bool, is_large: bool) -> Vec<u8> {
     let number = |value: u64, bytes: usize| {
         let mut digits = value.to_le_bytes()[..bytes].to_vec();
@@ -72,7 +72,7 @@ fn tiff(pages: &[Page], is_big_endian: bool, is_large: bool) -> Vec<u8> {
     let mut link = file.len();
     file.extend(number(0, wide));
     for page in pages {
-        // Numbers that do not fit beside their tag lie before the directory.
+        // Values that do not fit beside their tag precede the directory.
         let list = |file: &mut Vec<u8>, values: &[u64], bytes: usize| -> Vec<u8> {
             let all: Vec<u8> = values.iter().flat_map(|value| number(*value, bytes)).collect();
             if all.len() <= wide {
@@ -123,13 +123,13 @@ fn tiff(pages: &[Page], is_big_endian: bool, is_large: bool) -> Vec<u8> {
     file
 }
 
-/// Encodes one file; the pictures that a viewer shows.
+/// Encodes one file. Returns the pictures that a viewer shows.
 fn shown(folder: &Folder, file: &str) -> Vec<RgbImage> {
     folder.rayfold(&format!("encode {file} -o out.gif")).assert().code(0);
     decode_gif(&folder.read("out.gif")).into_iter().map(|(image, _)| image).collect()
 }
 
-/// The first frame was taken, and the others left out without a word.
+/// Regression test: only the first frame was used, and the others were silently ignored.
 #[test]
 fn an_animated_png_is_all_of_its_frames() {
     let folder = Folder::new();
@@ -141,13 +141,13 @@ fn an_animated_png_is_all_of_its_frames() {
     folder.rayfold("render balls -o %d.png").assert().code(0);
     folder.rayfold("encode balls.apng -o parts.gif --fps 20").assert().code(0);
     assert_eq!(folder.read("parts.gif"), folder.read("balls.gif"));
-    // Between others, in order.
+    // Between other files, in order.
     let out = folder.rayfold("encode 1.png balls.apng 7.png --no-sort -o more.gif --fps 20").assert().code(0);
     assert!(String::from_utf8_lossy(&out.get_output().stderr).contains("9 frames"));
     let frames = decode_gif(&folder.read("more.gif"));
     assert_eq!(frames.len(), 9);
     assert_eq!(frames[1..8], decode_gif(&folder.read("balls.gif"))[..]);
-    // One that is cut off is named, and nothing is written.
+    // A truncated file is reported, and nothing is written.
     let whole = folder.read("balls.apng");
     folder.write("half.apng", &whole[..whole.len() / 2]);
     let out = folder.rayfold("encode half.apng -o half.gif").assert().code(1);
@@ -170,13 +170,13 @@ fn a_tiff_is_all_of_its_pages() {
     }
     let out = folder.rayfold("encode pages.tif pages.tif -o out.gif").assert().code(0);
     assert!(String::from_utf8_lossy(&out.get_output().stderr).contains("10 frames"));
-    // A small copy of a page, as cameras and scanners add, is no page; nor is a mask.
+    // Thumbnails, which cameras and scanners add, are no pages; nor are masks.
     let mut with_copies = pages.clone();
     with_copies.insert(1, Page { subfile: 1, size: (3, 2), ..pages[0].clone() });
     with_copies.push(Page { subfile: 4, size: (3, 2), ..pages[0].clone() });
     folder.write("copies.tif", tiff(&with_copies, false, false));
     assert_eq!(shown(&folder, "copies.tif"), shown(&folder, "pages.tif"));
-    // The last directory leads to the first.
+    // The last directory points to the first.
     let mut circle = tiff(&pages, false, false);
     let (first, end) = (circle[4..8].to_vec(), circle.len());
     circle[end - 4..].copy_from_slice(&first);
@@ -188,7 +188,7 @@ error: 1 of 1 file cannot be used
 "#]]);
 }
 
-/// The decoder panicked.
+/// Regression test: the decoder panicked.
 #[test]
 fn a_tiff_in_tiles_is_read_or_refused_by_name() {
     let folder = Folder::new();
@@ -217,7 +217,7 @@ error: 1 of 1 file cannot be used
 #[test]
 fn orientation_is_obeyed() {
     let folder = Folder::new();
-    // Where the white pixel of the upper left corner goes in a picture of 6 x 4.
+    // The position of the white pixel of the upper left corner in a picture of 6 x 4.
     for (orientation, size, white) in [
         (1, (6, 4), (0, 0)),
         (2, (6, 4), (5, 0)),
@@ -232,7 +232,7 @@ fn orientation_is_obeyed() {
         let image = &shown(&folder, "a.tif")[0];
         assert_eq!(image.dimensions(), size, "{orientation}");
         assert_eq!(image.get_pixel(white.0, white.1).0, [255; 3], "{orientation}");
-        // The same in a PNG, by its eXIf chunk.
+        // The orientation in a PNG, by its eXIf chunk.
         let exif = [
             b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec(),
             vec![orientation as u8, 0, 0, 0, 0, 0, 0, 0],
@@ -247,7 +247,7 @@ fn orientation_is_obeyed() {
     }
 }
 
-/// A picture of 6 x 4 that is 128 everywhere but for its first pixel.
+/// Returns a picture of 6 x 4 that is 128 everywhere except for its first pixel.
 fn png(change: impl FnOnce(&mut png::Info<'_>)) -> Vec<u8> {
     let mut info = png::Info::with_size(6, 4);
     info.color_type = png::ColorType::Rgb;
@@ -262,7 +262,7 @@ fn png(change: impl FnOnce(&mut png::Info<'_>)) -> Vec<u8> {
     file
 }
 
-/// Pictures of linear light were far too dark.
+/// Regression test: pictures in linear light were far too dark.
 #[test]
 fn gamma_is_obeyed() {
     let folder = Folder::new();
@@ -272,9 +272,9 @@ fn gamma_is_obeyed() {
     let cases: [(&str, u8, Change); 5] = [
         ("none", 128, Box::new(|_| ())),
         ("that of the display", 128, Box::new(move |info| info.source_gamma = gamma(0.45455))),
-        // 128 / 255 as light is 188 as sRGB encodes it.
+        // 128 / 255 as light is 188 in sRGB.
         ("linear", 188, Box::new(move |info| info.source_gamma = gamma(1.0))),
-        // (128 / 255) ^ 1.8 is the light.
+        // The light is (128 / 255) ^ 1.8.
         ("old Macintosh", 146, Box::new(move |info| info.source_gamma = gamma(1.0 / 1.8))),
         (
             "sRGB, which counts",

@@ -1,4 +1,4 @@
-//! Files that are no scripts, pictures that stand in the way, and places that are links, secret or read-only.
+//! Special files: files that are no scripts, picture names that are taken, links, secret and read-only places.
 
 #![cfg(unix)]
 
@@ -13,7 +13,7 @@ fn make_pipe(folder: &Folder, name: &str) {
     assert!(Command::new("mkfifo").arg(folder.join(name)).status().unwrap().success());
 }
 
-/// Every command that looked at the folder waited for ever.
+/// Regression test: every command that read the folder waited for ever.
 #[test]
 fn a_pipe_among_the_scripts_is_refused_by_name() {
     let folder = Folder::with("scenes/1.txt", BALL);
@@ -52,7 +52,7 @@ error: nothing was written: 1 error in 1 of 2 files
     assert_eq!(folder.list("."), ["scenes"]);
 }
 
-/// A picture that is there is looked at with `--skip-existing`.
+/// With `--skip-existing` an existing picture is read.
 #[test]
 fn a_pipe_in_a_picture_s_place_is_refused_by_name() {
     let folder = Folder::with("a.txt", BALL);
@@ -101,7 +101,7 @@ fn a_read_only_file_is_not_replaced() {
     }
 }
 
-/// All was drawn, and nobody got it.
+/// Regression test: everything was drawn and the output was lost without an error.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_closed_standard_output_is_an_error() {

@@ -1,4 +1,4 @@
-//! `rayfold render` to one image and to many.
+//! `rayfold render` to one image and to several.
 
 use snapbox::str;
 
@@ -56,7 +56,7 @@ fn another_size_shows_the_same_picture() {
     folder.rayfold("render a.txt -o large.png --size 47x31").assert().code(0);
     let (small, large) = (folder.image("small.png"), folder.image("large.png"));
     assert_eq!(large.dimensions(), (47, 31));
-    // Samples sit on the window's corners, so every second one of the large image is one of the small.
+    // Samples are on the window's corners, so every second one of the large image is one of the small.
     for (x, y, pixel) in small.enumerate_pixels() {
         let other = large.get_pixel(2 * x, 2 * y);
         assert!((0..3).all(|c| pixel[c].abs_diff(other[c]) <= 1), "({x}, {y}): {pixel:?}, {other:?}");
@@ -90,7 +90,7 @@ other/0001.png to other/0002.png: 2 frames, [..]B, in [..] s
 "#]]);
 }
 
-/// The error named a file and a folder that nobody had asked for.
+/// Regression test: the error named a file and a folder that the user had not specified.
 #[test]
 fn a_pattern_below_a_file_is_refused_by_its_own_name() {
     let folder = Folder::with("a.txt", BALL);
@@ -104,7 +104,7 @@ fn a_pattern_below_a_file_is_refused_by_its_own_name() {
     assert_eq!(String::from_utf8(said).unwrap(), "error: cannot write a.txt/a.gif: a.txt is no folder\n");
 }
 
-/// What cannot be written was an error also where nothing was to be written.
+/// Regression test: a folder without write access was an error even if nothing had to be written.
 #[cfg(unix)]
 #[test]
 fn where_all_frames_are_there_nothing_need_be_written() {
@@ -114,7 +114,7 @@ fn where_all_frames_are_there_nothing_need_be_written() {
         let mode = std::os::unix::fs::PermissionsExt::from_mode(mode);
         std::fs::set_permissions(folder.join(name), mode).unwrap();
     };
-    // Root writes into the folder all the same, but replaces no read-only file.
+    // Root can write into the folder nevertheless, but replaces no read-only file.
     for (name, mode) in [("fr/1.png", 0o444), ("fr/2.png", 0o444), ("fr", 0o555)] {
         read_only(name, mode);
     }

@@ -1,14 +1,16 @@
-//! Drives the `rayfold` command from outside, as a user's shell does.
+//! Runs the `rayfold` command like a user's shell does.
 //!
-//! Expected output stands in the tests themselves; `SNAPSHOTS=overwrite cargo test -p rayfold --test cli` renews it.
+//! The tests contain the expected output; `SNAPSHOTS=overwrite cargo test -p rayfold --test cli` updates it.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
 mod bad_input;
 mod check;
 mod cost;
+mod documented;
 mod encode;
 mod encode_files;
+mod encode_formats;
 #[cfg(unix)]
 mod files;
 mod images;
@@ -18,9 +20,11 @@ mod newcomer;
 mod pages;
 mod render;
 mod split;
+mod timing;
 mod usage;
 #[cfg(unix)]
 mod watch;
+mod wrong_turns;
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +33,7 @@ use snapbox::cmd::Command;
 /// The program under test.
 pub(crate) const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
-/// A red ball on grey, 24 x 16 pixels.
+/// A red sphere on grey, 24 x 16 pixels.
 pub(crate) const BALL: &str = "\
 Screen 24, 16
 Camera 0 0 5  0 0 -1  0 1 0  1  -.3 -.2 .3 .2
@@ -39,7 +43,7 @@ Ilight 1 1 1  -1 -1 -1
 Trace
 ";
 
-/// A folder that is gone after the test.
+/// A folder that is deleted after the test.
 pub(crate) struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -47,14 +51,14 @@ impl Folder {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// With one file.
+    /// Makes a folder with one file.
     pub(crate) fn with(name: &str, text: impl AsRef<[u8]>) -> Self {
         let folder = Self::new();
         folder.write(name, text);
         folder
     }
 
-    /// Writes a file, and the folders that it lies in.
+    /// Writes a file and its parent folders.
     pub(crate) fn write(&self, name: &str, text: impl AsRef<[u8]>) {
         let path = self.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -73,7 +77,7 @@ impl Folder {
         self.path().join(name)
     }
 
-    /// Names of what lies in a folder, sorted, hidden files too.
+    /// Returns the sorted names in a folder, including hidden files.
     pub(crate) fn list(&self, name: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.join(name)).unwrap();
         let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -81,7 +85,7 @@ impl Folder {
         names
     }
 
-    /// `rayfold` with arguments that are separated by blanks.
+    /// Returns the command `rayfold` with arguments that are separated by spaces.
     pub(crate) fn rayfold(&self, args: &str) -> Command {
         Command::new(RAYFOLD)
             .args(args.split_whitespace())
@@ -90,18 +94,18 @@ impl Folder {
             .env("COLUMNS", "100")
     }
 
-    /// An image as it was written.
+    /// Reads an image.
     pub(crate) fn image(&self, name: &str) -> image::RgbImage {
         image::load_from_memory(&self.read(name)).unwrap().into_rgb8()
     }
 }
 
-/// A ball that moves to the right by a twelfth of its size with each frame.
+/// Returns a script with a sphere that moves to the right by a twelfth of its size per frame.
 pub(crate) fn ball_at(step: usize) -> String {
     BALL.replace("0 0 0  .1", &format!("{} 0 0  .1", step as f64 / 6.0))
 }
 
-/// An animation as a viewer shows it: its frames with their delays in hundredths of a second.
+/// Decodes an animation as a viewer shows it: its frames with their delays in hundredths of a second.
 pub(crate) fn decode_gif(bytes: &[u8]) -> Vec<(image::RgbImage, u16)> {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);

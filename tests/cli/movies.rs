@@ -1,4 +1,4 @@
-//! `rayfold render` for other programs: YUV4MPEG2 and APNG, decoded here by other code than wrote them.
+//! `rayfold render` for other programs: YUV4MPEG2 and APNG, decoded here by independent code.
 
 use std::io::Cursor;
 use std::process::{Command, Stdio};
@@ -18,7 +18,7 @@ fn balls(count: usize) -> Folder {
     folder
 }
 
-/// The pixels of a Y4M's frames, by BT.601's own formulas.
+/// Returns the pixels of a Y4M's frames, by the formulas of BT.601.
 fn decode_y4m(bytes: &[u8], size: (usize, usize)) -> Vec<Vec<[f64; 3]>> {
     let mut rest = bytes;
     let mut frames = Vec::new();
@@ -66,7 +66,7 @@ fn standard_output_is_the_same_video_and_nothing_else() {
     assert!(out.stdout == folder.read("file.y4m"));
     let said = String::from_utf8(out.stderr).unwrap();
     assert!(said.starts_with("standard output: 3 frames of 24 x 16, "), "{said}");
-    // A script with an error gives a program nothing at all.
+    // A script with an error produces no output for a program.
     folder.write("balls/f2.txt", "Trce");
     folder.rayfold("render balls -o -").assert().code(1).stdout_eq("");
 }
@@ -105,7 +105,7 @@ fn a_browser_gets_every_frame_without_loss() {
         let (parts, whole) = frame.delay().numer_denom_ms();
         assert_eq!(parts / whole, if number == 5 { 1_500 } else { 80 }, "frame {number}");
     }
-    // acTL: how many frames, and how often they are shown.
+    // acTL: the number of frames and of repetitions.
     let at = file.windows(4).position(|word| word == b"acTL").unwrap() + 4;
     let number = |at: usize| u32::from_be_bytes(file[at..at + 4].try_into().unwrap());
     assert_eq!((number(at), number(at + 4)), (5, 3));
@@ -117,9 +117,40 @@ fn flags_that_a_video_has_no_room_for_are_refused() {
     for flag in ["--loop 2", "--once", "--final-delay 2"] {
         let out = folder.rayfold(&format!("render balls -o a.y4m {flag}")).assert().code(2);
         let said = String::from_utf8(out.get_output().stderr.clone()).unwrap();
-        assert!(said.contains("are for .gif and .apng"), "{said}");
+        assert!(said.contains("are for .gif, .apng and .webp"), "{said}");
     }
     folder.rayfold("render balls -o %d.apng").assert().code(2);
+}
+
+#[test]
+fn a_webp_is_every_frame_without_loss() {
+    let folder = balls(5);
+    folder.rayfold("render balls -o balls.webp --fps 12.5 --loop 2 --final-delay 1.5").assert().code(0);
+    let file = folder.read("balls.webp");
+    assert_eq!(u32::from_le_bytes(file[4..8].try_into().unwrap()) as usize, file.len() - 8);
+    let mut decoder = image_webp::WebPDecoder::new(Cursor::new(&file)).unwrap();
+    assert!(decoder.is_animated() && !decoder.is_lossy() && !decoder.has_alpha());
+    assert_eq!((decoder.dimensions(), decoder.num_frames()), ((24, 16), 5));
+    assert_eq!(decoder.loop_count(), image_webp::LoopCount::Times(std::num::NonZeroU16::new(3).unwrap()));
+    for number in 1..=5 {
+        let mut pixels = vec![0; 24 * 16 * 3];
+        let ms = decoder.read_frame(&mut pixels).unwrap();
+        assert_eq!(pixels, folder.image(&format!("{number}.png")).into_raw(), "frame {number}");
+        assert_eq!(ms, if number == 5 { 1_500 } else { 80 }, "frame {number}");
+    }
+    // Read back by this program, too.
+    folder.rayfold("render balls -o balls.gif --fps 12.5 --final-delay 1.5").assert().code(0);
+    folder.rayfold("encode balls.webp -o parts.gif").assert().code(0);
+    assert!(folder.read("parts.gif") == folder.read("balls.gif"));
+    // Above 90 frames a second as an APNG.
+    let out = folder.rayfold("render balls -o fast.webp --fps 200").assert().code(0);
+    let said = String::from_utf8_lossy(&out.get_output().stderr).into_owned();
+    assert!(said.contains("browsers show at most 90 frames of a WebP a second, not 200"), "{said}");
+    folder.write("wide.txt", "Screen 20000 2\nTrace");
+    let out = folder.rayfold("render wide.txt -o wide.webp").assert().code(1);
+    let said = String::from_utf8_lossy(&out.get_output().stderr).into_owned();
+    assert!(said.contains("a WebP has 16384 pixels on a side at most, not 20000 x 2"), "{said}");
+    assert!(!folder.join("wide.webp").exists());
 }
 
 /// Browsers show a frame of 10 ms or less for 100 ms.

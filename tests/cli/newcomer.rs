@@ -1,4 +1,4 @@
-//! What a newcomer stumbled over, each defect by its name.
+//! Defects that a new user found.
 
 use serde_json::Value;
 use snapbox::str;
@@ -13,7 +13,7 @@ fn balls(count: usize) -> Folder {
     folder
 }
 
-/// What a run says to people; it must end with `code`.
+/// Returns the messages of a run, which must end with `code`.
 fn said(folder: &Folder, args: &str, code: i32) -> String {
     let output = folder.rayfold(args).assert().code(code).get_output().stderr.clone();
     String::from_utf8(output).unwrap()
@@ -44,7 +44,7 @@ error: balls: an animation has one size, but frame 1 (balls/f1.txt) is 24 x 16 a
     let report: Value = serde_json::from_slice(&report).unwrap();
     assert_eq!((&report["errors"], &report["conflicts"][0]["input"]), (&1.into(), &"balls".into()));
     assert_eq!(report["conflicts"][0]["severity"], "error");
-    // A script alone may be meant as pictures.
+    // A single script may be meant as separate pictures.
     folder.write("pair.txt", BALL.replace("Trace", "Trace\nScreen 6 4\nTrace"));
     let told = said(&folder, "check pair.txt", 0);
     assert!(told.starts_with("warning: pair.txt: an animation has one size"), "{told}");
@@ -74,7 +74,7 @@ fn submit_recommended_flags_that_it_lacked() {
         told.contains("is 12 x 8: give their scripts the same Screen") && !told.contains("--size"),
         "{told}"
     );
-    // What is recommended here is there.
+    // The recommended option exists.
     folder.write("balls/f2.txt", BALL.replace("24, 16", "8001, 8000"));
     let told = said(&folder, "submit balls --bucket nowhere", 1);
     assert!(told.contains("--max-pixels sets the limit on pixels"), "{told}");
@@ -85,12 +85,10 @@ fn submit_recommended_flags_that_it_lacked() {
 #[test]
 fn submit_listed_endings_that_it_refused() {
     let folder = balls(1);
-    for command in ["submit balls --bucket nowhere -o x.mp4", "encode a.png -o x.mp4"] {
-        folder.rayfold(command).assert().code(2).stderr_eq(str![[r#"
+    folder.rayfold("submit balls --bucket nowhere -o x.mp4").assert().code(2).stderr_eq(str![[r#"
 error: cannot write x.mp4: expected a name that ends in .gif
 
 "#]]);
-    }
     folder.rayfold("fetch film --bucket nowhere -o x.mp4").assert().code(2).stderr_eq(str![[r#"
 error: cannot write x.mp4: expected .gif, or a pattern such as frames/%04d.png (or .tif)
 
@@ -114,7 +112,7 @@ fn encode_played_files_as_the_shell_sorts_them() {
     let told = said(&folder, &format!("encode {as_the_shell_does} --no-sort -o given.gif"), 0);
     assert!(!told.contains("sorted"), "{told}");
     assert_eq!(decode_gif(&folder.read("given.gif"))[1].0, folder.image("f10.png"));
-    // Nothing to say where nothing is changed.
+    // No message if nothing changes.
     assert!(!said(&folder, "encode f2.png f10.png -o two.gif", 0).contains("sorted"));
 }
 
@@ -123,7 +121,7 @@ fn the_folder_of_frames_had_to_be_there() {
     let folder = balls(2);
     folder.rayfold("render balls -o new/frames/%04d.png").assert().code(0);
     assert_eq!(folder.list("new/frames"), ["0001.png", "0002.png"]);
-    // Not for scripts that cannot be drawn.
+    // No hint for scripts that cannot be drawn.
     folder.write("balls/f3.txt", "Trce");
     folder.rayfold("render balls -o other/%d.png").assert().code(1);
     assert_eq!(folder.list("."), ["balls", "new"]);
@@ -140,7 +138,7 @@ fn rendering_began_anew_after_ctrl_c() {
     folder.write("f/3.png", &whole[2][..whole[2].len() / 2]);
     folder.rayfold("render balls/f4.txt -o f/4.png --size 6x4").assert().code(0);
     folder.write("f/5.png", "no image");
-    // One that is whole stays, whatever it shows.
+    // A complete picture stays, whatever its content.
     folder.write("f/6.png", &whole[0]);
     let told = said(&folder, "render balls -o f/%d.png --skip-existing", 0);
     assert!(told.starts_with("f/1.png to f/6.png: 6 frames (2 were there), "), "{told}");
@@ -177,7 +175,7 @@ fn wrong_values_were_answered_in_the_words_of_rust() {
     for (flags, expected) in [
         ("--threads 0", "expected a whole number, 1 or more"),
         ("--threads x", "expected a whole number, 1 or more"),
-        ("--fps 15.5.5", "expected a number, such as 25 or 12.5"),
+        ("--fps 15.5.5", "expected a number, such as 25 or 12.5, or a fraction, such as 30000/1001"),
         ("--loop -1", "expected a whole number from 0, which is for ever, to 65535"),
         ("--max-pixels many", "expected a whole number, 1 or more"),
         ("--precision f16", "[possible values: auto, f32, f64]"),
@@ -223,9 +221,9 @@ fn cost_needed_a_duration_that_a_newcomer_does_not_have() {
     };
     let work = &report("")["workload"];
     assert_eq!((&work["frames"], &work["width"], &work["height"]), (&12.into(), &24.into(), &16.into()));
-    // Requests and pauses alone are 258 ms; drawing 24 x 16 pixels is next to nothing.
+    // Requests and pauses alone are 240 ms; drawing 24 x 16 pixels takes almost no time.
     let ms = work["ms"].as_f64().unwrap();
-    assert!((258.0..1_000.0).contains(&ms), "{ms}");
+    assert!((240.0..1_000.0).contains(&ms), "{ms}");
     assert!(work["frame_kb"].as_f64().unwrap() < 1.0);
     assert_eq!(report("--ms 123")["workload"]["ms"], 123.0);
     folder.write("balls/f3.txt", "Trce");

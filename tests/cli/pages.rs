@@ -1,6 +1,6 @@
-//! The page of each subcommand in docs/commands is its help.
+//! The page of each subcommand in docs/commands contains its help.
 //!
-//! `SNAPSHOTS=overwrite cargo test -p rayfold --test cli pages` renews them.
+//! `SNAPSHOTS=overwrite cargo test -p rayfold --test cli pages` updates the pages.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use crate::Folder;
 
 const PAGES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/commands");
 
-/// What a terminal of the usual width shows.
+/// Returns the help for a terminal of the usual width.
 fn help(of: &str) -> String {
     let out = Folder::new().rayfold(&format!("{of} --help")).env("COLUMNS", "80").assert().code(0);
     String::from_utf8(out.get_output().stdout.clone()).unwrap()
 }
 
-/// The subcommands, as the help lists them.
+/// Returns the subcommands that the help lists.
 fn subcommands() -> Vec<String> {
     let help = help("");
     let lines =
         help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    // What does not fit on a line goes on below itself, far from the margin.
+    // Continuation lines are indented further.
     let names =
         lines.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next());
     names.filter(|name| *name != "help").map(str::to_owned).collect()
@@ -68,7 +68,7 @@ fn the_page_of_each_subcommand_is_its_help() {
     }
 }
 
-/// Each block that says `scene` is a script as it stands.
+/// Each code block marked `scene` is a complete script.
 #[test]
 fn what_the_pages_show_is_drawn_without_a_word() {
     let docs = Path::new(PAGES).parent().unwrap();

@@ -4,7 +4,7 @@ use snapbox::str;
 
 use crate::{BALL, Folder, ball_at};
 
-/// Three frames: a ball, a second beside it, and after a Clear a third on another background.
+/// Returns a script of three frames: a sphere, a second beside it, and after a Clear a third on another background.
 fn flight() -> String {
     format!(
         "{BALL}Sphere 1 2 0 0 .1 .1 .1 0 .5 0\nTrace\nClear\nBackground 0 0 1\nSphere .5 0 0 0 1 1 0 0 0 0\nTrace\n"
@@ -64,7 +64,7 @@ error: nothing was written: 1 error
     assert_eq!(folder.list("."), ["a.txt"]);
 }
 
-/// A ball that grows over some frames, one that has another material from frame to frame, and a second shot.
+/// A sphere that grows over some frames, a sphere whose material changes from frame to frame, and a second shot.
 const WAVE: &str = "\
 Screen 16 12
 Look 0 0 9 0 (1:0 6:1) 0 40
@@ -74,6 +74,7 @@ Sphere (smooth 1:1 6:2) 0 0 0 skin
 Frames 2 6
 Trace
 Clear
+Ilight 1 1 1 0 -1 -1
 Sphere 1 (cycle 1:0 4:3) 0 0 .1 .1 .1 0 .5 0
 Frames 3
 Trace

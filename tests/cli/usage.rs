@@ -1,4 +1,4 @@
-//! A wrong command line is exit code 2 and says what was expected.
+//! A wrong command line has exit code 2 and a message about the expected one.
 
 use snapbox::str;
 
@@ -106,11 +106,11 @@ For more information, try '--help'.
 fn unknown_output_ending() {
     let folder = Folder::with("a.txt", BALL);
     folder.rayfold("render a.txt -o a.jpg").assert().code(2).stderr_eq(str![[r#"
-error: cannot tell from its ending what a.jpg should be: expected .gif, .apng or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
+error: cannot tell from its ending what a.jpg should be: expected .gif, .apng, .webp or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
 
 "#]]);
     folder.rayfold("render a.txt -o a").assert().code(2).stderr_eq(str![[r#"
-error: cannot tell from its ending what a should be: expected .gif, .apng or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
+error: cannot tell from its ending what a should be: expected .gif, .apng, .webp or .y4m for an animation, .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many
 
 "#]]);
     assert_eq!(folder.list("."), ["a.txt"]);
@@ -179,7 +179,7 @@ For more information, try '--help'.
 
 "#]]);
     folder.rayfold("render a.txt -o a.png --fps 20").assert().code(2).stderr_eq(str![[r#"
-error: --fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif or .apng
+error: --fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif, .apng or .webp
 
 "#]]);
 }
@@ -206,6 +206,36 @@ fn completions_know_the_subcommands() {
         assert!(out.status.success() && script.contains("max-pixels"), "{shell}: {script}");
     }
     Folder::new().rayfold("completions cmd.exe").assert().code(2);
+}
+
+#[test]
+fn there_is_a_manual_page_for_each_subcommand() {
+    let folder = Folder::new();
+    for _ in 0..2 {
+        folder.rayfold("man pages/man1").assert().code(0);
+    }
+    let text = |name: &str| String::from_utf8(folder.read(&format!("pages/man1/{name}"))).unwrap();
+    assert!(text("rayfold.1").contains(".TH rayfold 1"));
+    assert!(text("rayfold-render.1").contains("max\\-pixels"));
+    let help = folder.rayfold("--help").output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let mut names: Vec<String> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .map(|name| format!("rayfold-{name}.1"))
+        .collect();
+    names.push("rayfold.1".into());
+    names.sort();
+    let mut there = folder.list("pages/man1");
+    there.sort();
+    assert_eq!(there, names);
+    folder.write("file", "");
+    folder.rayfold("man file").assert().code(1);
 }
 
 #[cfg(unix)]

@@ -10,7 +10,7 @@ use crate::{BALL, Folder, RAYFOLD, ball_at};
 /// Longer than a loaded machine needs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The program at work; it does not outlive the test.
+/// The running program. It ends with the test.
 struct Watching {
     rayfold: Child,
     lines: Receiver<String>,
@@ -29,7 +29,7 @@ impl Watching {
         Self { rayfold, lines }
     }
 
-    /// Waits until it waits for a change; returns what it has said since.
+    /// Waits until the program waits for a change. Returns its output since then.
     fn until_it_waits(&self) -> String {
         let mut said = String::new();
         loop {
@@ -71,7 +71,7 @@ fn a_script_that_is_saved_is_drawn_again() {
     assert!(watching.until_it_waits().starts_with("out.gif: 1 frame"));
     assert_ne!(folder.read("out.gif"), first);
 
-    // A fault is told, the last picture stays, and what mends it is seen.
+    // A fault is reported, the last picture stays, and the correction is detected.
     let second = folder.read("out.gif");
     folder.write("balls/f2.txt", "Trce");
     let said = watching.until_it_waits();
@@ -83,7 +83,7 @@ fn a_script_that_is_saved_is_drawn_again() {
     folder.write("balls/f2.txt", BALL);
     assert!(watching.until_it_waits().starts_with("out.gif: 2 frames"));
 
-    // Ctrl-C is how it ends, and no failure.
+    // Ctrl-C ends the program without an error.
     let id = watching.rayfold.id().to_string();
     assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     assert_eq!(watching.rayfold.wait().unwrap().code(), Some(0));

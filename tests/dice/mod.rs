@@ -1,9 +1,9 @@
-//! Random numbers, places and materials for scenes, from a seed that is printed.
+//! Random numbers, positions and materials for scenes, from a seed that is printed.
 
 use glam::DVec3;
 use rayfold_scene::Material;
 
-/// Drawn from `RAYFOLD_SEED`, or from the test's own seed.
+/// A generator with the seed `RAYFOLD_SEED`, or with the test's own seed.
 pub(crate) struct Dice(pub(crate) fastrand::Rng);
 
 impl Dice {

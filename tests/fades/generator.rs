@@ -1,4 +1,5 @@
-//! Fades at random: a picture whose levels change slowly, in one channel or in all, alone or beside what stays or moves.
+//! Random fades: a picture whose levels change slowly, in one channel or in all, alone or beside parts that stay or
+//! move.
 
 use image::{Rgb, RgbImage};
 
@@ -11,22 +12,22 @@ pub(crate) struct Fade {
     picture: Picture,
     seed: u32,
     base: [f64; 3],
-    /// Levels from the left to the right, and from the top to the bottom.
+    /// The increase in levels from left to right and from top to bottom.
     across: [f64; 3],
     down: [f64; 3],
-    /// Levels a frame.
+    /// The change in levels per frame.
     slope: [f64; 3],
-    /// The slope changes its sign after so many frames.
+    /// The number of frames after which the slope changes its sign.
     turn: u32,
-    /// Whether what is bright changes more.
+    /// Whether brighter pixels change more.
     scales: bool,
-    /// Pixels a frame by which the picture moves.
+    /// The movement of the picture in pixels per frame.
     speed: f64,
-    /// The part of the picture's width that does not change.
+    /// The share of the picture's width that does not change.
     still: f64,
-    /// Whether a ball moves over it.
+    /// Whether a ball moves over the picture.
     ball: bool,
-    /// For so many frames a patch of bright noise lies over it.
+    /// The number of frames in which a patch of bright noise covers a part.
     patch: u32,
 }
 
@@ -43,7 +44,7 @@ enum Picture {
 }
 
 impl Fade {
-    /// Draws what is to change, and how.
+    /// Chooses the picture and its changes.
     pub(crate) fn at_random(dice: &mut fastrand::Rng) -> Self {
         let picture = [
             Picture::Gradient,
@@ -73,7 +74,7 @@ impl Fade {
         let slope = weights.map(|weight| slope * weight / most);
         let rising = slope.iter().sum::<f64>() > 0.0;
         let base = of(dice, 120.0).map(|level| if rising { level } else { 255.0 - level });
-        // Large ones have more colours than are counted one by one.
+        // Large pictures have more colours than the encoder counts individually.
         let large = dice.u8(0..16) == 0;
         let side = if large { 150..260 } else { 8..120 };
         Self {
@@ -95,7 +96,7 @@ impl Fade {
         }
     }
 
-    /// The frame of a number, from 0.
+    /// Returns the frame of a number, from 0.
     pub(crate) fn frame(&self, number: u32) -> RgbImage {
         RgbImage::from_fn(self.width, self.height, |x, y| {
             let (radius, centre) = (f64::from(self.height) / 5.0, f64::from(number) * 1.7);
@@ -148,7 +149,7 @@ fn scatter(k: u32) -> u32 {
     k ^ k >> 16
 }
 
-/// Value noise of four octaves, from 0 to 1.
+/// Returns value noise of four octaves, from 0 to 1.
 fn cloud(x: f64, y: f64, seed: u32) -> f64 {
     let octave = |octave: i32| {
         let (x, y) = (x * f64::from(1 << octave), y * f64::from(1 << octave));

@@ -1,5 +1,5 @@
-//! Random scenes of all that the language has, and what every picture of the packets is held to: the plain tracer's, and
-//! its own, whatever it is drawn with.
+//! Random scenes with all features of the language, and the check of the packets' pictures: they equal the plain
+//! tracer's, and they do not depend on the instruction set or the search structure.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
 use crate::dice::Dice;
 
-/// Pixels of all pictures that rounding may put on the other side of an outline, as a share.
+/// The share of pixels of all pictures at outlines that rounding may assign to another object.
 const ISOLATED: f64 = 4e-4;
 
 impl Dice {
-    /// A sphere, a box or a triangle, any of which may be a mirror.
+    /// Returns a sphere, a box or a triangle, any of which may be a mirror.
     pub(crate) fn object(&mut self) -> Object {
         let at = self.point(3.0);
         let material = self.material();
@@ -54,7 +54,7 @@ impl Dice {
         scene
     }
 
-    /// An object of any kind of this material, in a group or not.
+    /// Returns an object of any kind of this material, in a group or not.
     pub(crate) fn any(&mut self, material: Material) -> Object {
         let (at, about) = (self.point(3.0), self.point(1.0));
         let end = at + self.within(0.2, 2.0) / about.length() * about;
@@ -73,7 +73,7 @@ impl Dice {
         if self.0.u8(0..3) == 0 { placed(self, object) } else { object }
     }
 
-    /// Beside its suns.
+    /// Adds lamps to the suns of a scene.
     pub(crate) fn add_lamps(&mut self, scene: &mut Scene) {
         let (size, middle) = match scene.camera {
             Camera::Orthographic => (50.0, DVec3::new(35.0, 35.0, -60.0)),
@@ -90,7 +90,7 @@ impl Dice {
     }
 }
 
-/// An object of a group of one, moved, turned and scaled.
+/// Returns the object in a group of one, moved, rotated and scaled.
 pub(crate) fn placed(dice: &mut Dice, object: Object) -> Object {
     let right_angles = dice.0.bool();
     let turns = DVec3::from_array(
@@ -131,13 +131,14 @@ pub(crate) fn levels() -> Vec<(&'static str, Level)> {
     levels
 }
 
-/// Pixels that are off by more than one level in a channel.
+/// Returns the number of pixels that are off by more than one level in a channel.
 pub(crate) fn off(a: &RgbImage, b: &RgbImage) -> usize {
     assert_eq!(a.dimensions(), b.dimensions());
     a.pixels().zip(b.pixels()).filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count()
 }
 
-/// Holds the packets to the plain tracer, and to themselves: in all numbers, on all instructions, for any tile and tree.
+/// Compares the packets with the plain tracer, and with each other: all precisions, all instruction sets, any tile and
+/// tree.
 pub(crate) fn hold(scenes: &[Scene]) {
     let (mut differ, mut pixels) = (0, 0);
     for (number, scene) in scenes.iter().enumerate() {
@@ -146,7 +147,7 @@ pub(crate) fn hold(scenes: &[Scene]) {
         for precision in [Precision::Auto, Precision::F32, Precision::F64] {
             let options = RenderOptions { precision, ..Default::default() };
             let drawn = draw(scene, options);
-            // What is drawn with the same numbers needs no second look.
+            // An equal picture needs no second comparison.
             if before.as_ref() == Some(&drawn) {
                 continue;
             }

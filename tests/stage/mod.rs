@@ -1,6 +1,7 @@
-//! A stage for end-to-end tests: an S3 server, the invoker and the unmodified function binaries, with scripts going in and
-//! GIFs coming out. Everything is started fresh for each test, on free loopback ports, and ends with it. Each function runs
-//! under the policy of its own role, the document that Terraform gives it on AWS: what that lacks fails a test.
+//! The environment for end-to-end tests: an S3 server, the invoker and the unmodified function binaries. Scripts are
+//! uploaded and GIFs are built. Everything starts fresh for each test, on free loopback ports, and ends with it. Each
+//! function runs under the policy of its own role, in the document that Terraform uses on AWS, so a missing permission
+//! fails a test.
 
 #![allow(dead_code, unreachable_pub, reason = "a module of several test files, which use each a part of it")]
 
@@ -24,8 +25,8 @@ use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
 use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_settings};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
-/// As `RAYFOLD_SPARE_FRAMES`: time to keep free, in frames, so that an assembler takes one and leaves the rest. Any frame takes a
-/// thousandth of a second at least.
+/// A value for `RAYFOLD_SPARE_FRAMES`: the time to keep free, in frames, so that an assembler adds one frame and leaves
+/// the rest. Any frame takes a thousandth of a second at least.
 pub const ALL_ITS_TIME: &str = "1000000";
 
 /// Longer than anything here takes on a loaded machine.
@@ -38,8 +39,8 @@ pub struct Stage {
     data: tempfile::TempDir,
 }
 
-/// The folder of the function binaries, where the program is. `cargo test` for one package alone does not build what belongs
-/// to another: then they are built here.
+/// Returns the folder of the function binaries, which is that of the program. `cargo test` for one package does not
+/// build the binaries of another. In that case they are built here.
 pub fn functions_beside(program: &Path) -> &Path {
     let folder = program.parent().unwrap();
     if folder.join("rayfold-render").exists() && folder.join("rayfold-assemble").exists() {
@@ -70,7 +71,9 @@ pub async fn stage(store: StoreKind, functions: &Path, change: impl FnOnce(&mut 
         change(settings);
     };
     let mut platform = Platform::start(&plan, settings, &mut |line| eprintln!("{line}")).await.unwrap();
-    for function in Function::ALL {
+    // SeaweedFS has no temporary credentials for its owner.
+    let of_roles = Function::ALL.into_iter().filter(|_| store != StoreKind::SeaweedFs);
+    for function in of_roles {
         let own = role::environment(platform.server(), function, &plan.bucket).await;
         platform.settings_mut().environment_of.insert(function, own);
     }
@@ -134,18 +137,21 @@ impl Stage {
         self.store().get(&Animation::new(animation).unwrap().gif()).await.unwrap().body
     }
 
-    /// Waits until nothing is on its way any more: all invocations have ended, and the store has no event left to tell.
+    /// Waits until there is no work left: all invocations have ended, and the store has no event left to deliver.
     pub async fn settle(&mut self) {
         let start = Instant::now();
         let mut quiet = 0;
         while quiet < 4 {
             assert!(start.elapsed() < PATIENCE, "invocations never end:\n{}", self.story());
             tokio::time::sleep(Duration::from_millis(50)).await;
+            if self.invoker().pending() == 0 {
+                self.invoker().look().await;
+            }
             quiet = if self.invoker().pending() == 0 { quiet + 1 } else { 0 };
         }
     }
 
-    /// Waits until the animation stands as wanted, and settles.
+    /// Waits until the animation has the status `wanted`, and settles.
     pub async fn until(&mut self, animation: &str, wanted: Status) -> Manifest {
         let start = Instant::now();
         loop {
@@ -169,24 +175,24 @@ impl Stage {
         manifest
     }
 
-    /// The animation is done, its GIF has exactly the bytes that these scripts give locally.
+    /// Waits until the animation is done. Checks that its GIF has exactly the bytes that these scripts give locally.
     pub async fn until_gif_of(&mut self, animation: &str, files: &[(&str, String)]) -> Manifest {
         let manifest = self.until(animation, Status::Done).await;
         assert!(self.gif(animation).await == locally(files), "the GIF of {animation} is not the local one");
         manifest
     }
 
-    /// What was seen since the last look.
+    /// Returns the observations since the last call.
     pub fn seen(&mut self) -> Vec<Observation> {
         std::iter::from_fn(|| self.seen.try_recv().ok()).collect()
     }
 
-    /// The next observation.
+    /// Returns the next observation.
     pub async fn next(&mut self) -> Observation {
         tokio::time::timeout(PATIENCE, self.seen.recv()).await.expect("something happens").unwrap()
     }
 
-    /// What was seen, for a person who has to find out why a test failed.
+    /// Returns the observations as text, to explain why a test failed.
     pub fn story(&mut self) -> String {
         let lines = self.seen().into_iter().map(|observation| match observation.seen {
             Seen::Event { name, key, .. } => format!("event {name} {key}"),
@@ -194,23 +200,25 @@ impl Stage {
             Seen::Finished { attempt, outcome, .. } => format!("finished {} {outcome:?}", attempt.request_id),
             Seen::Requested { attempt, request } => format!("  {} {request:?}", attempt.request_id),
             Seen::Log { line, .. } => format!("  log {line}"),
+            Seen::Joined { invoker } => format!("joined {invoker}"),
+            Seen::Lost { invoker } => format!("lost {invoker}"),
             Seen::DeadLetter { body } => format!("dead letter {body}"),
         });
         lines.collect::<Vec<_>>().join("\n")
     }
 }
 
-/// How many frames were drawn.
+/// Returns the number of frames drawn.
 pub fn drawn(seen: &[Observation]) -> usize {
     outcomes(seen).get("drawn").copied().unwrap_or(0)
 }
 
-/// How many GIFs were built.
+/// Returns the number of GIFs built.
 pub fn built(seen: &[Observation]) -> u64 {
     logged(seen).iter().filter_map(|line| line["built"].as_u64()).sum()
 }
 
-/// The outcomes that render logged, by how often.
+/// Returns the number of each outcome that render logged.
 pub fn outcomes(seen: &[Observation]) -> BTreeMap<String, usize> {
     let mut outcomes = BTreeMap::new();
     for line in logged(seen).iter().filter(|line| line["message"] == "rendered") {
@@ -219,7 +227,7 @@ pub fn outcomes(seen: &[Observation]) -> BTreeMap<String, usize> {
     outcomes
 }
 
-/// What the functions logged.
+/// Returns the functions' log entries.
 pub fn logged(seen: &[Observation]) -> Vec<serde_json::Value> {
     let lines = seen.iter().filter_map(|observation| match &observation.seen {
         Seen::Log { line, .. } => Some(line),
@@ -228,7 +236,7 @@ pub fn logged(seen: &[Observation]) -> Vec<serde_json::Value> {
     lines.map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()
 }
 
-/// Requests of a function's invocations, one by one.
+/// Returns the requests of a function's invocations, one by one.
 pub fn requests(seen: &[Observation], of: Function) -> Vec<Requests> {
     let ended = seen.iter().filter_map(|observation| match &observation.seen {
         Seen::Finished { attempt, requests, .. } if attempt.function == of => Some(*requests),
@@ -237,14 +245,14 @@ pub fn requests(seen: &[Observation], of: Function) -> Vec<Requests> {
     ended.collect()
 }
 
-/// A small scene that differs by `x`.
+/// Returns a small scene that depends on `x`.
 pub fn scene(x: f64) -> String {
     format!(
         "Screen 24 18\nBackground .1 .2 .3\nSphere 6 {x} 9 -9 .2 .2 .2 .7 .6 .5\nIlight 1 1 1 .2 -.3 -1\nTrace\n"
     )
 }
 
-/// A frame that is drawn in four bands by functions of [`SMALL_MB`] megabytes, and differs by `x`.
+/// Returns a frame that functions of [`SMALL_MB`] megabytes draw in four bands. It depends on `x`.
 pub fn big_scene(x: f64) -> String {
     format!(
         "Screen 160 400\nSamples 4 0\nBackground .1 .2 .3  .7 .8 .9\nSphere 60 {x} 200 -90 .2 .2 .2 .7 .6 .5 .2 .2 .2\n\
@@ -252,15 +260,15 @@ pub fn big_scene(x: f64) -> String {
     )
 }
 
-/// A memory in which four samples a pixel of [`big_scene`] have no room, and one has.
+/// A memory size that is too small for four samples per pixel of [`big_scene`], but sufficient for one.
 pub const SMALL_MB: u32 = 2;
 
-/// `animation.json` that waits for this many frames.
+/// Returns an `animation.json` that waits for this many frames.
 pub fn frames(count: usize) -> (&'static str, String) {
     ("animation.json", format!("{{\"frames\": {count}}}"))
 }
 
-/// The GIF that the scripts give without any bucket: parsed, traced and encoded right here.
+/// Returns the GIF that the scripts give without a bucket: parsed, traced and encoded in this process.
 pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
     let limits = Limits::default();
     let mut settings = AnimationSettings::default();

@@ -1,5 +1,5 @@
-//! Taking a role by STS, a function's as Lambda does or that of a kind of user: the store then allows what the document says
-//! and no more.
+//! Assumes a role by STS: a function's, as Lambda does, or that of a kind of user. The store then allows exactly the
+//! operations in the role's policy.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -9,7 +9,8 @@ use aws_smithy_http_client::Builder as HttpBuilder;
 use rayfold_local::S3Server;
 use rayfold_pipeline::store::Connection;
 
-/// The document of a role for a bucket, as Terraform renders it: of a function, or of `viewer`, `uploader` or `operator`.
+/// Returns the policy of a role for a bucket, as Terraform renders it. The role is that of a function, or `viewer`,
+/// `uploader` or `operator`.
 pub fn policy(role: impl Display, bucket: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../infra/terraform/policies");
     let template = std::fs::read_to_string(folder.join(format!("{role}.json.tftpl"))).unwrap();
@@ -18,7 +19,7 @@ pub fn policy(role: impl Display, bucket: &str) -> String {
     document
 }
 
-/// Temporary credentials with the role's policy.
+/// Returns temporary credentials with the role's policy.
 pub async fn assume(server: &S3Server, role: impl Display, bucket: &str) -> Connection {
     let owner = server.connection();
     let document: serde_json::Value = serde_json::from_str(&policy(&role, bucket)).unwrap();
@@ -33,7 +34,7 @@ pub async fn assume(server: &S3Server, role: impl Display, bucket: &str) -> Conn
         .assume_role()
         .role_arn(format!("arn:aws:iam::000000000000:role/rayfold-{role}"))
         .role_session_name(role.to_string())
-        // STS takes at most 2,048 characters: without the blanks.
+        // STS accepts at most 2,048 characters, hence without spaces.
         .policy(document.to_string())
         .send()
         .await
@@ -47,7 +48,7 @@ pub async fn assume(server: &S3Server, role: impl Display, bucket: &str) -> Conn
     }
 }
 
-/// The same for a process, in the variables that Lambda sets.
+/// Returns the credentials for a process, in the variables that Lambda sets.
 pub async fn environment(server: &S3Server, role: impl Display, bucket: &str) -> Vec<(String, String)> {
     let Connection { access_key, secret_key, session_token, .. } = assume(server, role, bucket).await;
     [

@@ -1,33 +1,54 @@
-//! Which S3 servers the tests run on: always the one built in, and MinIO where there is one.
+//! Selects the S3 servers for the tests: always the built-in one, and each other one that is found.
 //!
-//! A run says which, once a test program, on standard error past the test runner's capture: what was not tried must not
-//! look like a success.
+//! Each test program prints its servers once, on standard error, so that the test runner does not capture the line. A
+//! store that was not tested must not look like a success.
 
 use std::io::Write;
 use std::sync::OnceLock;
 
-use rayfold_local::{StoreKind, minio};
+use rayfold_local::StoreKind;
 
-/// Both, or the one built in where no MinIO is found. None is installed here.
+/// Returns the built-in one and those that are found. Installs nothing.
 fn stores() -> &'static [StoreKind] {
     static STORES: OnceLock<Vec<StoreKind>> = OnceLock::new();
     STORES.get_or_init(|| {
-        let (stores, line) = match minio::find() {
-            Ok(binary) => {
-                (StoreKind::ALL.to_vec(), format!("the store built in, and MinIO ({})", binary.display()))
+        let mut stores = Vec::new();
+        // The printing macros are captured, and their output is shown only for failed tests.
+        let say = |line: String| drop(writeln!(std::io::stderr(), "{line}"));
+        for kind in StoreKind::ALL {
+            match kind.program().map(|program| program.find()) {
+                None => say(format!("these tests run on {kind}")),
+                Some(Ok(binary)) => say(format!("these tests run on {kind} ({})", binary.display())),
+                Some(Err(why)) => {
+                    say(format!("NOT RUN: these tests on {kind}: {why}"));
+                    continue;
+                }
             }
-            Err(why) => (vec![StoreKind::BuiltIn], format!("the store built in, and NOT on MinIO: {why}")),
-        };
-        // The macros that print are captured, and shown for tests that fail alone.
-        let _ = writeln!(std::io::stderr(), "these tests run on {line}");
+            stores.push(kind);
+        }
         stores
     })
 }
 
-/// A test on each of them, one after the other.
+/// Runs a test on each of them, one after the other.
 pub(crate) async fn on_every_store(test: impl AsyncFn(StoreKind)) {
     for &store in stores() {
         eprintln!("on {store}:");
         test(store).await;
     }
+}
+
+/// Runs a test on the servers that issue temporary credentials with a policy. SeaweedFS issues none to its owner.
+#[allow(dead_code, reason = "a module of several test files, which use each a part of it")]
+pub(crate) async fn on_every_store_with_roles(test: impl AsyncFn(StoreKind)) {
+    on_every_store(async |store| match store {
+        StoreKind::BuiltIn | StoreKind::Minio => test(store).await,
+        StoreKind::SeaweedFs => {
+            let _ = writeln!(
+                std::io::stderr(),
+                "NOT RUN: roles on {store}, which has no AssumeRole with a policy"
+            );
+        }
+    })
+    .await;
 }

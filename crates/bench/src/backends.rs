@@ -1,40 +1,40 @@
-//! The backends, each a way to trace a scene, that tests and measurements compare.
+//! The backends that tests and measurements compare. A backend is a way to trace a scene.
 //!
-//! A new backend is one line in [`all`].
+//! To add a backend, add a line to [`all`].
 
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::Scene;
 use rayfold_tracer::{Level, Precision, RenderOptions, probe, reference};
 
-/// A half-line.
+/// A ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts.
+    /// The start of the ray.
     pub origin: DVec3,
-    /// Where it goes, of any length but zero.
+    /// The direction, of any length but zero.
     pub direction: DVec3,
 }
 
-/// Where a ray meets an object first.
+/// The first hit of a ray with an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Position of the object in the script.
+    /// The position of the object in the script.
     pub object: usize,
-    /// In lengths of the ray's direction.
+    /// The distance along the ray, in units of the length of its direction.
     pub t: f64,
-    /// Unit normal, facing the ray.
+    /// The unit normal, facing the ray.
     pub normal: DVec3,
 }
 
-/// The numbers that a backend computes with.
+/// The arithmetic of a backend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
     /// Always `f32`.
     Single,
     /// Always `f64`.
     Double,
-    /// What the scene needs.
+    /// Chosen for each scene.
     Chosen,
 }
 
@@ -42,11 +42,11 @@ type Hits = anyhow::Result<Vec<Option<Hit>>>;
 type Nearest = Box<dyn Fn(&Scene, &[Ray]) -> Hits + Sync>;
 type Render = Box<dyn Fn(&Scene) -> anyhow::Result<RgbImage> + Sync>;
 
-/// A way to trace.
+/// A way to trace a scene.
 pub struct Backend {
-    /// For people.
+    /// The name in reports.
     pub name: String,
-    /// What its errors are measured in.
+    /// The arithmetic in whose units its errors are measured.
     pub arithmetic: Arithmetic,
     nearest: Nearest,
     render: Render,
@@ -62,23 +62,23 @@ impl Backend {
         Self { name: name.into(), arithmetic, nearest: Box::new(nearest), render: Box::new(render) }
     }
 
-    /// The nearest hit of each ray.
+    /// Returns the nearest hit of each ray.
     ///
     /// # Errors
-    /// Those of [`rayfold_tracer::render`].
+    /// Fails like [`rayfold_tracer::render`].
     pub fn nearest(&self, scene: &Scene, rays: &[Ray]) -> Hits {
         (self.nearest)(scene, rays)
     }
 
-    /// The image.
+    /// Renders the image.
     ///
     /// # Errors
-    /// Those of [`rayfold_tracer::render`].
+    /// Fails like [`rayfold_tracer::render`].
     pub fn render(&self, scene: &Scene) -> anyhow::Result<RgbImage> {
         (self.render)(scene)
     }
 
-    /// The distance from `x` to the next number of this arithmetic (`f32` where it is chosen).
+    /// Returns the distance from `x` to the next number of this arithmetic (`f32` for [`Arithmetic::Chosen`]).
     pub fn ulp(&self, x: f64) -> f64 {
         let epsilon = match self.arithmetic {
             Arithmetic::Double => f64::EPSILON,
@@ -88,8 +88,8 @@ impl Backend {
     }
 }
 
-/// Every backend that there is on this machine: each precision with each width of vectors, and what must not be seen in a
-/// picture (the tree, the tile's size, the number of threads) with the widest.
+/// Returns every backend available on this machine: each precision with each vector width, and with the widest also
+/// variants that must give the same picture (tree, tile size, number of threads).
 pub fn all() -> Vec<Backend> {
     let mut all = vec![reference()];
     for ((precision, name), tile) in PRECISIONS.into_iter().zip([(4, 4), (64, 4), (8, 32)]) {
@@ -106,7 +106,7 @@ pub fn all() -> Vec<Backend> {
     all
 }
 
-/// The truth first, then the backends to compare with it, each following light through so many mirrors.
+/// Returns the true backend, then the backends to compare with it, each tracing this number of bounces.
 pub(crate) fn for_pictures(bounces: u32) -> Vec<Backend> {
     let options = RenderOptions { bounces: Some(bounces), ..Default::default() };
     let mut all = vec![reference_with(options), packets_by_the_textbook(options)];
@@ -114,7 +114,7 @@ pub(crate) fn for_pictures(bounces: u32) -> Vec<Backend> {
     all
 }
 
-/// The packets with formulas that know nothing of rounding.
+/// Returns the packets with textbook formulas that ignore rounding.
 fn packets_by_the_textbook(options: RenderOptions<'static>) -> Backend {
     Backend::new(
         "f32 naive",
@@ -127,7 +127,7 @@ fn packets_by_the_textbook(options: RenderOptions<'static>) -> Backend {
 const PRECISIONS: [(Precision, &str); 3] =
     [(Precision::Auto, "auto"), (Precision::F32, "f32 robust"), (Precision::F64, "f64")];
 
-/// The widths of vectors that the processor has, the widest first.
+/// Returns the vector widths that the processor has, the widest first.
 pub fn levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();
     #[cfg(target_arch = "x86_64")]
@@ -143,7 +143,7 @@ pub fn levels() -> Vec<(&'static str, Level)> {
     return vec![("the machine's vectors", best)];
 }
 
-/// The tracer that pictures are made with.
+/// Returns the tracer that draws pictures for users.
 pub(crate) fn packets(name: impl Into<String>, options: RenderOptions<'static>) -> Backend {
     let arithmetic = match options.precision {
         Precision::Auto => Arithmetic::Chosen,
@@ -155,7 +155,7 @@ pub(crate) fn packets(name: impl Into<String>, options: RenderOptions<'static>) 
 }
 
 fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits {
-    // A direction that `f32` holds stays one.
+    // A direction that is exact in `f32` stays so.
     let about_unit =
         |d: DVec3| if (d.length() - 1.0).abs() < f64::from(f32::EPSILON) { d } else { d.normalize() };
     let precision = match options.precision {
@@ -173,7 +173,7 @@ fn packet_nearest(scene: &Scene, rays: &[Ray], options: &RenderOptions) -> Hits 
     Ok(found.into_iter().zip(rays).map(hit).collect())
 }
 
-/// The plain `f64` tracer.
+/// Returns the plain `f64` tracer.
 pub fn reference() -> Backend {
     reference_with(RenderOptions::default())
 }

@@ -1,4 +1,5 @@
-//! `rayfold-bench cold-start`: how large the functions are, and how soon a new process asks for its first invocation.
+//! `rayfold-bench cold-start`: the size of the functions, and the time until a new process requests its first
+//! invocation.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -10,24 +11,24 @@ use rayfold_local::observation::Seen;
 use rayfold_local::routes::Function;
 use rayfold_local::{Functions, any_port};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Processes of each function
+    /// Start this many processes of each function
     #[arg(long, default_value = "50")]
     rounds: usize,
-    /// The folder with the function binaries; without it those beside this program
+    /// Use the function binaries in this folder [default: those beside this program]
     #[arg(long, value_name = "DIR")]
     functions: Option<PathBuf>,
 }
 
-/// A payload that no function can read: it is answered at once and without the store.
+/// A payload that no function can parse. The function replies at once, without using the store.
 const NOTHING: &str = "{}";
 
-/// Measures and prints.
+/// Measures and prints the results.
 ///
 /// # Errors
-/// When the functions cannot be started.
+/// Fails if the functions cannot be started.
 pub fn run(args: &Args) -> Result<()> {
     let functions = match &args.functions {
         Some(folder) => Functions::in_folder(folder),
@@ -57,9 +58,9 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Of a new process.
+/// Returns the time until a new process calls `next` for the first time.
 async fn first_next(functions: &Functions, function: Function) -> Result<Duration> {
-    let mut settings = Settings::new(functions.clone(), any_port(), any_port(), String::new());
+    let mut settings = Settings::new(functions.clone(), Some(any_port()), any_port(), String::new());
     settings.sweep_every = None;
     settings.environment = [
         ("AWS_REGION", "us-east-1"),

@@ -1,4 +1,4 @@
-//! Seconds of processor time: what a machine that others use as well can measure.
+//! Processor time in seconds, which can be measured on a machine with other load.
 
 use std::time::Duration;
 
@@ -6,10 +6,10 @@ use anyhow::Result;
 use nix::sys::resource::{UsageWho, getrusage};
 use nix::time::{ClockId, clock_gettime};
 
-/// Processor time of `work` in all threads of this program, in seconds, and what it returned.
+/// Runs `work`. Returns the processor time of all threads of this program in seconds, and the result.
 ///
 /// # Errors
-/// When the clock cannot be read.
+/// Fails if the clock cannot be read.
 pub fn of<T>(work: impl FnOnce() -> T) -> Result<(f64, T)> {
     let before = Duration::from(clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID)?);
     let result = work();
@@ -17,10 +17,11 @@ pub fn of<T>(work: impl FnOnce() -> T) -> Result<(f64, T)> {
     Ok(((after - before).as_secs_f64(), result))
 }
 
-/// User processor time of the child processes that `work` starts and waits for, in seconds, and what it returned.
+/// Runs `work`. Returns the user processor time in seconds of the child processes that it starts and waits for, and the
+/// result.
 ///
 /// # Errors
-/// When the usage cannot be read.
+/// Fails if the usage cannot be read.
 pub fn of_children<T>(work: impl FnOnce() -> T) -> Result<(f64, T)> {
     let used = || -> Result<f64> {
         let time = getrusage(UsageWho::RUSAGE_CHILDREN)?.user_time();
@@ -31,7 +32,7 @@ pub fn of_children<T>(work: impl FnOnce() -> T) -> Result<(f64, T)> {
     Ok((used()? - before, result))
 }
 
-/// The middle of the measurements; not a number when there are none.
+/// Returns the median of the measurements; NaN if there are none.
 pub fn median(mut seconds: Vec<f64>) -> f64 {
     seconds.sort_by(f64::total_cmp);
     seconds.get(seconds.len() / 2).copied().unwrap_or(f64::NAN)

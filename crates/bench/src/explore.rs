@@ -1,7 +1,8 @@
-//! The pipeline's small worlds searched, and schedules that provoke: what holds, and how soon a broken rule is noticed.
+//! Searches the pipeline's small worlds and runs provoking schedules: shows which guarantees hold, and how soon a
+//! broken rule is detected.
 //!
-//! Writes `docs/reports/search.md` and its figures. States and seeds do not depend on the machine; seconds do, and are only
-//! printed.
+//! Writes `docs/reports/search.md` and its figures. States and seeds do not depend on the machine. Seconds do, and are
+//! only printed.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -11,42 +12,40 @@ use std::time::Instant;
 
 use rayfold_files::OutputFile;
 use rayfold_pipeline::Mutation;
-use rayfold_pipeline::simulation::explore::{
-    Counterexample, Explored, World, explore, provoke, provoking, worlds,
-};
+use rayfold_simulation::explore::{Counterexample, Explored, World, explore, provoke, provoking, worlds};
 
 /// Options of `rayfold-bench explore`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// States of a world after which its search ends; its line then says so
+    /// End the search of a world after this many states; its line then says so
     #[arg(long, default_value_t = 7_000_000)]
     most: u64,
-    /// States of a world up to which it is searched once more, with nothing forgotten, to see the same
+    /// Search a world of at most this many states again with the full history, to compare the results
     #[arg(long, default_value_t = 1_000_000)]
     most_remembered: u64,
-    /// States of a world after which the search for a broken rule goes on with the next world
+    /// After this many states of a world, continue the search for a broken rule with the next world
     #[arg(long, default_value_t = 20_000)]
     most_of_a_rule: u64,
-    /// Only worlds whose name holds this; then no report is written
+    /// Search only worlds whose name contains this, and write no report
     #[arg(long, default_value = "")]
     world: String,
-    /// Seeds of schedules that provoke, for each broken rule and for none
+    /// Number of seeds of provoking schedules, for each broken rule and for none
     #[arg(long, default_value_t = 1_000)]
     seeds: u64,
-    /// Threads; all cores when left out
+    /// Number of threads [default: all cores]
     #[arg(long)]
     threads: Option<usize>,
-    /// Folder of the report
+    /// Write the report into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
 }
 
-/// Searches.
+/// Runs the searches and writes the report.
 ///
 /// # Errors
 ///
-/// When a guarantee does not hold: what happened, step by step. When a broken rule is not noticed. When the report cannot be
-/// written.
+/// Fails if a guarantee does not hold (the error lists the steps), if a broken rule is not detected, or if the report
+/// cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let threads =
         args.threads.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
@@ -76,7 +75,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// What a search has seen, and another one that forgets nothing, if it came to its end.
+/// The result of a search, and of one that forgets no history, if that completed.
 #[derive(Debug)]
 struct Searched {
     explored: Explored,
@@ -84,7 +83,7 @@ struct Searched {
 }
 
 impl Searched {
-    /// Whether both have come to the same situations.
+    /// Returns whether both searches reached the same situations.
     fn agrees(&self) -> bool {
         self.remembering.as_ref().is_none_or(|remembering| remembering.saw_the_same_as(&self.explored))
     }
@@ -108,15 +107,15 @@ fn search(world: &World, args: &Args) -> Result<Searched, Box<Counterexample>> {
     searched
 }
 
-/// How a broken rule is noticed.
+/// The detection of a broken rule.
 #[derive(Debug)]
 struct Noticed {
     rule: Mutation,
-    /// By the search of the world that needs the fewest states.
+    /// The counterexample from the world that needs the fewest states.
     first: Option<Box<Counterexample>>,
-    /// Worlds in which the search notices.
+    /// The number of worlds in which the search detects it.
     worlds: usize,
-    /// Seeds of schedules that notice.
+    /// The number of seeds of schedules that detect it.
     seeds: u64,
 }
 
@@ -138,24 +137,24 @@ fn hunt(rule: Mutation, worlds: &[World], args: &Args) -> Noticed {
 
 const HEADER: &str = "# Small worlds, searched
 
-Written by `cargo run --release -p rayfold-bench -- explore`. Small worlds are searched for every interleaving of the real
-steps' requests (`crates/pipeline/src/simulation/explore`): one to three frames, the invocations that their events wake, and
-the assemblers; a user who overwrites, changes back and deletes at any moment; an invocation killed before or after any
-request, a write that lands after its sender's death, a lost answer, an event that comes twice or never, as the world's name
-says. States that few preemptions and faults lead to are visited first (*price*: the most that they weigh on the way to a state; a
-preemption is that somebody goes on though whoever went on before still could). *Depth* is the most requests and acts on the
-way to a state of rest. Both are of the way on which a state was reached first. Where the search ended at its limit, all ways
-that weigh less than *price* were gone.
+Written by `cargo run --release -p rayfold-bench -- explore`. The search covers every interleaving of the real steps' requests
+in small worlds (`crates/simulation/src/explore`). A world has one to three frames, the invocations that their events
+start, and the assemblers. Its name lists the faults: a user who overwrites, changes back and deletes at any moment; an
+invocation killed before or after any request; a write that takes effect after its sender was killed; a lost reply; an event
+delivered twice or never. The search visits states that need few preemptions and faults first. *Price* is the largest weight of
+these on the path to a state; a preemption is a switch to another invocation although the current one could continue. *Depth* is
+the largest number of requests and user actions on the path to a state of rest. Both refer to the path on which a state was
+reached first. If the search ended at its limit, all paths with a weight less than *price* are covered.
 
-The steps say at some places what they go on with (`goes_on_with`), and what has happened to an invocation before is then
-forgotten: it makes no difference to what comes. Worlds that are small enough were searched once more with *nothing forgotten*:
-the figure is how many states that makes. Both searches came to the same *situations* (what the bucket holds and what every
-invocation asks for next).
+At some points the steps declare the values that their remaining behaviour depends on (`forget_history_before`). The search then drops
+the invocation's earlier history, which has no effect on later requests. Small enough worlds were searched again with the full
+history; the number of states is in the column *nothing forgotten*. Both searches reached the same *situations* (the contents of
+the bucket and the next request of every invocation).
 
-Not searched: listings that mix two moments, and time: the store's clock moves with the user's acts alone, those of invocations
-stand still, a pause ends at once, the deadline does not come. The [seeds](simulation.md) have these.
+The search does not cover listings that mix two moments, or time: the store's clock advances only with the user's actions, the
+clocks of invocations stand still, a pause ends at once, and no deadline expires. The [simulation](simulation.md) covers these.
 
-No state broke a guarantee.
+No state violated a guarantee.
 
 | world | states | nothing forgotten | situations | at rest | steps | depth | price | searched |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -164,12 +163,12 @@ No state broke a guarantee.
 const RULES: &str = "
 ## Broken rules
 
-The same predicates, with one rule of the protocol broken on purpose. *States* are those that the search has seen when it
-notices, in the world that shows it soonest. *Seeds* are of schedules that provoke: each runs two of each of three kinds in
-each of the worlds that `provoking` names, by priorities that change a few times, by turns with pauses before writes, and by
-turns with at most two preemptions; faults are aimed at one write, or strike anywhere.
+The predicates are the same, but one rule of the protocol is broken on purpose. *States* is the number of states visited until
+the search detects this, in the world that needs the fewest. *Seeds* are those of provoking schedules. Each seed runs two
+schedules of each of three kinds in each of the worlds of `provoking`: by priorities that change a few times, in turns with
+pauses before writes, and in turns with at most two preemptions. Faults are aimed at one write, or occur anywhere.
 
-| broken rule | states until the search notices | price | in the world | worlds that notice | seeds that notice |
+| broken rule | states until detection | price | in the world | worlds that detect it | seeds that detect it |
 | --- | --- | --- | --- | --- | --- |
 ";
 
@@ -206,11 +205,15 @@ fn write_report(
         writeln!(page, "{}", rule_line(noticed, searched.len()))?;
     }
     let seeds = args.seeds;
-    writeln!(page, "\nSeeds are of {seeds}. With no rule broken {found} of {seeds} found anything.")?;
+    writeln!(
+        page,
+        "\n\
+     The number of seeds is {seeds}. With no rule broken {found} of {seeds} found a violation."
+    )?;
     let Args { most, most_of_a_rule, .. } = args;
     writeln!(
         page,
-        "The limits: worlds to {most} states, each broken rule to {most_of_a_rule} states a world."
+        "Limits: {most} states per world, {most_of_a_rule} states per world for each broken rule."
     )?;
     let files = [("search.md", page.into_bytes()), ("search.csv", figures.into_inner()?)];
     for (name, bytes) in files {
@@ -236,7 +239,7 @@ fn rule_line(noticed: &Noticed, of: usize) -> String {
     format!("| {rule:?} | {states} | {price} | {name} | {worlds} of {of} | {seeds} |")
 }
 
-/// Does so many pieces of work on so many threads, and gives what came of each, in their order.
+/// Runs `pieces` pieces of work on this many threads, and returns their results in order.
 fn side_by_side<T: Send>(threads: usize, pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, T)>> = Mutex::default();

@@ -1,10 +1,10 @@
-//! `rayfold-bench fingerprints`: a line for every picture, by which two builds of the program can be compared.
+//! `rayfold-bench fingerprints`: prints a line per picture, by which two builds of the program can be compared.
 //!
-//! A change of the tracer that is not meant to be seen is held to this: the lines of the program before and of the
-//! program after are the same, byte for byte. Pictures are those of scripts in the folders given, and of scenes drawn at
-//! random, small and nasty rather than pretty: every kind of object alone and together, few and many of them, faces in
-//! one plane, eyes within objects, lights along the axes. Each is drawn with every instruction set and all numbers. It
-//! judges nothing: whether a picture is right is for the tests.
+//! If a change of the tracer must not change pictures, the lines of the program before and after are equal byte for
+//! byte. The pictures are those of the scripts in the given folders and of random scenes. These are small and meant to
+//! be difficult: every kind of object alone and together, few and many of them, coplanar faces, eyes within objects,
+//! lights along the axes. Each is drawn with every instruction set and every precision. Tests check whether a picture
+//! is right; this program does not.
 //!
 //! ```text
 //! rayfold-bench fingerprints scenes --random 10000 > after.txt
@@ -27,23 +27,23 @@ use rayon::prelude::*;
 
 use crate::backends::levels;
 
-/// What to draw.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Folders of scripts, and folders of such folders
+    /// Folders of scripts; subfolders are included
     folders: Vec<PathBuf>,
-    /// Scenes to draw at random besides
+    /// Number of random scenes in addition
     #[arg(long, default_value_t = 0)]
     random: u64,
-    /// Seed of the first of them; the others have those that follow
+    /// Seed of the first random scene; the others have the seeds that follow
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-/// Draws all and prints a line for each.
+/// Draws all pictures and prints a line for each.
 ///
 /// # Errors
-/// When a folder cannot be read, a script is wrong or a scene cannot be rendered.
+/// Fails if a folder cannot be read, a script is wrong or a scene cannot be rendered.
 pub fn run(args: &Args) -> Result<()> {
     let mut scripts = Vec::new();
     for folder in &args.folders {
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let told: Vec<String> = scripts.par_iter().map(|script| of_script(script)).collect::<Result<_>>()?;
     print(&told)?;
-    // In batches, so that what is drawn can be followed, and lines need not be kept.
+    // In batches, so that progress is visible and lines need not be kept.
     for from in (0..args.random).step_by(200) {
         let seeds = args.seed + from..args.seed + args.random.min(from + 200);
         let told: Vec<String> = seeds.into_par_iter().map(of_seed).collect::<Result<_>>()?;
@@ -66,7 +66,7 @@ fn print(lines: &[String]) -> Result<()> {
     Ok(out.flush()?)
 }
 
-/// The scripts below a folder, in order.
+/// Finds the scripts below a folder, in order.
 fn find(folder: &Path, scripts: &mut Vec<PathBuf>) -> Result<()> {
     let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
     let mut paths: Vec<PathBuf> =
@@ -89,7 +89,8 @@ fn of_script(path: &Path) -> Result<String> {
     let mut told = String::new();
     let mut frame = 0;
     while let Some(scene) = script.frame(frame) {
-        // The picture as it is asked for once; what is compared between kernels is as well seen in a smaller one.
+        // The picture is drawn once at its own size. Kernels are compared on a smaller one, which shows differences as
+        // well.
         writeln!(
             told,
             "{name} {frame}: {:016x}",
@@ -115,7 +116,7 @@ fn of_seed(seed: u64) -> Result<String> {
 
 const PRECISIONS: [Precision; 3] = [Precision::Auto, Precision::F32, Precision::F64];
 
-/// A line for each way to draw a scene.
+/// Returns a line for each way to draw a scene.
 fn of_scene(name: &str, scene: &Scene, options: RenderOptions) -> Result<String> {
     let mut told = String::new();
     for (width, level) in levels() {
@@ -134,7 +135,7 @@ fn of_scene(name: &str, scene: &Scene, options: RenderOptions) -> Result<String>
     Ok(told)
 }
 
-/// A line for each way to send single rays.
+/// Returns a line for each way to trace single rays.
 fn of_rays(name: &str, scene: &Scene, rays: &[(DVec3, DVec3)], options: RenderOptions) -> Result<String> {
     let mut told = String::new();
     for (width, level) in levels() {
@@ -164,7 +165,7 @@ fn digest(bytes: &[u8]) -> u64 {
     hasher.finish()
 }
 
-/// Draws scenes at random.
+/// A generator of random scenes.
 struct Dice(fastrand::Rng);
 
 impl Dice {
@@ -172,7 +173,7 @@ impl Dice {
         self.0.u32(0..n) == 0
     }
 
-    /// In -1..1, and often a number that others are too.
+    /// Returns a number in -1..1, often one that repeats.
     fn number(&mut self) -> f64 {
         if self.one_in(3) { f64::from(self.0.i32(-4..5)) / 4.0 } else { 2.0 * self.0.f64() - 1.0 }
     }
@@ -181,7 +182,7 @@ impl Dice {
         DVec3::new(self.number(), self.number(), self.number())
     }
 
-    /// Not of length zero; often along an axis, or square to one.
+    /// Returns a vector of non-zero length, often along an axis or perpendicular to one.
     fn direction(&mut self) -> DVec3 {
         let mut direction = self.vector();
         for axis in 0..3 {
@@ -227,7 +228,7 @@ impl Dice {
         let flip = if self.one_in(8) { -1.0 } else { 1.0 };
         let (from, to) = (DVec2::new(-half * flip, -tall), DVec2::new(half * flip, tall));
         loop {
-            // Only an up that lies along the gaze is refused.
+            // Only an up vector parallel to the view direction is an error.
             if let Ok(pinhole) = Pinhole::new(eye, gaze, self.direction(), 1.0, from, to) {
                 return Ok(Camera::Pinhole(pinhole));
             }
@@ -248,7 +249,7 @@ impl Dice {
         let objects = (0..count).map(|_| self.object(kinds, size, mirrors));
         let mut objects: Vec<Object> = objects.collect::<Result<_>>()?;
         if self.one_in(5) {
-            // Twice in one place: the first counts.
+            // Two equal objects at the same position: the first wins.
             let again = objects[self.0.usize(0..count)].clone();
             objects.push(again);
         }
@@ -269,7 +270,7 @@ impl Dice {
         Ok(scene)
     }
 
-    /// What must not be seen in the picture, but for the bounces.
+    /// Returns options that must not change the picture, except for the number of bounces.
     fn options(&mut self) -> RenderOptions<'static> {
         let tiles = [None, None, None, Some((4, 4)), Some((8, 8)), Some((64, 4)), Some((8, 32))];
         RenderOptions {
@@ -307,12 +308,7 @@ mod tests {
                     Object::Sphere(_) => 0,
                     Object::Cuboid(_) => 1,
                     Object::Triangle(_) => 2,
-                    Object::Plane(_)
-                    | Object::Disc(_)
-                    | Object::Cylinder(_)
-                    | Object::Cone(_)
-                    | Object::Torus(_)
-                    | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
+                    _ => unreachable!("not drawn here: {object:?}"),
                 }] += 1;
             }
             few += usize::from(scene.objects.len() <= 64);

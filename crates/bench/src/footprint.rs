@@ -1,8 +1,9 @@
-//! `rayfold-bench footprint`: the memory and processor time of the functions that ship, by the size of an animation.
+//! `rayfold-bench footprint`: the memory and processor time of the shipped functions, by the size of an animation.
 //!
-//! All of an animation but its last frame is put into a bucket that tells nobody. The real functions then work on what is
-//! left, one invocation each in a process that has done next to nothing before: render draws the last frame, folds and
-//! claims; assemble builds the GIF; a sweep looks at everything. Writes `docs/reports/footprint.md`, its figures and its plot.
+//! The program puts all frames of an animation but the last into a bucket without events. The real functions then do
+//! the rest, one invocation each in a process that is almost new: render draws the last frame, folds and claims;
+//! assemble builds the GIF; a sweep checks the whole bucket. Writes `docs/reports/footprint.md`, its figures and its
+//! plot.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,7 +26,7 @@ use crate::pipeline::put;
 use crate::plot::{Labels, Series, log_log};
 use crate::scale::{ASSEMBLE_MB, LONGEST, RENDER_MB};
 
-/// Frames of an animation, and the size of its pictures.
+/// The numbers of frames of the animations, and the sizes of their pictures.
 const SIZES: [(u64, [u32; 2]); 7] = [
     (10, SMALL),
     (100, SMALL),
@@ -36,13 +37,13 @@ const SIZES: [(u64, [u32; 2]); 7] = [
     (100, [1920, 1080]),
 ];
 
-/// Where pictures are to weigh nothing.
+/// The size of pictures whose own cost is negligible.
 const SMALL: [u32; 2] = [64, 48];
 
-/// Puts side by side.
+/// The number of concurrent puts.
 const PUTS: usize = 64;
 
-/// In how many units a second Linux tells processor time.
+/// The unit of processor time on Linux is a second divided by this.
 const TICKS: f64 = 100.0;
 
 const BUCKET: &str = "footprint";
@@ -50,38 +51,38 @@ const BUCKET: &str = "footprint";
 /// Options of `rayfold-bench footprint`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Animations with more frames are left out, which the report then says
+    /// Leave out animations with more frames; the report then says so
     #[arg(long)]
     most: Option<u64>,
-    /// The folder that receives footprint.md, footprint.csv and footprint.svg
+    /// Write footprint.md, footprint.csv and footprint.svg into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
 }
 
-/// What one invocation took.
+/// The cost of one invocation.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// The most memory of its process, in MiB.
+    /// The peak memory of its process, in MiB.
     memory: f64,
     /// Its processor time in seconds.
     processor: f64,
     requests: Requests,
 }
 
-/// An animation's last frame, its GIF, and a sweep.
+/// The costs of an animation's last frame, its GIF, and a sweep.
 struct Row {
     frames: u64,
     size: [u32; 2],
     costs: [Cost; 3],
 }
 
-/// What the columns of costs are called.
+/// The names of the cost columns.
 const STEPS: [&str; 3] = ["render", "assemble", "sweep"];
 
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When the store or the functions cannot be started, an invocation fails, or the report cannot be written.
+/// Fails if the store or the functions cannot be started, an invocation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let functions = Functions::locate(&mut |line| eprintln!("{line}"))?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
@@ -126,7 +127,7 @@ async fn measure(functions: &Functions, frames: u64, size: [u32; 2]) -> Result<R
     Ok(Row { frames, size, costs: [rendering, assembling, sweeping] })
 }
 
-/// A ball on a slab, seen at this size.
+/// Returns the script of a sphere on a slab, in this picture size.
 fn text_of([width, height]: [u32; 2]) -> String {
     let high = 0.4 * f64::from(height) / f64::from(width);
     format!(
@@ -140,7 +141,7 @@ fn text_of([width, height]: [u32; 2]) -> String {
     )
 }
 
-/// All frames between the first and the last one, as if each had been drawn: they are the first one's.
+/// Puts all frames between the first and the last one as copies of the first.
 async fn fill(store: &S3Store, animation: &Animation, frames: u64, text: &Bytes) -> Result<()> {
     let drawn = store.list(ListRequest::all(animation.frames())).await?.objects;
     let drawn = drawn.into_iter().map(|object| object.key).find(|key| key.ends_with(".png"));
@@ -159,19 +160,19 @@ async fn fill(store: &S3Store, animation: &Animation, frames: u64, text: &Bytes)
     stream::iter(puts).map(Ok).try_for_each_concurrent(PUTS, |put| put).await
 }
 
-/// An invoker of the functions, and what it tells.
+/// An invoker of the functions, and its observations.
 struct Working {
     invoker: Invoker,
     seen: UnboundedReceiver<Observation>,
-    /// Processor time that each process has taken so far, in seconds.
+    /// The processor time of each process so far, in seconds.
     taken: BTreeMap<u32, f64>,
 }
 
 impl Working {
-    /// Starts an invoker, and tells what the sweep took with which it begins.
+    /// Starts an invoker. Returns it and the cost of the sweep that it runs at its start.
     async fn start(functions: &Functions, server: &S3Server) -> Result<(Self, Cost)> {
         let token = "no events come".to_owned();
-        let mut settings = Settings::new(functions.clone(), server.address(), any_port(), token);
+        let mut settings = Settings::new(functions.clone(), Some(server.address()), any_port(), token);
         settings.environment = server.environment();
         settings.environment.push(("RAYFOLD_BUCKET".into(), BUCKET.into()));
         (settings.sweep_every, settings.timeout) = (None, LONGEST);
@@ -183,7 +184,7 @@ impl Working {
         Ok((working, sweep))
     }
 
-    /// Has a function work on an object, as if an event had told of it.
+    /// Invokes a function with an event for an object.
     async fn wake(&mut self, function: Function, key: &str) -> Result<Cost> {
         let record = json!({
             "eventSource": "aws:s3", "eventName": "ObjectCreated:Put", "eventTime": "2026-01-01T00:00:00.000Z",
@@ -194,7 +195,7 @@ impl Working {
         self.cost()
     }
 
-    /// What the last invocation took, whose process waits for another one.
+    /// Returns the cost of the last invocation, whose process now waits for the next one.
     fn cost(&mut self) -> Result<Cost> {
         let mut last = None;
         while let Ok(Observation { seen, .. }) = self.seen.try_recv() {
@@ -210,7 +211,7 @@ impl Working {
     }
 }
 
-/// The most memory that a process has held, in MiB.
+/// Returns the peak memory of a process, in MiB.
 fn most_memory(process: u32) -> Result<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status"))?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -218,10 +219,11 @@ fn most_memory(process: u32) -> Result<f64> {
     Ok(kib.parse::<f64>()? / 1024.0)
 }
 
-/// Processor time of all threads of a process, in seconds.
+/// Returns the processor time of all threads of a process, in seconds.
 fn processor_time(process: u32) -> Result<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat"))?;
-    // The name, which may have spaces, is in parentheses; the state is the third field, user and system time the 14th and 15th.
+    // The name, which may have spaces, is in parentheses. The state is the third field; user and system time are the
+    // 14th and 15th.
     let (_, fields) = stat.rsplit_once(')').context("Linux tells the name")?;
     let times = fields.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
     let ticks = times.sum::<Result<f64, _>>()?;
@@ -230,14 +232,14 @@ fn processor_time(process: u32) -> Result<f64> {
 
 const HEADER: &str = "# What the functions take
 
-Written by `cargo run --release -p rayfold-bench -- footprint` on a bucket built in. All of an animation but its last frame is
-put there; then the functions that ship work on the rest, one invocation each: *render* draws the last frame, lists
-everything, writes the manifest, lists again and claims; *assemble* builds the GIF, frame by frame; *sweep* looks whether
-anything was left. That is the most that one invocation has to do with an animation of that size.
+Written by `cargo run --release -p rayfold-bench -- footprint` with the built-in store. The program puts all frames of an
+animation but the last into the bucket. Then the shipped functions do the rest, in one invocation each: *render* draws the last
+frame, lists everything, writes the manifest, lists again and claims; *assemble* builds the GIF, frame by frame; *sweep* checks
+whether any work is left. This is the largest amount of work of one invocation for an animation of that size.
 
-*Memory* is the most that the process has held, in MiB; Lambda gives 1,769 to render and 3,008 to assemble, which also sweeps,
-unless told otherwise. *Processor* is the time of all its threads, in seconds, with 10 ms as its unit; it depends on the machine,
-and whatever else runs there. *Requests* are those that S3 bills. Pictures are of a ball on a slab, all alike.
+*Memory* is the peak memory of the process, in MiB. By default, Lambda gives 1,769 to render and 3,008 to assemble, which also
+sweeps. *Processor* is the time of all its threads in seconds, with a resolution of 10 ms. It depends on the machine and on its
+other load. *Requests* are those that S3 bills. All pictures show the same sphere on a slab.
 
 ";
 
@@ -249,7 +251,7 @@ fn line(row: &Row) -> String {
     format!("| {} | {width} x {height} | {} |", row.frames, costs.join(" | "))
 }
 
-/// What the figures say of the limits.
+/// Compares the figures with the limits.
 fn conclusions(rows: &[Row]) -> String {
     let most = |of: usize| rows.iter().max_by(|a, b| a.costs[of].memory.total_cmp(&b.costs[of].memory));
     let (Some(rendered), Some(assembled), Some(largest)) =
@@ -261,8 +263,8 @@ fn conclusions(rows: &[Row]) -> String {
     let [fold, build, _] = largest.costs;
     format!(
         "
-- **Memory.** Render held at most {:.0} % of what it is given, with {} frames; assemble {:.0} %, with {} frames of {} x {}.
-- **Processor.** Whoever folds {} frames takes {:.2} s of it beyond drawing, in which everything is listed twice; the GIF takes {:.2} ms a
+- **Memory.** Render used at most {:.0} % of its memory, with {} frames; assemble {:.0} %, with {} frames of {} x {}.
+- **Processor.** A fold of {} frames takes {:.2} s beyond drawing, including two complete listings. The GIF takes {:.2} ms per
   frame of {} x {}.
 ",
         share(rendered, 0, RENDER_MB),

@@ -1,7 +1,8 @@
-//! `rayfold-bench growth`: processor time against the number of objects where a tree helps least.
+//! `rayfold-bench growth`: processor time by number of objects, in scenes where a tree helps least.
 //!
-//! Shells around each other, triangles that stand aslant in one place, fans and needles that share a corner, an eye within all
-//! objects: boxes along the axes do not tell such objects apart. Preparing a scene and drawing it are measured each for itself.
+//! The scenes have nested shells, slanted triangles in one place, fans and needles that share a corner, and an eye
+//! within all objects. Axis-aligned boxes do not separate such objects. Preparing a scene and drawing it are measured
+//! separately.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -16,19 +17,19 @@ use rayfold_tracer::{Drawing, RenderOptions};
 use crate::cpu_time;
 use crate::scenes::{light, looking_at};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives growth.md
+    /// Write growth.md into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// The most objects of a scene
+    /// Measure scenes of at most this many objects
     #[arg(long, default_value_t = 1_000_000)]
     most: usize,
-    /// Measure only scenes whose names have this in them
+    /// Measure only scenes whose names contain this
     #[arg(long, default_value = "")]
     only: String,
-    /// Seconds of processor time after which a scene is not measured with more objects
+    /// After this many seconds of processor time, do not measure the scene with more objects
     #[arg(long, default_value_t = 60.0)]
     seconds: f64,
     /// Print the table and write nothing
@@ -39,11 +40,11 @@ pub struct Args {
 /// Columns and rows of a picture.
 const SIZE: (u32, u32) = (64, 48);
 
-/// The number of objects that a scene starts with, and the factor from one to the next.
+/// The number of objects in the first scene of a family, and the factor from one scene to the next.
 const FIRST: usize = 1000;
 const STEP: usize = 10;
 
-/// An object of a scene, at random; `part` is its place among all, from 0 to 1.
+/// A function that makes a random object of a scene. `part` is its position among all objects, from 0 to 1.
 type Make = fn(&mut Rng, part: f64) -> Result<Object>;
 
 /// A family of scenes.
@@ -135,7 +136,7 @@ fn matt(rng: &mut Rng) -> Result<Material> {
     Ok(Material::new(0.3 * color, 0.6 * color, DVec3::ZERO)?)
 }
 
-/// A point of the unit sphere.
+/// Returns a point of the unit sphere.
 fn direction(rng: &mut Rng) -> DVec3 {
     loop {
         let v = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 2.0 - 1.0;
@@ -163,7 +164,7 @@ impl Family {
     }
 }
 
-/// Seconds of processor time.
+/// The processor time in seconds.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
     count: usize,
@@ -174,14 +175,16 @@ struct Taken {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be drawn, or the report cannot be written.
+/// Fails if a scene cannot be drawn, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let mut report = format!(
-        "# Cost against objects that no tree tells apart\n\n\
-         Written by `cargo run --release -p rayfold-bench -- growth --seconds {}`. Pictures of {} x {} pixels with one light; seconds of \
-         processor time to prepare a scene and to draw it, with 1,000 to 1,000,000 objects. A dash: fewer objects took more than \
-         {} s. *Exponent*: by which power of the number of objects the sum grows, in the last step.\n\n\
-         | scene | 1,000 | 10,000 | 100,000 | 1,000,000 | exponent |\n| --- | --- | --- | --- | --- | --: |\n",
+        "# Cost of objects that a tree cannot separate\n\n\
+         Written by `cargo run --release -p rayfold-bench -- growth --seconds {}`. Pictures have {} x {} pixels and \
+         one light. The table shows the processor time in seconds to prepare a scene and to draw it, with 1,000 to \
+         1,000,000 objects. A dash: fewer objects took more than {} s. *Exponent*: the sum grows with this power of \
+         the number of objects, in the last step.\n\n\
+         | scene | 1,000 | 10,000 | 100,000 | 1,000,000 | exponent |\n\
+         | --- | --- | --- | --- | --- | --: |\n",
         args.seconds, SIZE.0, SIZE.1, args.seconds
     );
     for family in FAMILIES.iter().filter(|family| family.name.contains(&args.only)) {
@@ -227,7 +230,7 @@ fn row(name: &str, taken: &[Taken]) -> Result<String> {
     Ok(row)
 }
 
-/// By which power the time grew in the last step.
+/// Returns the exponent of the growth of the time in the last step.
 fn exponent(taken: &[Taken]) -> Option<f64> {
     let [.., before, last] = taken else { return None };
     let seconds = |taken: &Taken| taken.prepared + taken.drawn;

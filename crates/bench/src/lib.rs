@@ -1,8 +1,8 @@
 //! Measurements of rayfold, and the reports that they write.
 //!
-//! Each subcommand of the program is a module here and writes one report; what two of them need (the oracle, the hard
-//! cases, the backends, the scenes) is a module beside them. Nothing that ships depends on this crate. A number in
-//! a report was measured by the run that wrote the report.
+//! Each subcommand of the program is a module and writes one report. Parts that several of them share (the oracle, the
+//! hard cases, the backends, the scenes) are modules beside them. Nothing that ships depends on this crate. Each number
+//! in a report was measured by the run that wrote the report.
 
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 
@@ -20,6 +20,8 @@ pub mod footprint;
 pub mod gif;
 pub mod growth;
 pub mod hard_cases;
+#[cfg(feature = "bucket")]
+pub mod laptop;
 pub mod measure;
 pub mod metamorphic;
 pub mod needs;

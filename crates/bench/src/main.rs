@@ -1,4 +1,4 @@
-//! The program that measures: a subcommand a report.
+//! The program for measurements: one subcommand per report.
 
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
@@ -6,7 +6,7 @@ use rayfold_bench::{
     sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, explore, footprint, pipeline, scale, simulate};
+use rayfold_bench::{cold_start, explore, footprint, laptop, pipeline, scale, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -19,50 +19,53 @@ struct Cli {
 enum Measurement {
     /// Error and speed of every backend, and the hard cases at full size
     Accuracy(accuracy::Args),
-    /// Random pairs of solids that share a surface: the first in the script is seen
+    /// Random pairs of solids that share a surface: checks that the first in the script is visible
     Coincident(coincident::Args),
-    /// The paper's table: scenes from upload to GIF, in a local bucket and by the local invoker
+    /// The paper's table: scenes from upload to GIF, in a local store and with the local invoker
     #[cfg(feature = "bucket")]
     Pipeline(pipeline::Args),
-    /// Size of the functions, and how soon a new process asks for its first invocation
+    /// Small animations on few places, by the real programs: seconds and requests
+    #[cfg(feature = "bucket")]
+    Laptop(laptop::Args),
+    /// Size of the functions, and the time until a new process requests its first invocation
     #[cfg(feature = "bucket")]
     ColdStart(cold_start::Args),
-    /// What it takes to read and write the largest scripts
+    /// Time and memory to read and write the largest scripts
     Parsing(parsing::Args),
-    /// The pipeline's protocol in a simulated world: seeds, broken rules, requests at scale
+    /// The pipeline's protocol in a simulated world: many seeds, broken rules, requests at scale
     #[cfg(feature = "bucket")]
     Simulate(simulate::Args),
-    /// The pipeline's protocol in small worlds: every interleaving, and schedules that provoke
+    /// The pipeline's protocol in small worlds: every interleaving, and provoking schedules
     #[cfg(feature = "bucket")]
     Explore(explore::Args),
-    /// Time, memory, size and quality of GIFs, beside those of other encoders
+    /// Time, memory, size and quality of GIFs, compared with other encoders
     Gif(gif::Args),
-    /// Memory and processor time of the functions that ship, by the size of an animation
+    /// Memory and processor time of the shipped functions, by the size of an animation
     #[cfg(feature = "bucket")]
     Footprint(footprint::Args),
-    /// A line for each of many pictures, by which the program before a change is compared with the one after
+    /// A line for each of many pictures, to compare the program before and after a change
     Fingerprints(fingerprints::Args),
-    /// Processor time against the number of objects where a tree helps least
+    /// Processor time by number of objects, in scenes where a tree helps least
     Growth(growth::Args),
-    /// Run a program and print what it took
+    /// Run a program and print its time and memory
     #[command(hide = true)]
     Measure(measure::Args),
-    /// Random scenes against what must show the same: scaled, turned, in another order, taken apart, as groups
+    /// Random scenes compared with variants that must look the same: scaled, rotated, reordered, split, grouped
     Metamorphic(metamorphic::Args),
-    /// Instructions that scenes execute for parts of the tracer that they do not use (needs valgrind)
+    /// Instructions that scenes execute for unused parts of the tracer (needs valgrind)
     Needs(needs::Args),
-    /// Dots at the outlines of bodies of triangles, and pixels off at needles and planes seen from the side
+    /// Dots at the outlines of triangle meshes, and wrong pixels at needles and planes seen edge-on
     Outlines(outlines::Args),
     /// Animations of 10 to 100,000 frames, and many at once, in a simulated world with the limits of AWS
     #[cfg(feature = "bucket")]
     Scale(scale::Args),
-    /// Error against time of pictures of several samples a pixel
+    /// Error by time of pictures with several samples per pixel
     Sampling(sampling::Args),
-    /// What a ray costs, shape by shape, beside POV-Ray and Mitsuba where they are
+    /// The cost of a ray by shape, compared with POV-Ray and Mitsuba if they are installed
     Shapes(speed::shapes::Args),
-    /// Processor time against the work asked for, and beside POV-Ray and Embree where they are
+    /// Processor time by the amount of work, compared with POV-Ray and Embree if they are installed
     Speed(speed::Args),
-    /// The studio's page in Chromium: pictures a second, and from the pointer to the canvas
+    /// The studio's page in Chromium: pictures per second, and latency from the pointer to the canvas
     Studio(studio::Args),
 }
 
@@ -72,6 +75,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Coincident(args) => coincident::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Pipeline(args) => pipeline::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Laptop(args) => laptop::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::ColdStart(args) => cold_start::run(&args),
         Measurement::Parsing(args) => parsing::run(&args),

@@ -1,6 +1,6 @@
-//! `rayfold-bench measure -- PROGRAM...`: what a program takes, as JSON.
+//! `rayfold-bench measure -- PROGRAM...`: prints the time and memory of a program as JSON.
 //!
-//! A process of its own, because the system counts the memory of whoever starts a program as the program's.
+//! This is a process of its own, because the system counts the memory of the starting process as the program's.
 
 #![allow(clippy::print_stdout, reason = "the result is read by who started it")]
 
@@ -13,7 +13,7 @@ use nix::sys::resource::{UsageWho, getrusage};
 use nix::sys::time::TimeValLike;
 use serde::{Deserialize, Serialize};
 
-/// The command line.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The program and its arguments
@@ -21,19 +21,19 @@ pub struct Args {
     program: Vec<OsString>,
 }
 
-/// What one run took.
+/// The cost of one run.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Cost {
-    /// Seconds by the clock.
+    /// The elapsed time in seconds.
     pub wall: f64,
-    /// Seconds of all cores, user and system.
+    /// The processor time in seconds of all cores, user and system.
     pub cpu: f64,
-    /// Most memory held, in MB.
+    /// The peak memory in MB.
     pub memory: f64,
 }
 
 impl Cost {
-    /// The least times of two runs, and the most memory.
+    /// Returns the least times of two runs, and the larger memory.
     pub(crate) fn least(self, other: Self) -> Self {
         Self {
             wall: self.wall.min(other.wall),
@@ -46,7 +46,7 @@ impl Cost {
 /// Runs the program and prints its [`Cost`].
 ///
 /// # Errors
-/// When it cannot be started or fails.
+/// Fails if it cannot be started or fails.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let name = args.program[0].to_string_lossy();
     let start = Instant::now();

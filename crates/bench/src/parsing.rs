@@ -1,4 +1,4 @@
-//! `rayfold-bench parsing`: what it takes to read and write the largest scripts, right and wrong ones.
+//! `rayfold-bench parsing`: time and memory to read and write the largest scripts, valid and invalid ones.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,21 +9,21 @@ use rayfold_scene::{Limits, Parsed, parse};
 
 use crate::cpu_time;
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives parsing.md
+    /// Write parsing.md into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// Size of each script in MiB
+    /// Use scripts of this many MiB
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=256))]
     mebibytes: u32,
-    /// How often each script is read; the median counts
+    /// Read each script this often; the median counts
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
 }
 
-/// A kind of script: what it is, and a line of it.
+/// A kind of script: its description and one of its lines.
 struct Kind {
     about: &'static str,
     line: fn(&mut fastrand::Rng) -> String,
@@ -48,14 +48,14 @@ fn triangle(rng: &mut fastrand::Rng, decimals: usize) -> String {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When the clock cannot be read or the report cannot be written.
+/// Fails if the clock cannot be read or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let mut report = format!(
         "# Parsing\n\n\
-         Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are of one run, seconds of processor \
-         time on one thread, the median of {} rounds. Every script has {} MiB, the default limit; \
-         *show* is the rendering of all diagnostics that are described (at most {} errors and as many warnings, the \
-         rest is counted), *write* that of the script as text.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are from one run: processor time in \
+         seconds on one thread, the median of {} rounds. Every script has {} MiB, the default limit. *Show* is the \
+         formatting of all diagnostics that are described (at most {} errors and as many warnings; the others are \
+         counted). *Write* is the conversion of the script to text.\n\n\
          | script | lines | parse | MiB/s | errors and warnings described | show | write |\n\
          | --- | --: | --: | --: | --: | --: | --: |\n",
         args.rounds,
@@ -98,7 +98,7 @@ fn row(kind: &Kind, args: &Args) -> Result<String> {
     ))
 }
 
-/// A script of at most `size` bytes, and not a line less.
+/// Returns a script of at most `size` bytes, with as many lines as fit.
 fn script(kind: &Kind, size: usize) -> String {
     let mut rng = fastrand::Rng::with_seed(1);
     let mut text = String::with_capacity(size);

@@ -6,14 +6,14 @@ use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Points with a name; joined by lines where they are a course.
+/// A named series of points, optionally joined by lines.
 pub(crate) struct Series {
     pub(crate) name: String,
     pub(crate) points: Vec<(f64, f64)>,
     pub(crate) joined: bool,
 }
 
-/// What a plot says beside its points.
+/// The texts of a plot.
 pub(crate) struct Labels<'a> {
     pub(crate) title: &'a str,
     pub(crate) x: &'a str,
@@ -22,10 +22,10 @@ pub(crate) struct Labels<'a> {
 
 const SIZE: (u32, u32) = (900, 560);
 
-/// Columns beside a chart for its legend.
+/// The width of the legend beside a chart, in pixels.
 const LEGEND: u32 = 280;
 
-/// Colours that those who see few colours tell apart (Okabe and Ito, 2008).
+/// Colours that are distinguishable with colour-blindness (Okabe and Ito, 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -41,8 +41,8 @@ pub(crate) fn log_log(path: &Path, labels: &Labels, series: &[Series]) -> Result
     draw(path, labels, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// Draws a column of points for each name, x being the name's index, and level lines; y is logarithmic. What is not
-/// above 0 cannot be shown.
+/// Draws a column of points for each name, and level lines. x is the index of the name; y is logarithmic. Points that
+/// are not above 0 are omitted.
 pub(crate) fn columns(
     path: &Path,
     labels: &Labels,
@@ -53,7 +53,7 @@ pub(crate) fn columns(
     draw_columns(path, labels, names, lines, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// Draws courses of shares in percent over a linear axis from 0 to `end`, and points that they should be left of.
+/// Draws courses of shares in percent over a linear axis from 0 to `end`, and the points that they should be left of.
 pub(crate) fn shares(
     path: &Path,
     labels: &Labels,
@@ -123,7 +123,7 @@ fn draw_columns(
     let (bottom, top) = (low / 1.2, high * 1.2);
     let area = SVGBackend::new(path, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
-    // The names of the series stand to the right of the columns.
+    // The names of the series are to the right of the columns.
     let width = names.len() as f64 * 1.2;
     let mut chart = ChartBuilder::on(&area)
         .caption(labels.title, ("sans-serif", 20))
@@ -174,7 +174,7 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
     let range = |of: fn(&(f64, f64)) -> f64| {
         let all = series.iter().flat_map(|s| &s.points).map(of);
         let (low, high) = all.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
-        // Whole decades, the first and the last of them with their names.
+        // Entire decades. The first and the last have labels.
         0.8 * 10f64.powf((low.log10() - 0.2).floor())..1.25 * 10f64.powf((high.log10() + 0.2).ceil())
     };
     let area = SVGBackend::new(path, (SIZE.0 + LEGEND, SIZE.1)).into_drawing_area();
@@ -200,7 +200,7 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
         if series.joined {
             chart.draw_series(LineSeries::new(series.points.iter().copied(), color.stroke_width(2)))?;
         }
-        // Colours repeat after seven; the shape tells the rest.
+        // Colours repeat after seven; then hollow points are used.
         let filled = k < COLORS.len();
         let style = if filled { color.filled() } else { color.stroke_width(2) };
         chart.draw_series(series.points.iter().map(|&p| Circle::new(p, 5, style)))?;
@@ -213,14 +213,14 @@ fn draw(path: &Path, labels: &Labels, series: &[Series]) -> Result<(), Box<dyn s
     Ok(())
 }
 
-/// One digit and the power of ten, for 1, 2 and 5; the lines between have no room for names.
+/// Returns one digit and the power of ten for 1, 2 and 5. Other grid lines have no space for labels.
 fn label(x: f64) -> String {
     let exponent = (x.log10() + 1e-9).floor();
     let digit = (x / 10f64.powf(exponent)).round();
     if [1.0, 2.0, 5.0].contains(&digit) { format!("{digit}e{exponent}") } else { String::new() }
 }
 
-/// The number itself, for 1, 2 and 5 times a power of ten.
+/// Returns the number itself, for 1, 2 and 5 times a power of ten.
 fn ratio_label(y: f64) -> String {
     if label(y).is_empty() { String::new() } else { format!("{}", (y * 1e6).round() / 1e6) }
 }

@@ -1,7 +1,9 @@
-//! What animations of 10 to 100,000 frames take, and many at once, in a simulated world with the limits of AWS.
+//! `rayfold-bench scale`: time and cost of animations of 10 to 100,000 frames, and of many at once, in a simulated
+//! world with the limits of AWS.
 //!
-//! Simulated time: the figures do not depend on the machine. What a frame costs follows from counted requests, the time of
-//! the invocations and `infra/prices.json`. Writes `docs/reports/scale.md`, its figures and its plots.
+//! Time is simulated, so the figures do not depend on the machine. The cost of a frame follows from the counted
+//! requests, the time of the invocations and `infra/prices.json`. Writes `docs/reports/scale.md`, its figures and its
+//! plots.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,36 +11,36 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use rayfold_files::OutputFile;
-use rayfold_pipeline::simulation::{Scale, ScaleReport, measure};
+use rayfold_simulation::{Scale, ScaleReport, measure};
 use rayon::prelude::*;
 use serde::Deserialize;
 
 use crate::plot::{Labels, Series, log_log};
 
-/// Memory of the functions in MiB, as the stack gives it unless told otherwise.
+/// The memory of the functions in MiB, by the defaults of the stack.
 pub(crate) const RENDER_MB: f64 = 1_769.0;
 pub(crate) const ASSEMBLE_MB: f64 = 3_008.0;
 
-/// What the assembler takes for a frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
+/// The assembler's time per frame of 512 x 512 (`docs/decisions/gif-in-one-piece.md`).
 const PUSH: Duration = Duration::from_millis(6);
 
-/// The same for 1920 x 1080.
+/// The assembler's time per frame of 1920 x 1080.
 const PUSH_LARGE: Duration = Duration::from_millis(30);
 
-/// How long an invocation may run: as long as Lambda lets one.
+/// The time limit of an invocation: the maximum of Lambda.
 pub(crate) const LONGEST: Duration = Duration::from_secs(900);
 
-/// Scripts that an upload brings in a second: some 40 connections at 40 ms a put. As many frames end in a second on 1,000
-/// places.
+/// The scripts uploaded per second: some 40 connections at 40 ms per put. At 1,000 concurrent invocations as many
+/// frames complete per second.
 const UPLOADED: u64 = 1_000;
 
-/// What a frame may cost in requests, on the average.
+/// The goal: the mean cost of a frame in requests.
 const GOAL: f64 = 12.0;
 
-/// Places for both functions, as an account has them by default.
+/// The number of concurrent invocations of both functions, by default for an account.
 const PLACES: usize = 1_000;
 
-/// Frames, animations, and what the assembler takes for a frame.
+/// The numbers of frames and of animations, and the assembler's time per frame.
 const SIZES: [(u64, u64, Duration); 10] = [
     (10, 1, PUSH),
     (100, 1, PUSH),
@@ -52,16 +54,22 @@ const SIZES: [(u64, u64, Duration); 10] = [
     (100_000, 1, PUSH_LARGE),
 ];
 
+/// The rows by places: frames, and places for both functions.
+const BY_PLACES: ([u64; 4], [usize; 6]) = ([10, 50, 300, 1_000], [1, 2, 4, 10, 100, 1_000]);
+
+/// Worlds of which each of these rows is the mean.
+const WORLDS: u64 = 5;
+
 /// Options of `rayfold-bench scale`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Sizes with more frames are left out, which the report then says
+    /// Leave out sizes with more frames; the report then says so
     #[arg(long)]
     most: Option<u64>,
-    /// Prices
+    /// Read the prices from this file
     #[arg(long, default_value = "infra/prices.json")]
     prices: PathBuf,
-    /// Folder of the report
+    /// Write the report into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
 }
@@ -84,7 +92,7 @@ struct S3Prices {
     get_and_other: f64,
 }
 
-/// One size and what came of it.
+/// The results for one size.
 struct Row {
     frames: u64,
     animations: u64,
@@ -93,14 +101,14 @@ struct Row {
     dollars_a_frame: f64,
 }
 
-/// What of a row a plot shows.
+/// The value of a row that a plot shows.
 type Value = fn(&Row) -> f64;
 
-/// Measures.
+/// Measures and writes the report.
 ///
 /// # Errors
 ///
-/// When an animation does not come right, or the report cannot be written.
+/// Fails if an animation's result is wrong, or if the report cannot be written.
 #[expect(clippy::print_stdout, reason = "a measurement tells what it finds")]
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let text = std::fs::read_to_string(&args.prices)
@@ -109,7 +117,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let is_wanted = |(frames, animations, _): &(u64, u64, Duration)| {
         args.most.is_none_or(|most| frames * animations <= most)
     };
-    // Each is a world of its own.
+    // Each size is simulated in its own world.
     let rows = SIZES.into_par_iter().filter(is_wanted).map(|(frames, animations, push)| {
         let start = Instant::now();
         let scale = Scale::on_aws(frames, animations, UPLOADED, PLACES, push);
@@ -120,10 +128,52 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Ok(row)
     });
     let rows = rows.collect::<anyhow::Result<Vec<_>>>()?;
-    write_report(args, &rows)
+    let (frames, places) = BY_PLACES;
+    let cases: Vec<_> = frames.iter().flat_map(|frames| places.map(|places| (*frames, places))).collect();
+    let by_places = cases.into_par_iter().map(|(frames, places)| {
+        let line = line_of_places(frames, places, &prices)?;
+        println!("{line}");
+        Ok(line)
+    });
+    let by_places = by_places.collect::<anyhow::Result<Vec<_>>>()?;
+    write_report(args, &rows, &by_places)
 }
 
-/// What a frame costs, in USD: requests and functions; the upload, the download and keeping it are not in it.
+const PLACES_HEADER: &str = "
+## By places
+
+One animation, as above, on so many places for both functions; the means of 5 worlds, the tail of the worst. *Puts, lists* and
+*gets* are those of both functions. *USD* is for 1,000 frames: these requests, and the time beyond drawing.
+
+| frames | places | requests a frame | puts, lists | gets | beyond, ms | tail, ms | manifests written | USD |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- |
+";
+
+fn line_of_places(frames: u64, places: usize, prices: &Prices) -> anyhow::Result<String> {
+    let mut reports = Vec::new();
+    for seed in 1..=WORLDS {
+        let scale = Scale { seed, ..Scale::on_aws(frames, 1, UPLOADED, places, PUSH) };
+        reports.push(measure(scale).map_err(anyhow::Error::msg)?);
+    }
+    let mean = |value: fn(&ScaleReport) -> f64| reports.iter().map(value).sum::<f64>() / WORLDS as f64;
+    let requests = mean(|report| report.requests_a_frame);
+    let [gets, puts, _, lists] = [0, 1, 2, 3].map(|kind: usize| {
+        reports.iter().map(|report| report.kinds_a_frame[kind]).sum::<f64>() / WORLDS as f64
+    });
+    let beyond = mean(|report| report.beyond_drawing.as_secs_f64());
+    let tail = reports.iter().map(|report| report.tail.as_millis()).max().unwrap_or_default();
+    let manifests = mean(|report| report.revisions as f64);
+    let waiting = beyond * RENDER_MB / 1_024.0 * prices.lambda.gb_second_x86_64;
+    let dollars = (puts + lists) * prices.s3.put_copy_post_list + gets * prices.s3.get_and_other + waiting;
+    Ok(format!(
+        "| {frames} | {places} | {requests:.2} | {:.2} | {gets:.2} | {:.0} | {tail} | {manifests:.0} | {:.4} |",
+        puts + lists,
+        beyond * 1000.0,
+        dollars * 1000.0,
+    ))
+}
+
+/// Returns the cost of a frame in USD: requests and functions. Excludes the upload, the download and storage.
 fn dollars(report: &ScaleReport, frames: u64, prices: &Prices) -> f64 {
     let [get, put, _, list] = report.kinds_a_frame;
     let [render, assemble] = report.invocations.map(|count| count as f64);
@@ -136,23 +186,24 @@ fn dollars(report: &ScaleReport, frames: u64, prices: &Prices) -> f64 {
 
 const HEADER: &str = "# Animations of any size
 
-Written by `cargo run --release -p rayfold-bench -- scale`, in simulated time: the figures do not depend on the machine. The
-real steps work in a bucket that bears 3,500 writes and 5,500 reads a second, all its keys together, and answers the rest with
-503, which S3's client meets by sending three times; GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms for each 1,000 names, bodies come and go at 80 MB/s (assumed). Lambda has
-1,000 places for both functions, the account's default. Scripts come at 1,000 a second, with `frames` set; a frame is drawn in
-800 to 1,200 ms and encoded in 6 ms (512 x 512) or 30 ms (1920 x 1080). An invocation has 15 minutes; a GIF that takes more is
-built by several, one after the other. Not modelled: processor time of the folds, and the encoder's state on its way from one
-assembler to the next (some 5 MB at 1080p); events that come late. Memory and processor time of the functions are
-[measured apart](footprint.md).
+Written by `cargo run --release -p rayfold-bench -- scale`, in simulated time, so the figures do not depend on the machine. The
+real steps use a bucket that accepts 3,500 writes and 5,500 reads per second, for all its keys together. It replies to the
+others with 503, and S3's client sends a request up to three times. GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms per 1,000
+names, and bodies are transferred at 80 MB/s (assumed). Lambda runs at most 1,000 concurrent invocations of both functions, the
+account's default. 1,000 scripts per second are uploaded, with `frames` set. A frame is drawn in 800 to 1,200 ms and encoded in
+6 ms (512 x 512) or 30 ms (1920 x 1080). An invocation has 15 minutes; a GIF that takes longer is built by several, one after
+the other. The model omits the processor time of the folds, the transfer of the encoder's state from one assembler to the next
+(some 5 MB at 1080p), and late events. Memory and processor time of the functions are [measured separately](footprint.md).
 
-*Requests* are those of the render function, 503s included. *Beyond* is the mean time of its invocations that was not drawing:
-Lambda bills it. *Tail*: from the last frame's put to the render function's last claim. *Waited*: for a free place, on the average and at most.
-*Assembling*: the time of all assemblers together; *in pieces*: how many of them built a GIF, each going on where the one before had
-left it. *Cost* in USD for 1,000 frames: requests and both functions.
+*Requests* are those of the render function, including 503s. *Beyond* is the mean time of its invocations except drawing; Lambda
+bills it. *Tail* is the time from the last frame's put to the render function's last claim. *Waited* is the time until an
+invocation could start, mean and maximum. *Assembling* is the time of all assemblers together. *In pieces* is the number of
+assemblers that built a GIF, each continuing from its predecessor's checkpoint. *Cost* is that of 1,000 frames in USD: requests
+and both functions.
 ";
 
 const TABLE: &str = "
-| frames | animations | ms to encode one | requests a frame | LIST a frame | 503 a frame | beyond, ms | tail, ms | claims | manifests written | largest manifest, KB | first GIF, s | last GIF, s | assembling, s | in pieces | render waited, s | assemble waited, s | cost of 1,000 |
+| frames | animations | ms to encode one | requests per frame | LIST per frame | 503 per frame | beyond, ms | tail, ms | claims | manifests written | largest manifest, KB | first GIF, s | last GIF, s | assembling, s | in pieces | render waited, s | assemble waited, s | cost of 1,000 |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
@@ -179,18 +230,18 @@ fn line(row: &Row) -> String {
     )
 }
 
-/// In how many invocations each GIF was built, on the average.
+/// Returns the mean number of invocations that built a GIF.
 fn pieces(row: &Row) -> u64 {
     1 + row.report.left / row.animations
 }
 
 const PLOTS: &str = "
-![Requests a frame](scale-requests.svg)
+![Requests per frame](scale-requests.svg)
 ![Seconds to the GIF](scale-time.svg)
 ![USD for 1,000 frames](scale-cost.svg)
 ";
 
-/// What the figures say of the limits.
+/// Compares the figures with the limits.
 fn conclusions(rows: &[Row]) -> String {
     let of_one: Vec<&Row> = rows.iter().filter(|row| row.animations == 1).collect();
     let (Some(largest), Some(longest_built), Some(dearest)) = (
@@ -211,19 +262,20 @@ fn conclusions(rows: &[Row]) -> String {
     };
     format!(
         "
-## What is near its limit
+## Figures near a limit
 
-- **The assembler's 15 minutes.** Encoding alone fills them with {} frames at 6 ms (512 x 512), with {} at 30 ms (1080p). What is more is
-  built in [pieces](../decisions/gif-in-one-piece.md#a-cut-in-time): {} frames at {} ms by {} invocations in {:.0} s together.
-  The next limit is a day, after which the bucket's rules remove an unfinished upload: 90 pieces, some 13 million frames at 6 ms, 2.7 million at 30 ms.
-- **Requests.** {frames} frames take {:.2} a frame, of {GOAL}; the most are {:.2}, of {}. Whose listing is many requests lets
-  others list, by lot, until nobody has written for a while ([pipeline](../pipeline.md#folding)): {:.2} listings a frame in all,
-  of which one is the look for a result before drawing.
-- **The manifest** has {:.0} bytes a frame at {frames} frames, {:.1} MB in all, and was written {} times: as often as listing and
-  putting it take, while frames come.
-- **The bucket's limits.** The most 503s are {:.2} a frame, of {}; each is sent again after a pause.
-- **Who waits for whom.** An assembler waited for a free place for at most {:.1} s, of {}: invocations of both functions queue
-  for the same places, in the order of their events.
+- **The assembler's 15 minutes.** Encoding alone fills them with {} frames at 6 ms (512 x 512), and with {} at 30 ms (1080p). A
+  longer GIF is built in [pieces](../decisions/gif-in-one-piece.md#a-cut-in-time): {} frames at {} ms by {} invocations in {:.0}
+  s together. The next limit is a day, after which the bucket's rules remove an unfinished upload: 90 pieces, some 13 million
+  frames at 6 ms, 2.7 million at 30 ms.
+- **Requests.** {frames} frames take {:.2} requests per frame, of {GOAL} allowed; the largest number is {:.2}, with {}. Almost
+  every invocation stops while another frame is to come ([pipeline](../pipeline.md#folding)). In all there are {:.2} listings
+  per frame; one of them looks for a result before drawing.
+- **The manifest** has {:.0} bytes per frame at {frames} frames, {:.1} MB in all, and was written {} times: while frames
+  complete, as often as the time to list and to put it allows.
+- **The bucket's limits.** The largest number of 503s is {:.2} per frame, with {}; each request is repeated after a pause.
+- **Concurrency.** An assembler waited at most {:.1} s until it could start, with {}: invocations of both functions share the
+  limit, in the order of their events.
 ",
         fit(PUSH),
         fit(PUSH_LARGE),
@@ -245,7 +297,7 @@ fn conclusions(rows: &[Row]) -> String {
     )
 }
 
-fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
+fn write_report(args: &Args, rows: &[Row], by_places: &[String]) -> anyhow::Result<()> {
     let mut page = HEADER.to_owned();
     page.push_str(TABLE);
     for row in rows {
@@ -253,6 +305,10 @@ fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
     }
     if let Some(most) = args.most {
         writeln!(page, "\nSizes with more than {most} frames in all were not run.")?;
+    }
+    page.push_str(PLACES_HEADER);
+    for line in by_places {
+        writeln!(page, "{line}")?;
     }
     page.push_str(PLOTS);
     page.push_str(&conclusions(rows));
@@ -315,7 +371,7 @@ fn write_report(args: &Args, rows: &[Row]) -> anyhow::Result<()> {
         OutputFile::write(&path, bytes, false)?;
     }
     let plots: [(&str, &str, Value); 3] = [
-        ("requests", "requests a frame", |row| row.report.requests_a_frame),
+        ("requests", "requests per frame", |row| row.report.requests_a_frame),
         ("time", "seconds to the GIF", |row| row.report.whole.as_secs_f64()),
         ("cost", "USD for 1,000 frames", |row| row.dollars_a_frame * 1000.0),
     ];

@@ -1,4 +1,4 @@
-//! Scenes to measure on, made from a seed.
+//! Scenes for measurements, made from a seed.
 
 use std::path::{Path, PathBuf};
 
@@ -11,34 +11,35 @@ use rayfold_scene::{
 
 use crate::backends::Ray;
 
-/// A camera at `eye` that looks at `target` and sees `width` world units a unit of distance from side to side.
+/// Returns a camera at `eye` that looks at `target` and sees `width` world units per unit of distance from side to
+/// side.
 ///
 /// # Errors
-/// When eye and target coincide or lie above one another.
+/// Fails if eye and target coincide or are on a vertical line.
 pub fn looking_at(eye: DVec3, target: DVec3, width: f64, screen: Screen) -> Result<Camera, InvalidValue> {
     let half = DVec2::new(0.5, 0.5 * f64::from(screen.height()) / f64::from(screen.width())) * width;
     Pinhole::new(eye, target - eye, DVec3::Y, 1.0, -half, half).map(Camera::Pinhole)
 }
 
-/// The ray of column `i` from the left and row `j` from the bottom, of unit length.
+/// Returns the ray of column `i` from the left and row `j` from the bottom, of unit length.
 pub fn pixel_ray(scene: &Scene, i: u32, j: u32) -> Ray {
     let (origin, direction) = rayfold_tracer::pixel_ray(scene, f64::from(i), f64::from(j));
     Ray { origin, direction }
 }
 
-/// The middle frame of an animation in `scenes/`.
+/// Returns the middle frame of an animation in `scenes/`.
 ///
 /// # Errors
-/// When its script cannot be read.
+/// Fails if its script cannot be read.
 pub fn example(name: &str) -> Result<Scene> {
     let scripts = scripts(name)?;
     first_frame(name, scripts.get(scripts.len() / 2).context("a folder without scripts")?)
 }
 
-/// The names of the scripts of an animation in `scenes/`, in order.
+/// Returns the names of the scripts of an animation in `scenes/`, in order.
 ///
 /// # Errors
-/// When there is no such folder.
+/// Fails if the folder does not exist.
 pub(crate) fn scripts(animation: &str) -> Result<Vec<String>> {
     let folder = folder(animation);
     let mut scripts: Vec<String> = std::fs::read_dir(&folder)
@@ -50,10 +51,10 @@ pub(crate) fn scripts(animation: &str) -> Result<Vec<String>> {
     Ok(scripts)
 }
 
-/// What a script of an animation in `scenes/` shows first.
+/// Returns the first frame of a script of an animation in `scenes/`.
 ///
 /// # Errors
-/// When it cannot be read.
+/// Fails if the script cannot be read.
 pub(crate) fn first_frame(animation: &str, script: &str) -> Result<Scene> {
     let text = std::fs::read(folder(animation).join(script))?;
     let parsed = parse(script, &text, &Limits::default());
@@ -67,16 +68,16 @@ fn folder(animation: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(animation)
 }
 
-/// The animations in `scenes/` that are in version 1 of the language.
+/// The animations in `scenes/` in version 1 of the language.
 pub const EXAMPLES: [&str; 5] = ["sphere_light", "moving_up", "artistic", "artisticsss", "hello"];
 
-/// Those that are one script with curves, in version 2.
+/// The animations in `scenes/` in version 2. Each is one script with curves.
 pub const MOVING_EXAMPLES: [&str; 5] = ["clockwork", "glass", "lamp", "marbles", "planets"];
 
-/// The script of an animation in `scenes/` that stands in its middle.
+/// Returns the middle script of an animation in `scenes/`.
 ///
 /// # Errors
-/// When it cannot be read.
+/// Fails if the script cannot be read.
 pub fn script(animation: &str) -> Result<Script> {
     let names = scripts(animation)?;
     let name = names.get(names.len() / 2).context("a folder without scripts")?;
@@ -84,26 +85,26 @@ pub fn script(animation: &str) -> Result<Script> {
     parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))
 }
 
-/// A surface that scatters and mirrors.
+/// Returns a material that is both diffuse and a mirror.
 ///
 /// # Errors
-/// When a number is not finite.
+/// Fails if a number is not finite.
 pub fn material(diffuse: DVec3, mirror: f64) -> Result<Material, InvalidValue> {
     Material::new(0.15 * diffuse, diffuse, DVec3::splat(mirror))
 }
 
-/// A light at infinity.
+/// Returns a sun.
 ///
 /// # Errors
-/// When the direction is zero.
+/// Fails if the direction is zero.
 pub fn light(color: f64, direction: [f64; 3]) -> Result<Light, InvalidValue> {
     DirectionalLight::new(DVec3::splat(color), direction.into()).map(Light::Directional)
 }
 
-/// 22 spheres, most of them mirrors, over a floor: 2 boxes, 2 triangles, 2 lights.
+/// Returns 22 spheres, most of them mirrors, over a floor, with 2 boxes, 2 triangles and 2 lights.
 ///
 /// # Errors
-/// Never for a screen of ordinary size.
+/// Does not fail for a screen of ordinary size.
 pub fn table(width: u32, height: u32) -> Result<Scene> {
     let screen = Screen::new(width, height)?;
     let mut scene = Scene::new(screen, looking_at(DVec3::new(0.0, 4.5, 9.0), DVec3::ZERO, 1.1, screen)?);
@@ -128,10 +129,11 @@ pub fn table(width: u32, height: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// `count` spheres of which about as many are seen whatever the count: they fill the same cube ever more finely.
+/// Returns `count` spheres that fill a cube. The number of visible spheres hardly depends on `count`, because more
+/// spheres are smaller.
 ///
 /// # Errors
-/// Never for a screen of ordinary size.
+/// Does not fail for a screen of ordinary size.
 pub fn cloud(count: u32, width: u32, height: u32) -> Result<Scene> {
     let screen = Screen::new(width, height)?;
     let mut scene = Scene::new(screen, looking_at(DVec3::new(0.0, 0.5, 6.0), DVec3::ZERO, 0.8, screen)?);
@@ -151,10 +153,10 @@ pub fn cloud(count: u32, width: u32, height: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A closed, wrinkled surface around the origin of at least `count` triangles, seen and lit from outside.
+/// Returns a closed, wrinkled surface around the origin of at least `count` triangles, seen and lit from outside.
 ///
 /// # Errors
-/// Never for a screen of ordinary size.
+/// Does not fail for a screen of ordinary size.
 pub fn rock(count: usize, width: u32, height: u32) -> Result<Scene> {
     let screen = Screen::new(width, height)?;
     let mut scene = Scene::new(screen, looking_at(DVec3::new(0.5, 1.0, 3.0), DVec3::ZERO, 0.8, screen)?);
@@ -170,8 +172,8 @@ pub fn rock(count: usize, width: u32, height: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The icosahedron, its faces quartered until there are at least `count`; corners on the unit sphere, shared bit for
-/// bit between neighbours.
+/// Returns an icosahedron whose faces are subdivided into four until there are at least `count`. The corners are on the
+/// unit sphere, and neighbours share them bit for bit.
 pub fn icosphere(count: usize) -> Vec<[DVec3; 3]> {
     let golden = 0.5 + 1.25f64.sqrt();
     let corners: Vec<DVec3> = [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)]
@@ -179,7 +181,7 @@ pub fn icosphere(count: usize) -> Vec<[DVec3; 3]> {
         .flat_map(|(a, b)| [DVec3::new(a, b, 0.0), DVec3::new(0.0, a, b), DVec3::new(b, 0.0, a)])
         .map(DVec3::normalize)
         .collect();
-    // The 20 triples of mutual neighbours, which are nearer to each other than any others.
+    // The faces are the 20 triples of mutual neighbours: no other corners are as near to each other.
     let near = |a: DVec3, b: DVec3| a.distance(b) < 1.1;
     let mut faces = Vec::new();
     for a in 0..12 {
@@ -199,7 +201,7 @@ pub fn icosphere(count: usize) -> Vec<[DVec3; 3]> {
 }
 
 fn quartered([p, q, r]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
-    // A sum of two commutes, so both neighbours get the same midpoint.
+    // A sum of two is commutative, so both neighbours get the same midpoint.
     let [a, b, c] = [(p + q).normalize(), (q + r).normalize(), (r + p).normalize()];
     [[p, a, c], [a, q, b], [c, b, r], [a, b, c]]
 }
@@ -210,15 +212,15 @@ fn wrinkled(p: DVec3) -> DVec3 {
     p * (1.0 + 0.08 * waves)
 }
 
-/// The nearest vector of `f32`s: what every arithmetic holds exactly.
+/// Returns the nearest vector of `f32`s, which every arithmetic represents exactly.
 pub fn single(v: DVec3) -> DVec3 {
     v.as_vec3().as_dvec3()
 }
 
-/// The scene with every position `p` moved to `scale · p + offset`, seen from the eye that moved along.
+/// Returns the scene with every position `p` moved to `scale · p + offset`, including the eye.
 ///
 /// # Errors
-/// When a number overflows, or the camera is not a pinhole.
+/// Fails if a number overflows, or if the camera is not a pinhole.
 pub fn moved(scene: &Scene, scale: f64, offset: DVec3) -> Result<Scene> {
     let place = |p: DVec3| scale * p + offset;
     let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera moves") };

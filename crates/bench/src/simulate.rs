@@ -1,7 +1,8 @@
-//! The pipeline's simulation at full size: many seeds, broken rules, and what frames cost at scale.
+//! `rayfold-bench simulate`: the pipeline's simulation at full size, with many seeds, broken rules, and the cost of
+//! frames at scale.
 //!
-//! Everything is measured in simulated time, so the figures are the same on every machine; only the seconds that the
-//! runs themselves take are not.
+//! Everything is measured in simulated time, so the figures are the same on every machine. The exceptions are the times
+//! of the runs themselves.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -12,17 +13,17 @@ use std::time::Instant;
 
 use rayfold_files::OutputFile;
 use rayfold_pipeline::Mutation;
-use rayfold_pipeline::simulation::{Run, Scale, ScaleReport, Violation, measure, replay, run as run_seed};
+use rayfold_simulation::{Run, Scale, ScaleReport, Violation, measure, replay, run as run_seed};
 
-/// How many violations are told one by one.
+/// The number of violations that are printed individually.
 const TOLD: usize = 20;
 
-/// What a whole report has, unless a part is asked for by itself.
+/// The sizes of a whole report, unless a part is requested separately.
 const SEEDS: u64 = 100_000;
 const HUNT: u64 = 60_000;
 const SIZES: [(u64, usize); 5] = [(10, 10), (50, 50), (1_000, 1_000), (2_500, 250), (10_000, 1_000)];
 
-/// Seeds that notice a broken rule, after which the hunt for more ends.
+/// The search for seeds that detect a broken rule ends after this many.
 const ENOUGH: u64 = 5;
 
 /// Options of `rayfold-bench simulate`.
@@ -31,25 +32,26 @@ const ENOUGH: u64 = 5;
     after_help = "Without --seeds, --hunt and --scale: all three at full size, and the report is written."
 )]
 pub struct Args {
-    /// How many seeds to run
+    /// Run this many seeds
     #[arg(long)]
     seeds: Option<u64>,
-    /// The first seed
+    /// Start with this seed
     #[arg(long, default_value_t = 0)]
     from: u64,
-    /// Threads; all cores when left out
+    /// Number of threads [default: all cores]
     #[arg(long)]
     threads: Option<usize>,
-    /// For each rule of the protocol, the first seeds that notice when it is broken, among so many
+    /// For each rule of the protocol, find the first seeds that detect its violation, among this many
     #[arg(long, value_name = "SEEDS")]
     hunt: Option<u64>,
-    /// Frames, and invocations at once, to measure requests and tail at: 1000x1000; may be given several times
+    /// Measure requests and tail with this many frames and concurrent invocations: 1000x1000; may be given several
+    /// times
     #[arg(long, value_name = "FRAMESxCONCURRENCY", value_parser = parse_size)]
     scale: Vec<(u64, usize)>,
-    /// Run this seed alone and print what happens
+    /// Run only this seed and print its events
     #[arg(long)]
     seed: Option<u64>,
-    /// Where to write a whole report
+    /// Write a whole report to this file
     #[arg(long, default_value = "docs/reports/simulation.md")]
     output: PathBuf,
 }
@@ -58,7 +60,7 @@ pub struct Args {
 ///
 /// # Errors
 ///
-/// When a guarantee does not hold, or the report cannot be written.
+/// Fails if a guarantee does not hold, or the report cannot be written.
 #[expect(clippy::print_stdout, reason = "a measurement tells what it finds")]
 pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(seed) = args.seed {
@@ -107,35 +109,35 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 const HEADER: &str = "# The protocol in the simulated world
 
-Written by `cargo run --release -p rayfold-bench -- simulate`. A run makes up a story of uploads and a world that fails
-in its own ways, both from one seed, and checks what [pipeline.md](../pipeline.md) guarantees. Simulated time: the
-figures do not depend on the machine.
+Written by `cargo run --release -p rayfold-bench -- simulate`. A run generates a sequence of uploads and a world with its own
+faults, both from one seed, and checks the guarantees of [pipeline.md](../pipeline.md). Time is simulated, so the figures do not
+depend on the machine.
 ";
 
 const HUNT_HEADER: &str = "
 ## Broken rules
 
-The same predicates, with one rule of the protocol broken on purpose; the hunt for seeds that notice ends with a few. One
-of each is a test (`crates/pipeline/src/simulation/tests.rs`).
+The predicates are the same, but one rule of the protocol is broken on purpose. The search for seeds that detect this ends after
+a few. One seed of each rule is a test (`crates/simulation/src/tests.rs`).
 
-| broken rule | seeds run | that noticed | which |
+| broken rule | seeds run | number that detected it | which |
 | --- | --- | --- | --- |
 ";
 
 const SCALE_HEADER: &str = "
 ## Requests and the tail
 
-One animation of single-frame scripts, uploaded within 200 ms with `frames` set, drawn in 800 to 1,200 ms each; GET takes
-10-25 ms, PUT 25-60 ms, LIST 20-40 ms a page. Requests are those of the render function, and so are the bytes of objects
-that it reads; GET, PUT and LIST are of both functions together. The time beyond drawing, which Lambda bills too, is the
-mean of the render function's invocations: requests and pauses. The tail is from the last frame's put to the render function's last claim.
-The worst of the seeds.
+One animation of single-frame scripts is uploaded within 200 ms with `frames` set, and each frame is drawn in 800 to 1,200 ms.
+GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms per page. Requests, and the bytes of objects read, are those of the render
+function; GET, PUT and LIST are those of both functions together. The time beyond drawing, which Lambda bills too, is the mean
+of the render function's invocations: requests and pauses. The tail is the time from the last frame's put to the render
+function's last claim. Each figure is the worst of the seeds.
 
-| frames | at once | seeds | requests a frame | KB read a frame | GET | PUT | LIST a frame | beyond drawing, ms | tail, ms | claims | manifests written | assembler's requests | requests when all is done |
+| frames | at once | seeds | requests per frame | KB read per frame | GET | PUT | LIST per frame | beyond drawing, ms | tail, ms | claims | manifests written | assembler's requests | requests when all is done |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
-/// What many runs were like.
+/// The summary of many runs.
 #[derive(Default)]
 struct Campaign {
     total: Run,
@@ -149,7 +151,7 @@ struct Campaign {
     seconds: f64,
 }
 
-/// Runs seeds until `enough` have found a guarantee broken.
+/// Runs seeds until `enough` of them have found a violated guarantee.
 fn run_seeds(from: u64, seeds: u64, threads: usize, rule: Option<Mutation>, enough: u64) -> Campaign {
     let start = Instant::now();
     let next = AtomicU64::new(from);
@@ -205,12 +207,18 @@ fn describe_campaign(report: &mut String, (from, seeds): (u64, u64), campaign: &
     let [render, assemble] = total.invocations;
     let _ = write!(
         report,
-        "\n## Seeds\n\n| | |\n| --- | --- |\n| seeds | {from} to {} |\n| runs in which a guarantee did not hold | {broken} |\n\
-         | runs that had to come right, and did, without a sweep | {without_sweep} |\n\
+        "\n\
+         ## Seeds\n\n\
+         | | |\n\
+         | --- | --- |\n\
+         | seeds | {from} to {} |\n\
+         | runs in which a guarantee was violated | {broken} |\n\
+         | runs that had to end right without a sweep, and did | {without_sweep} |\n\
          | runs in which events were given up after their attempts | {with_given_up} |\n\
-         | runs in which a write landed after its writer was killed | {with_late_writes} |\n\
-         | requests | {} |\n| invocations of render, of assemble | {render}, {assemble} |\n\
-         | seconds (on a machine that others used, too) | {:.0} |\n",
+         | runs in which a write took effect after its writer was killed | {with_late_writes} |\n\
+         | requests | {} |\n\
+         | invocations of render, of assemble | {render}, {assemble} |\n\
+         | seconds (on a machine with other load) | {:.0} |\n",
         from + seeds.saturating_sub(1),
         total.requests,
         campaign.seconds,

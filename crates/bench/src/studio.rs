@@ -1,6 +1,6 @@
-//! `rayfold-bench studio`: the studio's page in a real browser: the first picture, pictures a second while an object is
-//! dragged, and the time from the pointer to the canvas. `crates/studio/web/tests/bench.mjs` drives the browser; here its
-//! figures become the report.
+//! `rayfold-bench studio`: the studio's page in a real browser. Measures the time to the first picture, the pictures
+//! per second while an object is dragged, and the latency from the pointer to the canvas.
+//! `crates/studio/web/tests/bench.mjs` drives the browser; this program makes the report from its figures.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,52 +13,52 @@ use serde::Deserialize;
 
 use crate::plot::{Labels, Series, shares};
 
-/// Width and height of the picture.
+/// The width and height of the picture.
 const SIZE: (u32, u32) = (960, 540);
 
-/// What is asked for: pictures a second, milliseconds from the pointer to the canvas of all but 5 %, milliseconds to the
-/// first picture.
+/// The goals: pictures per second, milliseconds from the pointer to the canvas for 95 % of the pictures, milliseconds
+/// to the first picture.
 const GOALS: (f64, f64, f64) = (55.0, 25.0, 1000.0);
 
 /// The end of the plot, in milliseconds.
 const LONGEST_SHOWN_MS: f64 = 60.0;
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives studio.md, studio.csv and studio.svg
+    /// Write studio.md, studio.csv and studio.svg into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// The program rayfold [default: the one beside this program]
+    /// Measure this rayfold program [default: the one beside this program]
     #[arg(long)]
     program: Option<PathBuf>,
-    /// The browser
+    /// Use this browser
     #[arg(long, default_value = "chromium")]
     browser: PathBuf,
-    /// How often to measure; the run in which others worked least counts
+    /// Measure this often; the run with the least other load counts
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
-    /// How long an object is dragged in each, in seconds
+    /// Drag an object for this many seconds in each run
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..))]
     seconds: u32,
 }
 
-/// What the browser's driver tells of a run.
+/// The results of a run, from the browser's driver.
 #[derive(Debug, Deserialize)]
 struct Run {
     run: u32,
-    /// Milliseconds from opening the page to its first picture.
+    /// The time from opening the page to its first picture, in milliseconds.
     first: f64,
     seconds: f64,
-    /// The share of all processors that other programs took.
+    /// The share of all processors that other programs used.
     others: f64,
-    /// Processor time of the studio and the browser.
+    /// The processor time of the studio and the browser, in milliseconds.
     #[serde(rename = "processorMs")]
     processor_ms: f64,
     pictures: u32,
-    /// Pictures by their size.
+    /// The number of pictures of each size.
     sizes: BTreeMap<String, u32>,
-    /// Milliseconds from the pointer to the canvas.
+    /// The latencies from the pointer to the canvas, in milliseconds.
     waits: Vec<f64>,
 }
 
@@ -67,7 +67,7 @@ impl Run {
         f64::from(self.pictures) / self.seconds
     }
 
-    /// What this share of all waits is shorter than.
+    /// Returns the latency that this share of all latencies is below.
     fn quantile(&self, share: f64) -> f64 {
         let mut waits = self.waits.clone();
         waits.sort_by(f64::total_cmp);
@@ -75,12 +75,12 @@ impl Run {
         waits.get(at.saturating_sub(1)).copied().unwrap_or(f64::NAN)
     }
 
-    /// Processor time of the studio and the browser, a picture.
+    /// Returns the processor time of the studio and the browser per picture.
     fn work(&self) -> f64 {
         self.processor_ms / f64::from(self.pictures.max(1))
     }
 
-    /// The share of pictures at their whole size.
+    /// Returns the share of pictures of full size.
     fn whole(&self) -> f64 {
         let whole = self.sizes.get(&format!("{}x{}", SIZE.0, SIZE.1)).copied().unwrap_or(0);
         f64::from(whole) / f64::from(self.pictures.max(1))
@@ -90,7 +90,7 @@ impl Run {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When the program, Node or the browser cannot be run, or the report cannot be written.
+/// Fails if the program, Node or the browser cannot be run, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folder = tempfile::tempdir()?;
@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<()> {
     plot(&args.output.join("studio.svg"), &runs, quietest)
 }
 
-/// The scene in another size: its window as much wider as its picture.
+/// Returns the scene in another size. The width of its window changes in proportion to that of its picture.
 fn widened(text: &str) -> Result<String> {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let screen = lines.iter_mut().find(|line| line.starts_with("Screen ")).context("no Screen")?;
@@ -145,22 +145,25 @@ fn report(runs: &[Run], quietest: &Run) -> String {
     let word = |is_met: bool| if is_met { "met" } else { "missed" };
     let mut text = format!(
         "# The studio\n\n\
-         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frame of `scenes/hello` \
-         at {} x {}, in headless Chromium on the machine that draws; one of its balls is dragged on a circle, by 125 \
-         moves of the pointer a second. Each picture is sent as the part that differs from the one before; looking around \
-         changes all of it, and is not measured here. The browser is asked by its \
+         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frame of \
+         `scenes/hello` at {} x {}, in headless Chromium on the machine that draws; one of its spheres is dragged on a \
+         circle, by 125 pointer moves per second. The studio sends only the part of a picture that differs from the \
+         one before. Moving the view changes all of it, and is not measured here. The driver uses the browser's \
          debugging protocol without the Network domain, which would copy every picture.\n\n\
-         *Pointer to canvas* is from the time of the pointer's event to the end of `putImageData` of the first picture that \
-         was ordered with it or after it; what the browser takes to show its canvas comes on top. *First picture* is from \
-         opening the page in a browser that runs. *Others* is the share of all processors that programs took which \
-         do not belong to the measurement, *processor ms* what the studio and the browser took; of {} runs the one where that is least counts, run {}.\n\n\
-         | | measured | goal | |\n| --- | --: | --: | --- |\n\
-         | pictures a second | {:.1} | {rate} | {} |\n\
+         *Pointer to canvas* is the time from the pointer's event to the end of `putImageData` of the first picture \
+         that was requested with it or after it; it excludes the browser's time to show its canvas. *First picture* is \
+         the time from opening the page in a running browser. *Others* is the share of all processors used by programs \
+         outside the measurement, *processor ms* the time of the studio and the browser. Of {} runs the one with the \
+         least other load counts, run {}.\n\n\
+         | | measured | goal | |\n\
+         | --- | --: | --: | --- |\n\
+         | pictures per second | {:.1} | {rate} | {} |\n\
          | pointer to canvas, 95 % within, ms | {:.1} | {late} | {} |\n\
          | first picture, ms | {:.0} | {first} | {} |\n\n\
-         ![The share of moves that are on the canvas after so many milliseconds](studio.svg)\n\n\
+         ![The share of moves that are on the canvas by milliseconds](studio.svg)\n\n\
          ## All runs\n\n\
-         | run | others | pictures a second | at whole size | processor ms a picture | pointer to canvas: half within, ms | 95 % | 99 % | first picture, ms |\n\
+         | run | others | pictures per second | at whole size | processor ms per picture | pointer to canvas: half \
+         within, ms | 95 % | 99 % | first picture, ms |\n\
          | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n",
         SIZE.0,
         SIZE.1,
@@ -284,7 +287,7 @@ mod tests {
     fn a_goal_that_is_missed_is_called_so() {
         let run = measured(vec![30.0; 100]);
         let text = report(std::slice::from_ref(&run), &run);
-        assert!(text.contains("| pictures a second | 60.0 | 55 | met |"), "{text}");
+        assert!(text.contains("| pictures per second | 60.0 | 55 | met |"), "{text}");
         assert!(text.contains("| 30.0 | 25 | missed |"), "{text}");
     }
 

@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::console::{Color, Console};
@@ -13,7 +14,7 @@ use crate::elsewhere;
 #[cfg(feature = "network")]
 use crate::network;
 use crate::outcome::{Outcome, exit_code};
-use crate::{check, completions, encode, interrupt, render, split};
+use crate::{check, completions, encode, interrupt, man, render, split};
 
 /// Ray-traced animations from a folder of scene scripts.
 #[derive(Debug, Parser)]
@@ -62,6 +63,7 @@ enum Command {
     #[command(flatten)]
     Network(network::Command),
     Completions(completions::Args),
+    Man(man::Args),
 }
 
 impl Command {
@@ -74,15 +76,36 @@ impl Command {
             #[cfg(feature = "network")]
             Self::Network(command) => command.run(console),
             Self::Completions(args) => completions::run(&args, App::command(), console),
+            Self::Man(args) => man::run(&args, App::command(), console),
         }
+    }
+}
+
+/// Replaces a tip that misleads: no argument is meant to begin with a dash.
+fn correct(error: &mut clap::Error) {
+    if error.kind() != ErrorKind::UnknownArgument {
+        return;
+    }
+    error.remove(ContextKind::Suggested);
+    let is_json =
+        matches!(error.get(ContextKind::InvalidArg), Some(ContextValue::String(name)) if name == "--json");
+    if is_json {
+        let tip = "the flag is '--format json', for commands that have it";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
 }
 
 /// Parses, runs, and says what went wrong.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let mut args: Vec<OsString> = args.into_iter().collect();
+    if args.get(1).is_some_and(|command| command == "help") {
+        // The help of `help` is that of what follows.
+        args.retain(|arg| arg != "--help" && arg != "-h");
+    }
     let app = match App::try_parse_from(args) {
         Ok(app) => app,
-        Err(e) => {
+        Err(mut e) => {
+            correct(&mut e);
             #[cfg(not(feature = "network"))]
             if let Some(message) = elsewhere::missing(&e) {
                 let _ = writeln!(std::io::stderr(), "{message}");
@@ -94,8 +117,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let console = Console::resolve(app.global.quiet, app.global.color);
-    let result = interrupt::listen().map_err(anyhow::Error::new).and_then(|()| app.command.run(&console));
+    let result =
+        interrupt::listen(&console).map_err(anyhow::Error::new).and_then(|()| app.command.run(&console));
     match result {
+        Ok(Outcome::Failed) if interrupt::signalled() => Outcome::Interrupted.into(),
         Ok(outcome) => outcome.into(),
         Err(_) if interrupt::signalled() => {
             console.note("interrupted");

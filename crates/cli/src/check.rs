@@ -41,7 +41,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     format: Format,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, allow_negative_numbers = true, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
     #[command(flatten)]
     threads: Threads,
@@ -61,6 +61,7 @@ struct Report<'a> {
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     stdin_once(&args.input)?;
+    args.threads.tell(console);
     args.threads.start()?;
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let is_settings =

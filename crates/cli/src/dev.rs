@@ -1,10 +1,13 @@
 //! `rayfold dev`: the whole pipeline on this machine, until told to stop.
 //!
-//! An S3 server (the store built in, or MinIO), the bucket, its notifications and the local invoker with the function
-//! binaries. Everything it started ends with it; the data stays, and the next start goes on from there. With a folder it
-//! has its data in a temporary one, submits the scripts, writes the GIF and ends.
+//! An S3 server (the store built in, MinIO or SeaweedFS), the bucket, its notifications and the local invoker with the
+//! function binaries. Everything it started ends with it; the data stays, and the next start goes on from there. With a
+//! folder it has its data in a temporary one, submits the scripts, writes the GIF and ends. With an endpoint it runs the
+//! functions alone, on a bucket of another S3 server (`cluster`).
 
+mod cluster;
 mod news;
+mod stop;
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -27,9 +30,7 @@ use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 use crate::values;
 use news::News;
-
-/// Between two looks at whether to stop.
-const LOOK: Duration = Duration::from_millis(50);
+use stop::interrupted;
 
 /// How long the first lines wait for what was missed since the last run.
 const CATCH_UP: Duration = Duration::from_secs(3);
@@ -50,9 +51,18 @@ const LIMITS: [&str; 7] = [
 /// With a folder of scripts it submits them, writes the GIF and stops: all of it in a temporary folder and on free ports.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Nothing has to be installed: the S3 server is part of rayfold. `--store minio` takes MinIO
-instead, from RAYFOLD_MINIO or the PATH; without one it is installed from source, once, which
-needs Go 1.25 or later. Each keeps objects of its own, `bucket/` and `objects/` in the data folder.
+Nothing has to be installed: the S3 server is part of rayfold. --store minio
+and --store seaweedfs run another server, from RAYFOLD_MINIO or
+RAYFOLD_SEAWEEDFS, or from the PATH. If it is missing, it is built from source
+once, which needs Go. Each store keeps its objects in a folder of its own below
+the data folder: bucket/, objects/, seaweedfs/.
+
+--endpoint runs the functions on a bucket of an S3 server that is running
+already, with the credentials of the standard AWS environment. Several machines
+on one bucket share the work, and take over the work of one that is lost. The
+bucket is listed every second. With --webhook and --webhook-arn a change is
+seen at once: the server sends it to http://IP:PORT/events, with the bearer
+token in RAYFOLD_WEBHOOK_TOKEN.
 
 The functions, rayfold-render and rayfold-assemble, are those in the folder that RAYFOLD_FUNCTIONS
 names; without it those beside rayfold, or on the PATH, or they are built where rayfold was built.
@@ -75,7 +85,9 @@ Examples:
   rayfold dev
       prints what to set in another terminal
   aws s3 sync scenes/hello s3://rayfold/scripts/hello/
-      there; the GIF appears below animations/")]
+      there; the GIF appears below animations/
+  rayfold dev --endpoint http://10.0.0.5:8333 --bucket films
+      on several machines: they share the scripts of one bucket")]
 pub(crate) struct Args {
     /// A folder of scripts, to be made into a GIF
     folder: Option<PathBuf>,
@@ -85,6 +97,15 @@ pub(crate) struct Args {
     /// Run on when the GIF of FOLDER is written
     #[arg(long, requires = "folder")]
     keep: bool,
+    /// Run the functions on a bucket of this S3 server, which is running already
+    #[arg(long, value_name = "URL", value_parser = url, conflicts_with_all = ["folder", "store", "data", "address"])]
+    endpoint: Option<String>,
+    /// Listen there for the webhook of the server of --endpoint
+    #[arg(long, value_name = "IP:PORT", requires_all = ["endpoint", "webhook_arn"])]
+    webhook: Option<SocketAddr>,
+    /// ARN of the webhook on that server, as arn:minio:sqs::NAME:webhook; replaces the bucket's notifications
+    #[arg(long, value_name = "ARN", requires = "webhook")]
+    webhook_arn: Option<String>,
     /// What keeps the bucket
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
     store: StoreKind,
@@ -102,10 +123,27 @@ pub(crate) struct Args {
     bucket: String,
 }
 
+impl Args {
+    /// Applies the arguments to the settings of the invoker and the functions.
+    fn apply(&self, settings: &mut Settings) {
+        settings.concurrency = self.concurrency.map_or_else(usual_concurrency, usize::from);
+        let stuck_after_ms = stuck_after(settings.timeout).as_millis().to_string();
+        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), stuck_after_ms));
+        let own = |name: &str| Some((name.to_owned(), std::env::var(name).ok()?));
+        settings.environment.extend(LIMITS.into_iter().filter_map(own));
+    }
+}
+
 /// The names of the stores, for the flag.
 fn stores() -> impl TypedValueParser<Value = StoreKind> {
     PossibleValuesParser::new(StoreKind::ALL.map(StoreKind::name))
         .map(|name| StoreKind::named(&name).unwrap_or_default())
+}
+
+fn url(text: &str) -> Result<String, &'static str> {
+    let is_url =
+        ["http://", "https://"].iter().any(|scheme| text.len() > scheme.len() && text.starts_with(scheme));
+    if is_url { Ok(text.to_owned()) } else { Err("expected http:// or https:// and a host") }
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -144,6 +182,9 @@ impl Scratch {
 async fn serve(args: &Args, order: Option<&Order>, console: &Console) -> anyhow::Result<Outcome> {
     let mut say = |line: &str| console.note(line);
     let functions = Functions::locate(&mut say)?;
+    if let Some(endpoint) = &args.endpoint {
+        return cluster::serve(endpoint, functions, args, console).await;
+    }
     let scratch = order.map(|_| Scratch::new()).transpose()?;
     let data = match (&scratch, &args.data) {
         (Some(scratch), _) => scratch.folder.path().to_path_buf(),
@@ -157,24 +198,18 @@ async fn serve(args: &Args, order: Option<&Order>, console: &Console) -> anyhow:
     };
     let plan =
         Plan { store: args.store, data: data.clone(), address, bucket: args.bucket.clone(), functions };
-    let settings = |settings: &mut Settings| {
-        settings.concurrency = args.concurrency.map_or_else(usual_concurrency, usize::from);
-        let stuck_after_ms = stuck_after(settings.timeout).as_millis().to_string();
-        settings.environment.push(("RAYFOLD_STUCK_AFTER_MS".into(), stuck_after_ms));
-        let own = |name: &str| Some((name.to_owned(), std::env::var(name).ok()?));
-        settings.environment.extend(LIMITS.into_iter().filter_map(own));
-    };
+    let settings = |settings: &mut Settings| args.apply(settings);
     let start = Platform::start(&plan, settings, &mut say);
     let mut platform = tokio::select! {
         platform = start => match platform {
             Err(error @ Error::DataInUse(_)) => bail!("{error}: stop that one, or choose another folder by --data"),
             Err(error @ Error::MinioFolder(_)) => bail!("{error} by --data"),
-            Err(error @ (Error::NoMinio(_) | Error::Install(_))) => {
-                bail!("{error}. Without `--store minio` nothing has to be installed")
+            Err(error @ (Error::NoServer { .. } | Error::Install { .. })) => {
+                bail!("{error}. Without `--store` nothing has to be installed")
             }
             platform => platform?,
         },
-        () = told_to_stop() => return Ok(Outcome::Interrupted),
+        () = interrupted() => return Ok(Outcome::Interrupted),
     };
     let ended = attend(args, order, &mut platform, (&data, console)).await;
     // Else whatever is still written comes back into a folder that is being removed.
@@ -205,8 +240,8 @@ async fn attend(
                     Some(observation) => news.hear(&observation),
                     None => bail!("the invoker has ended"),
                 },
-                status = platform.server().ended() => bail!("MinIO has ended ({status})"),
-                () = told_to_stop() => return Ok(Outcome::Interrupted),
+                status = platform.server().ended() => bail!("{} has ended ({status})", args.store),
+                () = interrupted() => return Ok(Outcome::Interrupted),
             }
         }
         if !args.keep {
@@ -230,26 +265,20 @@ async fn attend(
             },
             () = news.tick() => news.look().await,
             status = platform.server().ended() => {
-                bail!("MinIO has ended ({status}); its log is in {}", data.display());
+                bail!("{} has ended ({status}); its log is in {}", args.store, data.display());
             }
-            () = told_to_stop() => break,
+            () = interrupted() => break,
         }
     }
     console.note("stopping");
     Ok(Outcome::Done)
 }
 
-async fn told_to_stop() {
-    while !interrupt::stopping() {
-        tokio::time::sleep(LOOK).await;
-    }
-}
-
 /// What the other store keeps in the same data folder is not what is shown now.
 fn left_alone(other: StoreKind, data: &Path) -> String {
     let flag = match other {
-        StoreKind::BuiltIn => "without --store",
-        StoreKind::Minio => "by --store minio",
+        StoreKind::BuiltIn => "without --store".to_owned(),
+        StoreKind::Minio | StoreKind::SeaweedFs => format!("by --store {}", other.name()),
     };
     let objects = other.objects(data);
     format!("{} has objects of {other}, which stay there; they are shown {flag}", objects.display())

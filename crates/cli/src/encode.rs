@@ -1,62 +1,85 @@
-//! `rayfold encode`: images that are already there to an animation.
+//! `rayfold encode`: turns existing images into an animation.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use image::RgbImage;
 use rayfold_files::probe;
 use rayfold_gif::{Encoder, Plays, Settings};
-use rayfold_scene::natural_cmp;
+use rayfold_scene::{SETTINGS_FILE, natural_cmp};
 
 use crate::ahead;
 use crate::console::Console;
+use crate::input::{is_stdin, must_be_new, must_not_replace, stdin_once};
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 use crate::playback::Playback;
 use crate::progress::Progress;
-use crate::render::movie::{self, MovieError};
-use crate::render::target::{Container, Movie, Place, must_be_gif};
+use crate::render::movie::{self, MovieError, Push};
+use crate::render::target::{Container, Movie, Place, Target};
+use crate::render::{check_max_size, fit};
 use crate::threads::Threads;
 use crate::values;
 use crate::wording::number;
 
+mod durations;
 mod picture;
+mod source;
 mod tiff;
+mod video;
 
 use picture::Picture;
 
-/// Files at fault that are named, at most.
-const MOST_TOLD: usize = 20;
+/// The largest number of faulty files that are named.
+const MAX_TOLD: usize = 20;
 
-/// Memory that images ahead of the encoder may take, in bytes: two of 1920 x 1080.
+/// The largest memory for images that wait for the encoder, in bytes: two of 1920 x 1080.
 const AHEAD: u64 = 14 << 20;
 
-/// Turn images into an animated GIF
+/// Turn images into an animation
 ///
-/// Every image is a frame, and all are of one size; of an animated PNG each frame is one, of a TIFF each page. What is
-/// transparent is shown over black.
+/// Every image is a frame, and all are of one size; of an animated GIF, PNG or WebP and of a .y4m each frame is one, of
+/// a TIFF each page. What is transparent is shown over black.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   rayfold encode frames/*.png -o hello.gif
-  rayfold encode a.png b.png a.png --no-sort -o blink.gif --fps 2 --loop 3")]
+  rayfold encode a.png b.png a.png --no-sort -o blink.gif --fps 2 --loop 3
+  rayfold encode old.gif -o new.apng
+      every frame keeps its time
+  ffmpeg -i film.mp4 -pix_fmt yuv444p -f yuv4mpegpipe - | rayfold encode - -o film.gif
+      from another program; see docs/video.md")]
 pub(crate) struct Args {
-    /// PNG or TIFF files; they are shown in natural order of their names: f2.png before f10.png
+    /// PNG, JPEG, GIF, WebP, TIFF or .y4m files, or - for standard input; they are shown in natural order of their
+    /// names: f2.png before f10.png
     #[arg(required = true, value_name = "FRAME")]
     frames: Vec<PathBuf>,
-    /// The GIF to write
-    #[arg(long, short, value_name = "OUT.gif")]
+    /// File to write: .gif, .apng, .webp or .y4m; - is standard output
+    #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
+    /// Format of the file, whatever the ending of OUT [default: by the ending; for -, gif]
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    format: Option<Container>,
+    /// Leave a file that is there already, and fail
+    #[arg(long)]
+    no_clobber: bool,
     /// Show the files in the order in which they are given
     #[arg(long)]
     no_sort: bool,
-    /// Frames a second; above 50 some are left out, because a GIF cannot show them, but never the last
-    #[arg(long, value_name = "RATE", default_value_t = Settings::default().fps, value_parser = values::rate, allow_negative_numbers = true)]
-    fps: f64,
+    /// Frames a second, such as 25, 12.5 or 30000/1001; above 50 some are left out, because a GIF cannot show them, but
+    /// never the last [default: the times of an animated file, the rate of a .y4m, or 10]
+    #[arg(long, value_name = "RATE", value_parser = values::rate, allow_negative_numbers = true)]
+    fps: Option<f64>,
+    /// Durations of frames, as JSON: {"5": 0.5} shows the fifth for half a second. An animation.json is such a file, too
+    #[arg(long, value_name = "FILE")]
+    durations: Option<PathBuf>,
     #[command(flatten)]
     playback: Playback,
-    /// Keep every frame of at most 256 colours exactly. Without this flag, a slow fade of a large image (more than 100,000
+    /// Reduce the levels of colours until the .gif or .webp has at most this size, such as 8M or 500k
+    #[arg(long, value_name = "SIZE", value_parser = values::bytes, allow_negative_numbers = true)]
+    max_size: Option<u64>,
+    /// In a .gif, keep every frame of at most 256 colours exactly. Without this flag, a slow fade of a large image (more than 100,000
     /// pixels) may be off by up to 4 levels of 255, in a file several times smaller
     #[arg(long)]
     exact: bool,
@@ -65,51 +88,117 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    must_be_gif(&args.output)?;
-    probe(&args.output)?;
-    let fps = args.fps;
-    Encoder::new(std::io::sink(), Settings { fps, ..Settings::default() })
-        .map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
+    let (container, place) = target(args)?;
+    stdin_once(&args.frames)?;
+    if let Place::File(path) = &place {
+        if args.no_clobber {
+            must_be_new(path)?;
+        }
+        must_not_replace(path, args.frames.iter().map(PathBuf::as_path))?;
+        probe(path)?;
+    }
+    if let Some(fps) = args.fps {
+        Encoder::new(std::io::sink(), Settings { fps, ..Settings::default() })
+            .map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
+    }
+    let durations = args.durations.as_deref().map(durations::read).transpose()?.unwrap_or_default();
+    tell_of_settings(args, console);
     let of_file = pictures(&args.frames, console)?;
     let pictures: Vec<&Picture> = in_order(args, console).iter().flat_map(|file| &of_file[file]).collect();
+    args.threads.tell(console);
     args.threads.start()?;
+    let frames = pictures.iter().map(|picture| picture.frames).sum::<Option<u64>>();
+    if let (Some(frames), Some((&frame, _))) = (frames, durations.last_key_value())
+        && frame > frames
+    {
+        anyhow::bail!("--durations gives frame {frame} a time, but there are {}", number(frames, "frame"));
+    }
+    let fps = args.fps.or_else(|| pictures.iter().find_map(|picture| picture.fps()));
+    let fps = fps.unwrap_or(Settings::default().fps);
     let movie = Movie {
         size: pictures.first().context("at least one frame")?.size()?,
-        frames: pictures.iter().map(|picture| picture.frames).sum(),
+        frames,
         fps,
         plays: args.playback.plays(Plays::Endless),
         last_delay_cs: args.playback.last_delay_cs(),
         exact: args.exact,
     };
-    let mut progress = Progress::start(console, "frames", movie.frames);
-    let place = Place::File(args.output.clone());
-    let written = movie::write(&place, Container::Gif, movie, |push| {
+    let progress = Progress::start(console, "frames", frames.unwrap_or_default());
+    let fill = |push: Push<'_>| {
         let (mut of_images, mut done) = (pictures.iter(), 0);
         let take = |image: Option<RgbImage>| {
             let picture = of_images.next().context("a picture for each image")?;
-            let mut take_one = |image| {
+            let mut take_one = |image, own: Option<f64>| {
                 anyhow::ensure!(!interrupt::stopping(), "interrupted");
-                push(image).map_err(|error| explain(error, &picture.path))?;
                 done += 1;
+                let seconds = durations.get(&done).copied().or(own.filter(|_| args.fps.is_none()));
+                push(image, seconds).map_err(|error| explain(error, &picture.name()))?;
                 progress.set(console, done);
                 Ok(())
             };
             match image {
-                Some(image) => take_one(image),
+                Some(image) => take_one(image, None),
                 // Each frame needs the one before it.
                 None => picture.decode_each(&mut take_one),
             }
         };
-        // On a thread of the pool: it need not wait for another one to encode.
+        // On a thread of the pool, so that it need not wait for another thread to encode.
         rayon::scope(|_| {
             ahead::in_order(pictures.iter(), window(movie.size), |picture| picture.decode(), take)
         })
-    })?;
-    movie::tell(&place, &written, fps, progress.finish(), console);
+    };
+    let written = match args.max_size {
+        None => movie::write(&place, container, movie, fill),
+        Some(limit) => fit::write(&place, container, movie, limit, console, fill),
+    };
+    let took = progress.finish();
+    match written {
+        Ok(written) => movie::tell(&place, &written, fps, took, console),
+        Err(error) if matches!(error.downcast_ref(), Some(MovieError::Closed)) => console.note(error),
+        Err(error) => return Err(error),
+    }
     Ok(Outcome::Done)
 }
 
-/// The files as they are shown. That they are not in the order in which they were given is told.
+/// Returns the container to write, and its place.
+fn target(args: &Args) -> Result<(Container, Place), Usage> {
+    let shown = args.output.display();
+    let format = args.format.or_else(|| is_stdin(&args.output).then_some(Container::Gif));
+    let target = Target::parse(&args.output, format)?;
+    check_max_size(args.max_size, &target)?;
+    let Target::Animation(container, place) = target else {
+        return Err(Usage(format!(
+            "cannot write {shown}: an animation is expected, such as .gif or .apng; images are made already"
+        )));
+    };
+    if container == Container::Y4m && args.playback.is_given() {
+        return Err(Usage(
+            "--loop, --once and --final-delay are for .gif, .apng and .webp: a .y4m holds frames and their rate alone"
+                .into(),
+        ));
+    }
+    if args.exact && container != Container::Gif {
+        return Err(Usage("--exact is for .gif: every other output keeps all colours of a frame".into()));
+    }
+    Ok((container, place))
+}
+
+/// Reports an animation.json beside the images, which is for scripts and not read here.
+fn tell_of_settings(args: &Args, console: &Console) {
+    let folders: BTreeSet<&Path> = args.frames.iter().filter_map(|file| file.parent()).collect();
+    for folder in folders {
+        let settings = folder.join(SETTINGS_FILE);
+        if settings.is_file() && args.durations.as_ref() != Some(&settings) {
+            console.note(format_args!(
+                "{} is not read: --fps, --loop and --durations say how to show images",
+                settings.display()
+            ));
+        }
+    }
+}
+
+/// Returns the files in the order in which they are shown, and reports if that is not the order in which they were
+/// given.
 fn in_order(args: &Args, console: &Console) -> Vec<PathBuf> {
     let mut files = args.frames.clone();
     if !args.no_sort {
@@ -128,36 +217,38 @@ fn in_order(args: &Args, console: &Console) -> Vec<PathBuf> {
     files
 }
 
-/// How many images may be read before the encoder takes them.
+/// Returns how many images may be read before the encoder takes them.
 fn window((width, height): (u32, u32)) -> usize {
     let most = rayon::current_num_threads() + 2;
     let images = AHEAD / (3 * u64::from(width) * u64::from(height)).max(1);
     usize::try_from(images).unwrap_or(most).clamp(1, most)
 }
 
-/// Names the file that is at fault.
-fn explain(error: MovieError, file: &Path) -> anyhow::Error {
+/// Adds the name of the faulty file to an error.
+fn explain(error: MovieError, name: &str) -> anyhow::Error {
     let of_the_frame = matches!(error, MovieError::Gif(_));
     let error = anyhow::Error::new(error);
-    if of_the_frame { error.context(file.display().to_string()) } else { error }
+    if of_the_frame { error.context(name.to_owned()) } else { error }
 }
 
-/// Looks at all files before any is encoded: that each is there, and a PNG or TIFF image of how many frames.
+/// Examines all files before any is encoded: the kind of each, and its number of frames.
 ///
 /// # Errors
-/// When one is not; each is reported.
+/// When a file cannot be shown; each such file is reported.
 fn pictures(files: &[PathBuf], console: &Console) -> anyhow::Result<HashMap<PathBuf, Vec<Picture>>> {
     let mut pictures = HashMap::new();
     let mut faults = Vec::new();
     for path in files {
-        match Picture::all_of(path) {
+        let all = if is_stdin(path) { Picture::all_of_stdin() } else { Picture::all_of(path) };
+        match all {
             Ok(all) => _ = pictures.insert(path.clone(), all),
+            Err(error) if interrupt::signalled() => return Err(error),
             Err(fault) => faults.push(fault),
         }
     }
     if faults.is_empty() {
         return Ok(pictures);
     }
-    faults.iter().take(MOST_TOLD).for_each(|fault| console.error(fault));
+    faults.iter().take(MAX_TOLD).for_each(|fault| console.error(fault));
     anyhow::bail!("{} of {} cannot be used", faults.len(), number(files.len() as u64, "file"))
 }

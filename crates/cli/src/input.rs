@@ -44,6 +44,11 @@ enum Place {
 }
 
 impl Input {
+    /// The files that are read.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.scripts.iter().filter_map(ScriptFile::path).chain(self.settings.as_deref())
+    }
+
     /// Of an animation: one folder, or scripts.
     ///
     /// # Errors
@@ -168,6 +173,34 @@ fn is_nameless_pipe(input: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
     let is_pipe = input.metadata().is_ok_and(|metadata| metadata.file_type().is_fifo());
     is_pipe && (input.starts_with("/dev/fd") || input.canonicalize().is_err())
+}
+
+/// # Errors
+/// When there is a file of this name.
+pub(crate) fn must_be_new(output: &Path) -> anyhow::Result<()> {
+    let is_there = output.symlink_metadata().is_ok();
+    anyhow::ensure!(!is_there, "{} exists already, and --no-clobber keeps it", output.display());
+    Ok(())
+}
+
+/// # Errors
+/// When the file that is to be written is one of those that are read.
+pub(crate) fn must_not_replace<'a>(
+    output: &Path,
+    mut inputs: impl Iterator<Item = &'a Path>,
+) -> Result<(), Usage> {
+    let Ok(place) = output.canonicalize() else { return Ok(()) };
+    match inputs.find(|input| input.canonicalize().is_ok_and(|input| input == place)) {
+        None => Ok(()),
+        Some(input) if input == output => {
+            Err(Usage(format!("{} would replace its input: expected another output", output.display())))
+        }
+        Some(input) => Err(Usage(format!(
+            "{} would replace the input {}: expected another output",
+            output.display(),
+            input.display()
+        ))),
+    }
 }
 
 /// It is `-`, which is no file.

@@ -1,4 +1,5 @@
-//! Stopping on a signal (Ctrl-C, SIGTERM, SIGHUP): the first time in order, the second time at once.
+//! Stopping on a signal (Ctrl-C, SIGTERM, SIGHUP): the first time in order, the second time at once. A run that has not
+//! stopped in order after [`GRACE`] is ended at once, too, unless it has asked for [`patience`].
 //!
 //! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary files
 //! on the way out. At once means that only those files are removed. What the system may let us wait for without end (a
@@ -11,9 +12,16 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use crate::console::Console;
+
 static STOPPING: AtomicBool = AtomicBool::new(false);
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// The time limit for an orderly stop: a user should wait for less than a second.
+const GRACE: Duration = Duration::from_millis(700);
+
+static PATIENT: AtomicBool = AtomicBool::new(false);
 
 /// Between two looks at whether a signal has come.
 const LOOK: Duration = Duration::from_millis(20);
@@ -23,30 +31,50 @@ const LOOK: Duration = Duration::from_millis(20);
 /// # Errors
 /// When the system refuses a handler.
 #[cfg(unix)]
-pub(crate) fn listen() -> std::io::Result<()> {
+pub(crate) fn listen(console: &Console) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let wanted =
         [SIGHUP, SIGINT, SIGTERM, SIGXFSZ].into_iter().filter(|signal| !is_ignored(*signal, &status));
     let mut signals = signal_hook::iterator::Signals::new(wanted)?;
+    let console = *console;
     std::thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever().filter(|signal| *signal != SIGXFSZ) {
             if SIGNAL.swap(signal, Ordering::SeqCst) != 0 {
-                rayfold_files::remove_unfinished();
-                for folder in &*folders() {
-                    let _ = std::fs::remove_dir_all(folder);
-                }
-                std::process::exit(exit_code());
+                end_at_once();
             }
             stop();
+            if !PATIENT.load(Ordering::SeqCst) {
+                // If there is no thread for it, a second signal is needed.
+                let _ = std::thread::Builder::new().name("grace".into()).spawn(move || {
+                    std::thread::sleep(GRACE);
+                    console.note("interrupted");
+                    end_at_once();
+                });
+            }
         }
     })?;
     Ok(())
 }
 
+/// Ends the program without waiting for any work. Files that are not complete are removed.
+fn end_at_once() -> ! {
+    rayfold_files::remove_unfinished();
+    for folder in &*folders() {
+        let _ = std::fs::remove_dir_all(folder);
+    }
+    std::process::exit(exit_code());
+}
+
+/// Lets the run take its time to stop in order: it has other programs to stop, or others to answer.
+#[cfg(feature = "network")]
+pub(crate) fn patience() {
+    PATIENT.store(true, Ordering::SeqCst);
+}
+
 /// Elsewhere Ctrl-C keeps its default, which ends the program at once.
 #[cfg(not(unix))]
-pub(crate) fn listen() -> std::io::Result<()> {
+pub(crate) fn listen(_: &Console) -> std::io::Result<()> {
     Ok(())
 }
 

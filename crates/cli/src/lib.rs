@@ -20,6 +20,7 @@ mod elsewhere;
 mod encode;
 mod input;
 mod interrupt;
+mod man;
 #[cfg(feature = "network")]
 mod network;
 mod outcome;

@@ -9,7 +9,7 @@ use crate::console::Console;
 #[cfg(unix)]
 use crate::dev;
 use crate::outcome::Outcome;
-use crate::{cost, studio};
+use crate::{cost, interrupt, studio};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
@@ -35,7 +35,11 @@ impl Command {
             Self::Retry(args) => retry::run(&args, console),
             Self::Remove(args) => remove::run(&args, console),
             #[cfg(unix)]
-            Self::Dev(args) => dev::run(&args, console),
+            Self::Dev(args) => {
+                // The store and the functions are programs of their own.
+                interrupt::patience();
+                dev::run(&args, console)
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Every script is parsed once to learn its faults and the shape of its frames. Small scripts are kept; beyond
 //! [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -21,8 +22,14 @@ use crate::wording::number;
 /// Bytes of text of which the parsed scripts are kept; they take about as much again.
 const KEPT_TEXT: usize = 64 << 20;
 
-/// Memory that frames ahead of the encoder may take, in bytes: fifteen images of 1920 x 1080 with what goes with them.
+/// Memory that frames ahead of the encoder may take, in bytes: two images of 1920 x 1080 while they are drawn.
 const AHEAD: u64 = 192 << 20;
+
+/// Bytes of a pixel while it is drawn: its samples, its levels, and what these are encoded into.
+const OF_PIXEL: u64 = 48;
+
+/// The fewest frames at once: one is drawn while another is encoded.
+const FEWEST: usize = 2;
 
 /// Pixels of a side that a GIF has room for.
 const LONGEST_SIDE: u32 = 65_535;
@@ -88,6 +95,8 @@ pub(crate) enum PlanError {
     NoSuchFrame { frames: u64, wanted: u64 },
     #[error("{SETTINGS_FILE} says {}, but the scripts give {frames}", number(*.expected, "frame"))]
     TooFew { frames: u64, expected: u64 },
+    #[error("{SETTINGS_FILE} gives frame {frame} a duration, but there are {}", number(*.frames, "frame"))]
+    NoFrameToTime { frames: u64, frame: u64 },
     #[error(
         "--size needs a pinhole camera: frame {frame} ({name}) is drawn by Orthocamera, whose pixels are world units"
     )]
@@ -149,6 +158,9 @@ impl Plan {
             faults.add(found);
             parts.extend(part);
         }
+        if wishes.samples.is_some_and(|samples| samples.most() > 1) {
+            faults.samples_are_asked_for();
+        }
         let settings = settings.flatten().unwrap_or_default();
         let plan = (faults.bad == 0).then(|| Self::of(parts, settings, limits, wishes));
         Ok((faults, plan))
@@ -165,6 +177,9 @@ impl Plan {
             && frames < expected
         {
             return Err(PlanError::TooFew { frames, expected });
+        }
+        if let Some((&frame, _)) = settings.durations().range(frames + 1..).next() {
+            return Err(PlanError::NoFrameToTime { frames, frame });
         }
         let (first, last) = (wishes.frames.0.unwrap_or(1), wishes.frames.1.unwrap_or(frames));
         if let Some(wanted) = [first, last].into_iter().find(|n| *n < 1 || *n > frames) {
@@ -224,12 +239,12 @@ impl Plan {
     pub(crate) fn window(&self) -> usize {
         let bytes = |shape: &Shape| {
             let pixels = self.size.unwrap_or(shape.screen).pixels();
-            // The image and what it is encoded into; objects and what finds them quickly.
-            6 * pixels + 400 * shape.objects as u64
+            // Objects and what finds them quickly.
+            OF_PIXEL * pixels + 400 * shape.objects as u64
         };
         let largest = self.runs().map(|(_, _, shape)| bytes(shape)).max().unwrap_or(1);
         let most = 4 * rayon::current_num_threads();
-        usize::try_from(AHEAD / largest).unwrap_or(most).clamp(1, most)
+        usize::try_from(AHEAD / largest).unwrap_or(most).clamp(FEWEST, most)
     }
 
     /// The frames to draw, in order.
@@ -241,6 +256,32 @@ impl Plan {
             .map(|((part, index), number)| Job { number, part, index })
             .skip(skip)
             .take(self.len() as usize)
+    }
+
+    /// The frames to draw in the order in which an animation shows them, which may run back after the last.
+    pub(crate) fn shown(&self) -> impl Iterator<Item = Job> + '_ {
+        let back = if self.settings.bounces() {
+            let inner = usize::try_from(self.len().saturating_sub(2)).unwrap_or(usize::MAX);
+            self.jobs().skip(1).take(inner).collect()
+        } else {
+            Vec::new()
+        };
+        self.jobs().chain(back.into_iter().rev())
+    }
+
+    /// Returns the number of frames that an animation shows.
+    pub(crate) fn shown_count(&self) -> u64 {
+        self.settings.shown_count(self.len())
+    }
+
+    /// Returns the durations of frames in seconds, by their index among the frames that an animation shows, from 0.
+    ///
+    /// # Errors
+    /// None: the times were checked before.
+    pub(crate) fn durations(&self) -> anyhow::Result<BTreeMap<u64, f64>> {
+        let selected = self.settings.durations().range(self.selected.clone());
+        let own = selected.map(|(frame, seconds)| (frame + 1 - self.selected.start(), *seconds)).collect();
+        Ok(self.settings.clone().with_durations(own)?.shown_durations(self.len()))
     }
 
     /// What a frame is drawn from.

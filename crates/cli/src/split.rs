@@ -8,7 +8,7 @@ use rayfold_files::OutputFile;
 use rayfold_scene::{Limits, Name};
 
 use crate::console::Console;
-use crate::input::Input;
+use crate::input::{Input, must_not_replace};
 use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::survey::Faults;
@@ -31,7 +31,7 @@ pub(crate) struct Args {
     /// The folder to write to; it is made when it is not there
     dir: PathBuf,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, allow_negative_numbers = true, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
 }
 
@@ -56,6 +56,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let ours: BTreeSet<String> = (1..=script.frame_count()).map(name).collect();
     refuse_strangers(folder, &ours)?;
+    for number in 1..=script.frame_count() {
+        must_not_replace(&folder.join(name(number)), input.files())?;
+    }
     for number in 1..=script.frame_count() {
         anyhow::ensure!(!interrupt::stopping(), "interrupted");
         let frame = script.only(number - 1).context("a frame of the script is missing")?;

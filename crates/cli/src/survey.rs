@@ -80,6 +80,11 @@ impl Faults {
         self.sort_out(parsed)
     }
 
+    /// Forgets the advice to use several rays a pixel, because the command line asks for them.
+    pub(crate) fn samples_are_asked_for(&mut self) {
+        self.diagnostics.retain(|diagnostic| diagnostic.code != Code::NeedsSamples);
+    }
+
     /// Notes an input that could not even be listed.
     pub(crate) fn unusable(&mut self, error: anyhow::Error) {
         let _: Option<()> = self.sort_out(Err(error));
@@ -116,7 +121,9 @@ impl Faults {
             console.error(error);
         }
         for diagnostic in &self.diagnostics {
-            if diagnostic.is_error() || !console.quiet {
+            if diagnostic.code == Code::NotText {
+                console.fault(&diagnostic.file, &diagnostic.message);
+            } else if diagnostic.is_error() || !console.quiet {
                 console.say(format_args!("{}\n", diagnostic.render(console.color)));
             }
         }

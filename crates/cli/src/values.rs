@@ -7,7 +7,7 @@ use rayfold_scene::{Samples, Screen};
 /// A whole number of `1` or more.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn count<T: FromStr + Default + PartialEq>(text: &str) -> Result<T, String> {
     match text.parse::<T>() {
         Ok(number) if number != T::default() => Ok(number),
@@ -18,7 +18,7 @@ pub(crate) fn count<T: FromStr + Default + PartialEq>(text: &str) -> Result<T, S
 /// How often an animation is repeated; 0 is for ever.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn repetitions(text: &str) -> Result<u16, String> {
     text.parse().map_err(|_| format!("expected a whole number from 0, which is for ever, to {}", u16::MAX))
 }
@@ -26,18 +26,17 @@ pub(crate) fn repetitions(text: &str) -> Result<u16, String> {
 /// A number of any size and sign; whoever takes it knows its bounds.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate) if rate.is_finite() => Ok(rate),
-        _ => Err("expected a number, such as 25 or 12.5".into()),
-    }
+    let rate = text.parse::<f64>().ok().or_else(|| rayfold_scene::fraction(text));
+    rate.filter(|rate| rate.is_finite())
+        .ok_or_else(|| "expected a number, such as 25 or 12.5, or a fraction, such as 30000/1001".into())
 }
 
 /// Seconds as hundredths of one, which is how an animation counts.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn hundredths(text: &str) -> Result<u16, String> {
     let expected = "expected seconds from 0.02 to 655.35, such as 1.5";
     let value = text.parse::<f64>().map_err(|_| expected)? * 100.0;
@@ -48,7 +47,7 @@ pub(crate) fn hundredths(text: &str) -> Result<u16, String> {
 /// Rays a pixel and the error that is aimed at, as `64` or `64,0.5`.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn samples(text: &str) -> Result<Samples, String> {
     let expected =
         "expected rays a pixel, 1 or more, and after a comma the error in levels, such as 64 or 64,0.5";
@@ -60,10 +59,28 @@ pub(crate) fn samples(text: &str) -> Result<Samples, String> {
     Samples::new(most, error).map_err(|_| expected.into())
 }
 
+/// A size in bytes, as `8M` or `500k`; a unit is a power of 1,000.
+///
+/// # Errors
+/// The message says what was expected.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let expected = "expected a size such as 8M, 1.5MB or 500k";
+    let lower = text.to_ascii_lowercase();
+    let digits = lower.trim_end_matches('b');
+    let (digits, unit) = match digits.strip_suffix(['k', 'm', 'g']) {
+        Some(rest) if digits.ends_with('k') => (rest, 1e3),
+        Some(rest) if digits.ends_with('m') => (rest, 1e6),
+        Some(rest) => (rest, 1e9),
+        None => (digits, 1.0),
+    };
+    let size = digits.trim_end().parse::<f64>().map_err(|_| expected)? * unit;
+    if (1.0..=1e15).contains(&size) { Ok(size as u64) } else { Err(expected.into()) }
+}
+
 /// Width and height, as `640x480`.
 ///
 /// # Errors
-/// What was expected.
+/// The message says what was expected.
 pub(crate) fn size(text: &str) -> Result<Screen, String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     let (width, height) = sides.ok_or("expected width and height in pixels, such as 640x480")?;
@@ -79,6 +96,24 @@ mod tests {
         assert_eq!(size("640x480"), Ok(Screen::new(640, 480).unwrap()));
         for wrong in ["", "640", "640x", "0x480", "640x480x3", "-1x2", "6.4x3"] {
             assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn rates_may_be_fractions() {
+        assert_eq!(["25", "12.5", "30000/1001"].map(rate), [Ok(25.0), Ok(12.5), Ok(30_000.0 / 1_001.0)]);
+        for wrong in ["", "x", "30000/", "/1001", "1/0", "1/2/3", "nan", "inf"] {
+            assert!(rate(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_files_have_units() {
+        let read = ["8M", "8 MB", "1.5m", "500k", "500kB", "2G", "12345", "12b"].map(bytes);
+        let expect = [8_000_000, 8_000_000, 1_500_000, 500_000, 500_000, 2_000_000_000, 12_345, 12];
+        assert_eq!(read, expect.map(Ok));
+        for wrong in ["", "M", "0", "-8M", "8X", "eight", "nan", "inf", "1e99"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
         }
     }
 

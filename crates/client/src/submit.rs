@@ -97,8 +97,8 @@ struct Difference {
 /// # Errors
 /// [`Error::Settings`] if the number is 0.
 pub fn settings_with_frames(settings: &AnimationSettings, frames: u64) -> Result<File> {
-    let counted = AnimationSettings::new(Some(frames), settings.fps(), settings.loops());
-    let counted = counted.map_err(|source| Error::Settings(source.into()))?;
+    let counted =
+        settings.clone().with_frames(Some(frames)).map_err(|source| Error::Settings(source.into()))?;
     let text = serde_json::to_string_pretty(&counted).map_err(|source| Error::Settings(source.into()))?;
     Ok(File::of_text(text + "\n"))
 }

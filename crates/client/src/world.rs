@@ -16,8 +16,8 @@ use rayfold_pipeline::store::{
     UnfinishedUpload,
 };
 use rayfold_pipeline::{
-    Animator, Clock, Drawing, Encoding, Invocation, Joining, Policy, Randomness, Renderer, Result, Timestamp,
-    Unfit, assemble, render_frame,
+    Animator, BandJoiner, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result,
+    Timestamp, Unfit, assemble, render_frame,
 };
 use rayfold_scene::AnimationSettings;
 
@@ -230,7 +230,7 @@ impl World {
 struct OneLine;
 
 impl Renderer for OneLine {
-    type Joining = Whole;
+    type BandJoiner = Whole;
 
     fn most_bytes(&self) -> u64 {
         1_000
@@ -263,7 +263,7 @@ impl Renderer for OneLine {
 /// A joiner that is never used, because no frame is in bands.
 enum Whole {}
 
-impl Joining for Whole {
+impl BandJoiner for Whole {
     async fn push(&mut self, _: Bytes) -> Result<(), Reason> {
         match *self {}
     }

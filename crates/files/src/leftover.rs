@@ -2,20 +2,25 @@
 //!
 //! A run keeps a lock on its temporary file while it writes. The system releases the lock when the run ends, however
 //! it ends. Only files with a name of this crate's pattern are removed.
+//!
+//! Some network drives do not pass locks on to other machines. So a name begins with a mark of the running system, and
+//! a file of another system must be old to count as left behind.
 
 use std::collections::HashSet;
 use std::fs::{File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, SystemTime};
 
 const BEFORE: &str = ".rayfold-";
 const AFTER: &str = ".part";
 const DIGITS: usize = 12;
 
-/// The time since the last write after which an unlocked temporary file counts as left behind. A file is locked right
-/// after it is made, so any time longer than that would do.
+/// The digits of the system's mark; the others are random.
+const MARK_DIGITS: usize = 4;
+
+/// The time since the last write after which an unlocked temporary file of another system counts as left behind.
 const AGE: Duration = Duration::from_secs(60 * 60);
 
 /// The same time on file systems without locks. A run may still be writing there, but no frame takes days.
@@ -24,7 +29,26 @@ const AGE_WITHOUT_LOCKS: Duration = Duration::from_secs(7 * 24 * 60 * 60);
 /// Returns a name that no other run uses, short enough for every file system.
 pub(crate) fn temporary_name() -> String {
     let random = RandomState::new().hash_one(std::process::id());
-    format!("{BEFORE}{:0DIGITS$x}{AFTER}", random >> (64 - 4 * DIGITS))
+    let (mark, digits) = (mark().unwrap_or(random >> 16), DIGITS - MARK_DIGITS);
+    format!("{BEFORE}{:0MARK_DIGITS$x}{:0digits$x}{AFTER}", mark >> 48, random >> (64 - 4 * digits))
+}
+
+/// A mark of the system that runs, from its start to its end; `None` where it has no name.
+fn mark() -> Option<u64> {
+    static MARK: OnceLock<Option<u64>> = OnceLock::new();
+    *MARK.get_or_init(|| {
+        let name = std::fs::read("/proc/sys/kernel/random/boot_id").ok()?;
+        // FNV-1a, which is the same in every run.
+        Some(name.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
+        }))
+    })
+}
+
+/// Says whether a temporary file was made on the system that runs.
+fn is_of_this_system(name: &str) -> bool {
+    let digits = name.strip_prefix(BEFORE).and_then(|rest| rest.get(..MARK_DIGITS));
+    digits.zip(mark()).is_some_and(|(digits, mark)| digits == format!("{:0MARK_DIGITS$x}", mark >> 48))
 }
 
 fn is_temporary(name: &str) -> bool {
@@ -47,25 +71,32 @@ pub(crate) fn remove_leftovers(folder: &Path) {
 fn remove_older(folder: &Path, now: SystemTime) {
     let Ok(entries) = folder.read_dir() else { return };
     for entry in entries.flatten() {
-        let is_ours = entry.file_name().to_str().is_some_and(is_temporary);
+        let name = entry.file_name();
+        let Some(name) = name.to_str().filter(|name| is_temporary(name)) else { continue };
         // For a link with such a name, the type of the link itself counts.
-        if is_ours && entry.file_type().is_ok_and(|of| of.is_file()) && is_abandoned(&entry.path(), now) {
-            let _ = std::fs::remove_file(entry.path());
+        if entry.file_type().is_ok_and(|of| of.is_file()) {
+            let age = if is_of_this_system(name) { Duration::ZERO } else { AGE };
+            remove_if_abandoned(&entry.path(), now, age);
         }
     }
 }
 
-fn is_abandoned(path: &Path, now: SystemTime) -> bool {
-    let Ok(modified) = path.metadata().and_then(|metadata| metadata.modified()) else { return false };
+fn remove_if_abandoned(path: &Path, now: SystemTime, least: Duration) {
+    let Ok(modified) = path.metadata().and_then(|metadata| metadata.modified()) else { return };
     let age = now.duration_since(modified).unwrap_or_default();
-    if age < AGE {
-        return false;
+    if age < least {
+        return;
     }
-    match File::open(path).map(|file| file.try_lock()) {
+    let file = File::open(path);
+    let is_abandoned = match file.as_ref().map(File::try_lock) {
         Ok(Ok(())) => true,
         Ok(Err(TryLockError::WouldBlock)) => false,
         // A mode of 0200 denies this process to read the file, but its writer may still be running.
         Ok(Err(TryLockError::Error(_))) | Err(_) => age >= AGE_WITHOUT_LOCKS,
+    };
+    if is_abandoned {
+        // The lock is held until the file is gone, so that a run that has just made it notices.
+        let _ = std::fs::remove_file(path);
     }
 }
 
@@ -120,5 +151,18 @@ mod tests {
         drop(running);
         remove_older(path, SystemTime::now());
         assert!(!path.join(".rayfold-000000000003.part").exists(), "its run has ended");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_run_on_this_system_left_goes_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        let (left, written) = (temporary_name(), temporary_name());
+        drop(made(path, &left, Duration::ZERO));
+        let running = made(path, &written, Duration::ZERO);
+        running.try_lock().unwrap();
+        remove_older(path, SystemTime::now());
+        assert!(!path.join(left).exists() && path.join(written).exists());
     }
 }

@@ -1,7 +1,7 @@
 //! Writing: a temporary file that replaces its target when it is complete.
 
-use std::fs::{File, Metadata, OpenOptions};
-use std::io::{self, Write};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -131,6 +131,15 @@ impl OutputFile {
         Ok(Self { path: path.to_path_buf(), place, temporary, file })
     }
 
+    /// Replaces bytes that were written before. Nothing can be written behind the end after that.
+    ///
+    /// # Errors
+    /// Returns the error of the system.
+    pub fn overwrite(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(at))?;
+        self.file.write_all(bytes)
+    }
+
     /// Moves the file to its target. `durable`: syncs it to disk first, which takes milliseconds per file.
     ///
     /// # Errors
@@ -206,19 +215,24 @@ impl Temporary {
             options.mode(0o600);
         }
         let mut tries = 0;
-        let (path, file) = loop {
+        let (temporary, file) = loop {
             let path = folder.join(temporary_name());
             tries += 1;
             match options.open(&path) {
-                Ok(file) => break (path, file),
+                Ok(file) => {
+                    unfinished().push(path.clone());
+                    let temporary = Self(path);
+                    // On a file system without locks, only the age identifies leftovers.
+                    let is_taken = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+                    // Before the lock, another run may have removed the file as a leftover.
+                    if !is_taken && temporary.0.exists() || tries >= MAX_NAMES {
+                        break (temporary, file);
+                    }
+                }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists && tries < MAX_NAMES => {}
                 Err(error) => return Err(error),
             }
         };
-        unfinished().push(path.clone());
-        let temporary = Self(path);
-        // On a file system without locks, only the age identifies leftovers.
-        let _ = file.try_lock();
         if let Some(existing) = existing {
             #[cfg(unix)]
             {

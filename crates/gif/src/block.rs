@@ -56,6 +56,8 @@ pub(crate) struct Block {
     pub(crate) area: Area,
     /// Red, green and blue of each index; at most 256 entries.
     pub(crate) palette: Vec<u8>,
+    /// The palette is that of the file, so that the block stores none.
+    pub(crate) is_of_file: bool,
     /// The index that leaves a pixel as it is.
     pub(crate) transparent: Option<u8>,
     pub(crate) delay_cs: u16,
@@ -85,8 +87,24 @@ impl Block {
         let filler = transparent.map(|_| [0; 3]);
         let palette = colours.iter().chain(&filler).flatten().copied().collect::<Vec<_>>();
         let data = lzw::join(bits(palette.len() / 3), parts);
-        Self { area, palette, transparent, delay_cs, data }
+        Self { area, palette, is_of_file: false, transparent, delay_cs, data }
     }
+
+    /// Marks the palette as that of the file.
+    pub(crate) fn of_file(self) -> Self {
+        Self { is_of_file: true, ..self }
+    }
+
+    /// Returns the bytes that depend on the choice of the palette.
+    pub(crate) fn bytes(&self) -> usize {
+        let table = if self.is_of_file { 0 } else { 3 << bits_of_table(self.palette.len() / 3) };
+        table + self.data.len()
+    }
+}
+
+/// Returns the bits of an index into a stored palette of this many colours.
+fn bits_of_table(colours: usize) -> u8 {
+    (1..8).find(|&bits| colours <= 1 << bits).unwrap_or(8)
 }
 
 /// Returns the bits of an index into a palette of this many colours. LZW needs at least 2.

@@ -1,5 +1,6 @@
 //! The encoder: takes frames, checks them, gives them their delays, and writes the blocks in order.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::num::NonZeroU16;
 
@@ -8,6 +9,7 @@ use image::RgbImage;
 
 use crate::block::Block;
 use crate::error::{Error, LONGEST_SIDE};
+use crate::exact::{self, FewColours};
 use crate::quantise::Quantiser;
 use crate::state::{StateReader, StateWriter, damaged};
 use crate::thinning::{Thinning, read_size};
@@ -22,6 +24,9 @@ pub struct Settings {
     pub plays: Plays,
     /// The time that the last frame is shown, in hundredths of a second. Default: as `fps` says.
     pub last_delay_cs: Option<u16>,
+    /// The times that frames are shown, in hundredths of a second, by the number of the frame as it is pushed, from 0.
+    /// Default: as `fps` says, which is then at most 50.
+    pub delays_cs: BTreeMap<u64, u16>,
     /// Keeps frames of at most 256 colours exact also in slow fades of large pictures. There the file may
     /// become several times larger.
     pub exact: bool,
@@ -49,7 +54,19 @@ impl Plays {
 impl Settings {
     /// Makes settings with a frame rate and a number of repetitions (0: endless).
     pub fn new(fps: f64, repetitions: u16) -> Self {
-        Self { fps, plays: Plays::repeated(repetitions), last_delay_cs: None, exact: false }
+        let plays = Plays::repeated(repetitions);
+        Self { fps, plays, last_delay_cs: None, delays_cs: BTreeMap::new(), exact: false }
+    }
+
+    /// Sets the times that frames are shown, in seconds, by the number of the frame as it is pushed, from 0.
+    #[must_use]
+    pub fn timed(self, seconds: &BTreeMap<u64, f64>) -> Self {
+        // The conversion saturates.
+        let delay_cs = |seconds: f64| (100.0 * seconds).round() as u16;
+        Self {
+            delays_cs: seconds.iter().map(|(frame, seconds)| (*frame, delay_cs(*seconds))).collect(),
+            ..self
+        }
     }
 }
 
@@ -107,6 +124,9 @@ impl<W: Write> Encoder<W> {
     /// Returns [`Error::FrameRate`] if the format cannot hold the rate.
     pub fn new(writer: W, settings: Settings) -> Result<Self, Error> {
         let timeline = Timeline::new(settings.fps)?;
+        if settings.fps > MAX_FPS && !settings.delays_cs.is_empty() {
+            return Err(Error::TooFastForDelays { fps: settings.fps });
+        }
         let thinning = Thinning::new(settings.fps, MAX_FPS);
         let stage = Stage::Empty(writer);
         Ok(Self { settings, thinning, timeline, pushed: 0, written: 0, duration_cs: 0, stage })
@@ -135,16 +155,37 @@ impl<W: Write> Encoder<W> {
         self.thinning.push(frame).map_or(Ok(()), |frame| self.encode(frame))
     }
 
+    /// Adds the next frame as [`push`](Self::push) does, shown for `delay_cs` hundredths of a second.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`push`](Self::push), and [`Error::TooFastForDelays`].
+    pub fn push_for(&mut self, frame: RgbImage, delay_cs: u16) -> Result<(), Error> {
+        if self.settings.fps > MAX_FPS {
+            return Err(Error::TooFastForDelays { fps: self.settings.fps });
+        }
+        let place = self.timeline.handed_out();
+        self.settings.delays_cs.insert(place, delay_cs);
+        let pushed = self.push(frame);
+        // Only what is to come matters.
+        self.settings.delays_cs.remove(&place);
+        pushed
+    }
+
     /// Encodes a frame that is not dropped.
     fn encode(&mut self, frame: RgbImage) -> Result<(), Error> {
         let (number, size) = (self.pushed, frame.dimensions());
-        let delay_cs = self.timeline.advance();
+        let place = self.timeline.handed_out();
+        let by_rate = self.timeline.advance();
+        let delay_cs = self.settings.delays_cs.get(&place).copied().unwrap_or(by_rate);
         let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
                 let writer = Counting { inner: Some(writer), bytes: 0 };
-                let file = begin(writer, size, self.settings.plays)
+                let of_file = exact::palette_of_file(frame.as_raw().as_chunks().0);
+                let file = begin(writer, size, self.settings.plays, of_file.as_ref())
                     .map_err(|source| Error::Write { frame: number, source })?;
-                Box::new(Running { size, file, quantiser: Quantiser::new(self.settings.exact) })
+                let quantiser = Quantiser::new(self.settings.exact, of_file);
+                Box::new(Running { size, file, quantiser })
             }
             Stage::Running(running) => running,
             Stage::Failed => return Err(self.failed_before()),
@@ -209,6 +250,11 @@ impl<W: Write> Encoder<W> {
             state.bytes(&[plays, u8::from(settings.last_delay_cs.is_some()), u8::from(settings.exact)])?;
             state.u16(times)?;
             state.u16(settings.last_delay_cs.unwrap_or_default())?;
+            state.u64(settings.delays_cs.len() as u64)?;
+            for (frame, delay_cs) in &settings.delays_cs {
+                state.u64(*frame)?;
+                state.u16(*delay_cs)?;
+            }
             for count in [pushed, written, duration_cs, timeline.handed_out()] {
                 state.u64(count)?;
             }
@@ -223,6 +269,9 @@ impl<W: Write> Encoder<W> {
                     for number in [size.0.into(), size.1.into(), file.get_ref().bytes] {
                         state.u64(number)?;
                     }
+                    let of_file = quantiser.of_file().map_or(&[][..], |of_file| &of_file.colours);
+                    state.u16(of_file.len() as u16)?;
+                    state.bytes(of_file.as_flattened())?;
                     quantiser.write(&mut state)?;
                 }
             }
@@ -248,7 +297,12 @@ impl<W: Write> Encoder<W> {
             (REPEATED, Some(times)) => Plays::Repeated(times),
             _ => return Err(damaged("it says not how often it is shown")),
         };
-        let settings = Settings { fps, plays, last_delay_cs: has_last_delay.then_some(last_delay_cs), exact };
+        let mut delays_cs = BTreeMap::new();
+        for _ in 0..state.u64()? {
+            delays_cs.insert(state.u64()?, state.u16()?);
+        }
+        let last_delay_cs = has_last_delay.then_some(last_delay_cs);
+        let settings = Settings { fps, plays, last_delay_cs, delays_cs, exact };
         let (pushed, written, duration_cs, timed) = (state.u64()?, state.u64()?, state.u64()?, state.u64()?);
         if written > timed || timed > pushed || pushed > MAX_COUNTED || duration_cs > MAX_COUNTED {
             return Err(damaged("it has frames that there cannot be"));
@@ -266,10 +320,17 @@ impl<W: Write> Encoder<W> {
                 if bytes > MAX_COUNTED {
                     return Err(damaged("it is longer than there can be"));
                 }
-                let quantiser = Quantiser::read(&mut state, size, exact)?;
+                let count = usize::from(state.u16()?);
+                let colours = state.bytes(3 * count)?;
+                let of_file = exact::palette_of_file(colours.as_chunks().0).filter(|_| count > 0);
+                if of_file.as_ref().map_or(0, |of_file| of_file.colours.len()) != count {
+                    return Err(damaged("its palette has a colour twice"));
+                }
                 // The beginning of the file is written already.
                 let nowhere = Counting { inner: None, bytes: 0 };
-                let mut file = begin(nowhere, size, plays).map_err(|source| Error::State { source })?;
+                let mut file = begin(nowhere, size, plays, of_file.as_ref())
+                    .map_err(|source| Error::State { source })?;
+                let quantiser = Quantiser::read(&mut state, size, exact, of_file)?;
                 *file.get_mut() = Counting { inner: Some(writer), bytes };
                 Stage::Running(Box::new(Running { size, file, quantiser }))
             }
@@ -307,8 +368,13 @@ fn begin<W: Write>(
     writer: Counting<W>,
     size: (u32, u32),
     plays: Plays,
+    of_file: Option<&FewColours>,
 ) -> io::Result<gif::Encoder<Counting<W>>> {
-    let mut file = gif::Encoder::new(writer, size.0 as u16, size.1 as u16, &[]).map_err(into_io)?;
+    // The index behind the colours is transparent.
+    let filler = of_file.map(|_| [0; 3]);
+    let colours = of_file.into_iter().flat_map(|of_file| &of_file.colours).chain(&filler);
+    let palette: Vec<u8> = colours.flatten().copied().collect();
+    let mut file = gif::Encoder::new(writer, size.0 as u16, size.1 as u16, &palette).map_err(into_io)?;
     let repeat = match plays {
         Plays::Endless => Some(Repeat::Infinite),
         // A GIF without a repeat count is shown once.
@@ -320,7 +386,7 @@ fn begin<W: Write>(
 }
 
 fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, block: Block) -> io::Result<()> {
-    let Block { area, palette, transparent, delay_cs, data } = block;
+    let Block { area, palette, is_of_file, transparent, delay_cs, data } = block;
     let frame = gif::Frame {
         delay: delay_cs,
         dispose: DisposalMethod::Keep,
@@ -329,7 +395,7 @@ fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, block: Block) -> io::Re
         top: area.top as u16,
         width: (area.right - area.left) as u16,
         height: (area.bottom - area.top) as u16,
-        palette: Some(palette),
+        palette: (!is_of_file).then_some(palette),
         buffer: data.into(),
         ..gif::Frame::default()
     };

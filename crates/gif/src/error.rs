@@ -14,6 +14,12 @@ pub enum Error {
         /// The rate that was requested.
         fps: f64,
     },
+    /// Frames have times of their own, but some of them would be dropped.
+    #[error("{fps} frames a second: where frames have times of their own, a GIF can hold at most 50")]
+    TooFastForDelays {
+        /// The rate that was requested.
+        fps: f64,
+    },
     /// A frame has another size than the frames before it.
     #[error("frame {frame} is {} x {} pixels, the frames before it are {} x {}", found.0, found.1, expected.0, expected.1)]
     UnlikeSize {

@@ -138,14 +138,23 @@ impl Kind {
     }
 }
 
+/// The largest palette of a file: an index is left for transparent.
+const MAX_OF_FILE: usize = 255;
+
+/// Returns the palette of a file, which its first frame decides; `None` if that has too many colours.
+pub(crate) fn palette_of_file(first: &[[u8; 3]]) -> Option<FewColours> {
+    few_colours(first).filter(|few| few.colours.len() <= MAX_OF_FILE)
+}
+
 /// Draws the pixels whose seen colour is wrong. Draws all of the frame if it is the first, or if no index
-/// is left for transparent.
+/// is left for transparent. A block uses the palette of the file if that makes the file smaller.
 pub(crate) fn draw(
     pixels: &[[u8; 3]],
     width: usize,
     first: bool,
     seen: &mut [[u8; 3]],
     frame_colours: &FewColours,
+    of_file: Option<&FewColours>,
     delay_cs: u16,
 ) -> Block {
     let mut wrong = vec![false; pixels.len()];
@@ -178,6 +187,34 @@ pub(crate) fn draw(
         None => Some(Area::whole(width, pixels.len())),
     };
     let Some(area) = area else { return Block::nothing(delay_cs) };
+    if first && of_file.is_some() {
+        // The palette of the file is just that of its first frame.
+        return block(pixels, width, area, seen, colours, transparent, delay_cs).of_file();
+    }
+    let of_file = of_file.filter(|of_file| {
+        transparent.is_some() && colours.colours.iter().all(|rgb| of_file.find(*rgb).is_ok())
+    });
+    let with_file = of_file.map(|of_file| {
+        let index = of_file.colours.len() as u8;
+        block(pixels, width, area, &mut seen.to_vec(), of_file, Some(index), delay_cs).of_file()
+    });
+    let own = block(pixels, width, area, seen, colours, transparent, delay_cs);
+    match with_file {
+        Some(with_file) if with_file.bytes() <= own.bytes() => with_file,
+        _ => own,
+    }
+}
+
+/// Draws a block of a frame with these colours.
+fn block(
+    pixels: &[[u8; 3]],
+    width: usize,
+    area: Area,
+    seen: &mut [[u8; 3]],
+    colours: &FewColours,
+    transparent: Option<u8>,
+    delay_cs: u16,
+) -> Block {
     let layout = Layout { area, width, colours: &colours.colours, transparent, delay_cs, stripes: 1 };
     let (block, _) = stripe::in_stripes(layout, seen, |writer, first_row, seen| {
         let mut last = ([0; 3], colours.find([0; 3]).ok());

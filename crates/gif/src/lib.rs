@@ -59,3 +59,8 @@ mod update_map;
 pub use encoder::{Encoder, Plays, Settings, Summary};
 pub use error::Error;
 pub use thinning::Thinning;
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

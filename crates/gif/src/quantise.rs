@@ -15,7 +15,7 @@ use crate::block::{Area, Block};
 use crate::bound;
 use crate::colour::LocalMetric;
 use crate::error::Error;
-use crate::exact::{self, Change, Kind};
+use crate::exact::{self, Change, FewColours, Kind};
 use crate::histogram::{Histogram, MAX_BINS};
 use crate::plan::{LossyPlan, Plan};
 use crate::quantised::Quantised;
@@ -40,6 +40,8 @@ const MANY_COLOURS: usize = 4096;
 pub(crate) struct Quantiser {
     /// No frame [drifts](Kind).
     exact: bool,
+    /// The palette of the file.
+    of_file: Option<FewColours>,
     /// The frame that is drawn next.
     prepared: Option<Prepared>,
     /// The canvas after the last block.
@@ -89,10 +91,12 @@ struct Preparation<'a> {
 }
 
 impl Quantiser {
-    /// Makes a quantiser. `exact`: frames of few colours stay exact also if they drift.
-    pub(crate) fn new(exact: bool) -> Self {
+    /// Makes a quantiser. `exact`: frames of few colours stay exact also if they drift. `of_file`: the palette of the
+    /// file.
+    pub(crate) fn new(exact: bool, of_file: Option<FewColours>) -> Self {
         Self {
             exact,
+            of_file,
             prepared: None,
             seen: RgbImage::default(),
             budget: RefineBudget::new(),
@@ -101,6 +105,11 @@ impl Quantiser {
             spare: None,
             drawn_error: 0.0,
         }
+    }
+
+    /// Returns the palette of the file.
+    pub(crate) fn of_file(&self) -> Option<&FewColours> {
+        self.of_file.as_ref()
     }
 
     /// Takes the next frame, and returns the block of the one before it.
@@ -116,7 +125,8 @@ impl Quantiser {
         if first {
             self.seen = RgbImage::new(frame.width(), frame.height());
         }
-        let Self { exact, seen, budget, parts, whole, spare, drawn_error, .. } = self;
+        let Self { exact, of_file, seen, budget, parts, whole, spare, drawn_error, .. } = self;
+        let of_file = of_file.as_ref();
         let mut buffers = spare.take().unwrap_or_else(Buffers::new);
         let mut preparation = Preparation {
             pixels: pixels_of(&frame),
@@ -146,11 +156,11 @@ impl Quantiser {
                     let compared = preparation.compare(&previous.frame);
                     preparation.plan(compared)
                 },
-                || Some(previous.draw(seen)),
+                || Some(previous.draw(seen, of_file)),
             ),
             Some(previous) => {
                 let compared = preparation.compare(seen);
-                rayon::join(|| preparation.plan(compared), || Some(previous.draw(seen)))
+                rayon::join(|| preparation.plan(compared), || Some(previous.draw(seen, of_file)))
             }
         };
         if let Plan::Lossy(LossyPlan { area: Some(_), level_error, .. }) = plan {
@@ -192,7 +202,7 @@ impl Quantiser {
     pub(crate) fn finish(&mut self) -> Option<Block> {
         rayon::scope(|_| self.settle());
         let last = self.prepared.take()?;
-        rayon::scope(|_| Some(last.draw(&mut self.seen).0))
+        rayon::scope(|_| Some(last.draw(&mut self.seen, self.of_file.as_ref()).0))
     }
 }
 
@@ -239,9 +249,13 @@ impl Quantiser {
         state: &mut StateReader<'_>,
         (width, height): (u32, u32),
         exact: bool,
+        of_file: Option<FewColours>,
     ) -> Result<Self, Error> {
-        let mut quantiser =
-            Self { budget: RefineBudget::read(state)?, drawn_error: state.f32()?, ..Self::new(exact) };
+        let mut quantiser = Self {
+            budget: RefineBudget::read(state)?,
+            drawn_error: state.f32()?,
+            ..Self::new(exact, of_file)
+        };
         let (delay_cs, first, drifts) = (state.u16()?, state.u8()? != 0, state.u8()? != 0);
         let kind = state.u8()?;
         let (bound, reservation) = match kind {
@@ -360,12 +374,13 @@ impl Prepared {
     }
 
     /// Draws the frame. Returns the block, and the static pixels that were redrawn.
-    fn draw(&self, seen: &mut RgbImage) -> (Block, Vec<Redrawn>) {
+    fn draw(&self, seen: &mut RgbImage, of_file: Option<&FewColours>) -> (Block, Vec<Redrawn>) {
         let (width, pixels) = (self.frame.width() as usize, pixels_of(&self.frame));
         let seen = seen.as_chunks_mut::<3>().0;
         match &self.plan {
             Plan::Lossless(colours) => {
-                (exact::draw(pixels, width, self.first, seen, colours, self.delay_cs), Vec::new())
+                let block = exact::draw(pixels, width, self.first, seen, colours, of_file, self.delay_cs);
+                (block, Vec::new())
             }
             Plan::Lossy(LossyPlan { area: None, .. }) => (Block::nothing(self.delay_cs), Vec::new()),
             Plan::Lossy(LossyPlan { area: Some(area), quantised, changed, reservation, bound, .. }) => {
@@ -449,7 +464,7 @@ mod tests {
 
     #[test]
     fn each_frame_is_planned_by_what_is_seen_before_it() {
-        let mut quantiser = Quantiser::new(false);
+        let mut quantiser = Quantiser::new(false, None);
         assert!(quantiser.push(frame(64, 0), 5).is_none());
         let Some(Prepared { first: true, plan: Plan::Lossy(plan), .. }) = &quantiser.prepared else {
             panic!("{:?}", quantiser.prepared)
@@ -474,7 +489,7 @@ mod tests {
 
     #[test]
     fn few_colours_are_planned_without_loss() {
-        let mut quantiser = Quantiser::new(false);
+        let mut quantiser = Quantiser::new(false, None);
         quantiser.push(RgbImage::from_pixel(16, 16, image::Rgb([9; 3])), 5);
         assert!(matches!(quantiser.prepared, Some(Prepared { plan: Plan::Lossless(_), .. })));
     }

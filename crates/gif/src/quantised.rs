@@ -18,7 +18,7 @@ const AT_MOST: f32 = 3.0;
 /// The smallest palette after halving, transparent included.
 const FEWEST: usize = 16;
 /// A frame with more bins keeps its large palette: a smaller one would hardly suffice, and takes long to compute.
-const MOST_BINS_HALVED: usize = 4096;
+const MAX_BINS_HALVED: usize = 4096;
 
 /// The largest number of colours that are added to a palette because of the bound.
 const MAX_ADDED: usize = 64;
@@ -51,7 +51,7 @@ impl Quantised {
 
     /// Halves the palette as long as its error stays small enough. One index is left for transparent.
     pub(crate) fn of_fewer_colours(mut self, histogram: &Histogram, bins: &[Sample]) -> Self {
-        if bins.len() > MOST_BINS_HALVED {
+        if bins.len() > MAX_BINS_HALVED {
             return self;
         }
         let bound = GOOD_ENOUGH + (BY_PIXELS / histogram.pixels() as f32).min(AT_MOST);

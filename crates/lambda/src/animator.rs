@@ -11,6 +11,9 @@ use rayfold_scene::{AnimationSettings, Limits};
 
 use crate::{png, pool};
 
+/// More frames than there can be.
+const MANY_FRAMES: u64 = 1 << 40;
+
 /// An animator that makes GIFs.
 #[derive(Debug, Clone, Copy)]
 pub struct GifAnimator {
@@ -29,7 +32,9 @@ impl Animator for GifAnimator {
 
     fn begin(&self, settings: &AnimationSettings) -> Result<GifEncoding, Reason> {
         let ready = Shelf::default();
-        let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops());
+        // Durations of an animation that bounces need the number of frames, which the assembler fills in.
+        let durations = settings.shown_durations(settings.frames().unwrap_or(MANY_FRAMES));
+        let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops()).timed(&durations);
         let encoder = Encoder::new(ready.clone(), settings).map_err(reason)?;
         Ok(GifEncoding { encoder: Some(encoder), ready, most_pixels: self.most_pixels })
     }

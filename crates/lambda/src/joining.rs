@@ -4,7 +4,7 @@
 use std::num::NonZeroU64;
 
 use bytes::Bytes;
-use rayfold_pipeline::Joining;
+use rayfold_pipeline::BandJoiner;
 use rayfold_pipeline::keys::Band;
 use rayfold_pipeline::manifest::Reason;
 
@@ -32,7 +32,7 @@ impl PngJoining {
     }
 }
 
-impl Joining for PngJoining {
+impl BandJoiner for PngJoining {
     async fn push(&mut self, band: Bytes) -> Result<(), Reason> {
         let failed = || Reason::new("the encoder failed on an earlier band");
         let next = *self.bands.last().ok_or_else(|| Reason::new("the frame has all its bands"))?;

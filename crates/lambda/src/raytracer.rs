@@ -48,7 +48,7 @@ pub struct RayTracer {
 }
 
 impl Renderer for RayTracer {
-    type Joining = PngJoining;
+    type BandJoiner = PngJoining;
 
     fn most_bytes(&self) -> u64 {
         self.limits.max_script_bytes as u64
@@ -303,7 +303,7 @@ impl Drop for CancelOnDrop {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_pipeline::Joining;
+    use rayfold_pipeline::BandJoiner;
 
     use super::*;
 

@@ -1,4 +1,4 @@
-//! The owner's keys: random, and kept beside the data, readable by the user alone.
+//! The owner's keys: random, and stored beside the data, readable only by the user.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -14,12 +14,12 @@ use crate::error::{Error, Result};
 pub struct Credentials {
     /// The access key's id.
     pub access_key: String,
-    /// The secret.
+    /// The secret access key.
     pub secret_key: String,
 }
 
 impl Credentials {
-    /// Fresh ones, from the system's randomness.
+    /// Returns new random credentials.
     ///
     /// # Errors
     /// [`Error::Random`].
@@ -27,7 +27,8 @@ impl Credentials {
         Ok(Self { access_key: format!("rayfold{}", token(6)?), secret_key: token(20)? })
     }
 
-    /// Those of an earlier run beside `data`, or fresh ones, kept there.
+    /// Returns the credentials of an earlier run beside `data`. If there are none, makes new ones and stores them
+    /// there.
     pub(crate) fn kept(data: &Path) -> Result<Self> {
         let path = data.join("credentials.json");
         if let Ok(text) = fs::read(&path)
@@ -51,7 +52,7 @@ impl Credentials {
     }
 }
 
-/// `bytes` random bytes in hexadecimal.
+/// Returns `bytes` random bytes in hexadecimal.
 ///
 /// # Errors
 /// [`Error::Random`].

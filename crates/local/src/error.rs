@@ -1,80 +1,102 @@
-//! What can go wrong around the functions; what goes wrong inside them is an outcome of theirs.
+//! The errors of setting up the bucket and the invoker. Errors inside functions are outcomes of their invocations.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why the bucket or the invoker could not be set up.
+use crate::program::Program;
+
+/// An error of setting up the bucket or the invoker.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Neither MinIO nor what builds it is on this machine.
-    #[error("there is no MinIO: put `minio` on the PATH, or name it in RAYFOLD_MINIO ({0})")]
-    NoMinio(String),
-    /// RAYFOLD_MINIO names nothing.
-    #[error("RAYFOLD_MINIO names {0}, which is no file")]
-    NamedMinioMissing(PathBuf),
-    /// `go install` ran and failed.
+    /// Neither the S3 server nor the tools to build it are on this machine.
     #[error(
-        "MinIO could not be installed from source ({0}): put `minio` on the PATH, or name it in RAYFOLD_MINIO; its \
-         project is archived, and module proxies have begun to refuse it"
+        "there is no {program}: put `{}` on the PATH, name it in {}, or build it with `cargo run -p rayfold-local \
+         --example stores {}` ({reason})", program.binary, program.variable, program.name.to_lowercase()
     )]
-    Install(String),
+    NoServer {
+        /// The server's program.
+        program: &'static Program,
+        /// The missing programs, and the places that were searched.
+        reason: String,
+    },
+    /// The variable that names the S3 server names nothing.
+    #[error("{variable} names {}, which is no file", path.display())]
+    NamedServerMissing {
+        /// The variable.
+        variable: &'static str,
+        /// The path in that variable.
+        path: PathBuf,
+    },
+    /// Go ran and failed.
+    #[error(
+        "{program} could not be built from source ({reason}): put `{}` on the PATH, or name it in {}",
+        program.binary, program.variable
+    )]
+    Install {
+        /// The server's program.
+        program: &'static Program,
+        /// The last lines that Go wrote.
+        reason: String,
+    },
     /// The folder is MinIO's own.
     #[error(
         "{} is the data folder of a MinIO and stays as it is: choose another folder", .0.display()
     )]
     MinioFolder(PathBuf),
-    /// The store built in did not start.
+    /// The built-in store did not start.
     #[error(transparent)]
     Store(rayfold_bucket::Error),
-    /// Files of the store built in are damaged, or missing.
+    /// Files of the built-in store are damaged or missing.
     #[error("{0}. `cargo install --path crates/bucket` in rayfold's sources installs `rayfold-bucket`")]
     StoreDamaged(#[source] rayfold_bucket::Error),
-    /// MinIO ended or stayed unreachable while starting.
-    #[error("MinIO did not start: {reason}; its log is {}", log.display())]
-    MinioStart {
-        /// What was seen.
+    /// The S3 server ended or stayed unreachable during its start.
+    #[error("{program} did not start: {reason}; its log is {}", log.display())]
+    ServerStart {
+        /// The server's program.
+        program: &'static Program,
+        /// The observed symptom.
         reason: String,
-        /// Where MinIO wrote what it had to say.
+        /// The server's log file.
         log: PathBuf,
     },
-    /// Another process holds the folder.
+    /// Another process uses the folder.
     #[error("{} is in use by another rayfold", .0.display())]
     DataInUse(PathBuf),
-    /// A file or folder could not be used.
+    /// A file or folder could not be accessed.
     #[error("{}", path.display())]
     File {
-        /// Which.
+        /// The path of the file or folder.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         source: io::Error,
     },
-    /// A loopback port could not be had.
+    /// A loopback port was not available.
     #[error("cannot listen on {address}")]
     Listen {
-        /// Where.
+        /// The address.
         address: String,
-        /// Why.
+        /// The system's error.
         source: io::Error,
     },
-    /// A function's binary is not where it is looked for.
+    /// A function's binary is missing from its folder.
     #[error(
         "the function {function} is not in {}: build it with `cargo build -p rayfold-lambda`, or name the folder that \
          has it in RAYFOLD_FUNCTIONS", folder.display()
     )]
     NoFunction {
-        /// Its binary's name.
+        /// The name of its binary.
         function: &'static str,
-        /// Where it was looked for.
+        /// The folder that should contain it.
         folder: PathBuf,
     },
-    /// A function's binary is nowhere.
+    /// A function's binary is neither in the program's folder nor on the PATH.
     #[error(
         "the function {function} is neither in {} nor on the PATH: install it with `cargo install --path \
          crates/lambda` in rayfold's sources, or name the folder that has it in RAYFOLD_FUNCTIONS", folder.display()
     )]
     FunctionNowhere {
-        /// Its binary's name.
+        /// The name of its binary.
         function: &'static str,
         /// The folder of the running program.
         folder: PathBuf,
@@ -85,20 +107,61 @@ pub enum Error {
     /// A program could not be started.
     #[error("cannot start {}", program.display())]
     Spawn {
-        /// Which.
+        /// The path of the program.
         program: PathBuf,
-        /// Why.
+        /// The system's error.
         source: io::Error,
     },
     /// The bucket could not be set up.
     #[error("cannot set up the bucket {bucket}")]
     Bucket {
-        /// Its name.
+        /// The name of the bucket.
         bucket: String,
-        /// Why.
+        /// The store's error.
         source: rayfold_pipeline::Error,
     },
-    /// The system gave no random bytes for the credentials.
+    /// The S3 server does not answer.
+    #[error("cannot reach {endpoint}")]
+    Unreachable {
+        /// The server's address.
+        endpoint: String,
+        /// The reason.
+        source: rayfold_pipeline::Error,
+    },
+    /// The S3 server has no such bucket.
+    #[error(
+        "there is no bucket {bucket} at {endpoint}: create it with `aws s3 mb s3://{bucket} --endpoint-url {endpoint}`"
+    )]
+    NoBucket {
+        /// The server's address.
+        endpoint: String,
+        /// The bucket's name.
+        bucket: String,
+    },
+    /// The S3 server refuses access to the bucket.
+    #[error(
+        "{endpoint} refuses access to the bucket {bucket}: credentials come from AWS_ACCESS_KEY_ID and \
+         AWS_SECRET_ACCESS_KEY, or AWS_PROFILE"
+    )]
+    Refused {
+        /// The server's address.
+        endpoint: String,
+        /// The bucket's name.
+        bucket: String,
+        /// The server's message.
+        source: rayfold_pipeline::Error,
+    },
+    /// The S3 server lacks conditional puts.
+    #[error(
+        "{endpoint} cannot hold animations: {problem}. Conditional puts (If-None-Match, If-Match) are needed"
+    )]
+    NoConditions {
+        /// The server's address.
+        endpoint: String,
+        /// The observed behaviour.
+        problem: &'static str,
+    },
+    /// The system returned no random bytes for the credentials.
     #[error("no random bytes from the system: {0}")]
     Random(getrandom::Error),
 }
@@ -110,5 +173,5 @@ impl Error {
     }
 }
 
-/// The crate's results.
+/// The result type of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

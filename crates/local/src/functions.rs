@@ -1,10 +1,10 @@
-//! Where the function binaries are.
+//! The location of the function binaries.
 //!
-//! They lie beside the program that runs them. In the project's own `target/` they may be missing, or older than the
-//! sources, as Cargo builds only what it is asked for; so they are built then, which costs a moment when they are fresh.
-//! They are built with the whole workspace's features, as is what `cargo run` runs: both share one AWS SDK. Beside a
-//! program that was installed they may be missing too: then they are looked for on the PATH, and built in the sources
-//! that the program is of, where those are still there.
+//! They are in the folder of the program that runs them. In the project's own `target/` they may be missing, or older
+//! than the sources, because Cargo builds only the requested targets. So they are built in that case, which takes a
+//! moment if they are up to date. They are built with the features of the whole workspace, like a program run by `cargo
+//! run`, so that both share one AWS SDK. Beside an installed program they may be missing too. Then they are searched
+//! for on the PATH, and built in the program's sources if those still exist.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -20,15 +20,16 @@ pub struct Functions {
 }
 
 impl Functions {
-    /// Those in `folder`.
+    /// Returns the functions in `folder`.
     pub fn in_folder(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
     }
 
-    /// Those in the folder that RAYFOLD_FUNCTIONS names, which are taken as they are; or beside this program, built anew
-    /// when it lies in the workspace it was built from; or on the PATH; or built in that workspace.
+    /// Finds the functions. If RAYFOLD_FUNCTIONS is set, they are in that folder and are used unchanged. Otherwise they
+    /// are beside this program, and are rebuilt if it is in the workspace that it was built from. Otherwise they are on
+    /// the PATH, or are built in that workspace.
     ///
-    /// `say` hears what takes time, a line at a time.
+    /// `say` gets a line before each step that takes time.
     ///
     /// # Errors
     /// [`Error::NoFunction`], [`Error::FunctionNowhere`], [`Error::Build`].
@@ -60,7 +61,8 @@ impl Functions {
         }
     }
 
-    /// Those beside an installed program, which is this, or wherever else they may be.
+    /// Finds the functions of an installed program: beside it (`self`), on the PATH, or by building them in its
+    /// sources.
     fn installed(self, sources: Option<&Path>, say: &mut dyn FnMut(&str)) -> Result<Self> {
         let Err(_) = self.check() else { return Ok(self) };
         let path = env::var_os("PATH").unwrap_or_default();
@@ -83,12 +85,12 @@ impl Functions {
         Err(Error::FunctionNowhere { function: self.missing().unwrap_or_default(), folder: self.folder })
     }
 
-    /// Of one of them.
+    /// Returns the path of a function's binary.
     pub fn path(&self, function: Function) -> PathBuf {
         self.folder.join(function.binary())
     }
 
-    /// Both are there.
+    /// Checks that both binaries exist.
     ///
     /// # Errors
     /// [`Error::NoFunction`].
@@ -99,7 +101,7 @@ impl Functions {
         }
     }
 
-    /// The first binary that is not there.
+    /// Returns the name of the first missing binary.
     fn missing(&self) -> Option<&'static str> {
         Function::ALL.into_iter().find(|function| !self.path(*function).is_file()).map(Function::binary)
     }

@@ -1,10 +1,13 @@
-//! A child process that does not outlive us, whatever ends us.
+//! A child process that ends with this process, whatever the cause.
 //!
-//! The program runs under a small POSIX shell that holds the read end of a pipe; we hold the other. When we close it, or
-//! die in any way, also by SIGKILL, the kernel closes it, the shell reads the end of file and stops the program by its
-//! process id, with SIGKILL if it does not go within five seconds. No signal handler, no `unsafe`, no name to look up.
-//! The shell is in a process group of its own: a Ctrl-C in the terminal is ours to answer, in order.
+//! The program runs under a small POSIX shell that holds the read end of a pipe; this process holds the write end. If
+//! this process closes it or ends, also by SIGKILL, the kernel closes it. The shell then reads the end of file and
+//! stops the program by its process id, with SIGKILL if the program does not end within five seconds. This needs no
+//! signal handler, no `unsafe`, and no search by name. The shell has its own process group, so that this process
+//! handles a Ctrl-C in the terminal and stops the parts in order.
+//! The shell holds a lock file until the program has ended, so that no successor starts on the same data before.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -15,12 +18,12 @@ use crate::error::{Error, Result};
 
 const SCRIPT: &str = r#"
 log=$1; shift
-exec 3<&0
-"$@" 3<&- </dev/null >>"$log" 2>&1 &
+exec 3<&0 4>&2
+"$@" 3<&- 4>&- </dev/null >>"$log" 2>&1 &
 pid=$!
 echo "$pid"
 exec >/dev/null 2>&1
-( read -r _ <&3; kill "$pid"; sleep 5; kill -9 "$pid" ) &
+( exec 4>&-; read -r _ <&3; kill "$pid"; sleep 5; kill -9 "$pid" ) &
 keeper=$!
 exec 3<&-
 wait "$pid"
@@ -29,23 +32,26 @@ kill "$keeper"
 exit "$status"
 "#;
 
-/// A running program; dropping it stops the program and waits until it is gone.
+/// A running program. Dropping it stops the program and waits until it has ended.
 #[derive(Debug)]
 pub(crate) struct Guarded {
     shell: Mutex<Child>,
     lifeline: Option<ChildStdin>,
+    pid: u32,
 }
 
 impl Guarded {
-    /// Starts `program`, its output appended to `log`.
+    /// Starts `program` and appends its output to `log`. `lock`, if given, stays locked until the program has ended.
     ///
     /// # Errors
-    /// [`Error::Spawn`] when the shell cannot be started; a program that is missing shows in [`Self::exited`].
+    /// Fails with [`Error::Spawn`] if the shell cannot be started. If the program is missing, [`Self::exited`] returns
+    /// a status.
     pub(crate) fn spawn(
         program: &Path,
         args: &[String],
         env: impl IntoIterator<Item = (String, String)>,
         log: &Path,
+        lock: &File,
     ) -> Result<Self> {
         let failed = |source| Error::Spawn { program: program.to_owned(), source };
         let mut shell = Command::new("sh")
@@ -56,7 +62,7 @@ impl Guarded {
             .envs(env)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(lock.try_clone().map_err(failed)?)
             .process_group(0)
             .spawn()
             .map_err(failed)?;
@@ -65,13 +71,18 @@ impl Guarded {
         if let Some(out) = shell.stdout.take() {
             BufReader::new(out).read_line(&mut line).map_err(failed)?;
         }
-        if line.trim().parse::<u32>().is_err() {
+        let Ok(pid) = line.trim().parse() else {
             return Err(failed(std::io::Error::other("the shell named no process")));
-        }
-        Ok(Self { shell: Mutex::new(shell), lifeline })
+        };
+        Ok(Self { shell: Mutex::new(shell), lifeline, pid })
     }
 
-    /// How the program ended, if it has.
+    /// The program's process id.
+    pub(crate) fn pid(&self) -> u32 {
+        self.pid
+    }
+
+    /// Returns the program's exit status if it has ended.
     pub(crate) fn exited(&self) -> Option<ExitStatus> {
         self.shell.lock().unwrap_or_else(PoisonError::into_inner).try_wait().ok().flatten()
     }
@@ -94,13 +105,15 @@ mod tests {
         Command::new("kill").args(["-0", &pid.to_string()]).stderr(Stdio::null()).status().unwrap().success()
     }
 
-    /// A shell that writes its process id into a file and goes on with the script.
+    /// Starts a shell that writes its process id into a file and then runs the script.
     fn sleeper(script: &str) -> (Guarded, u32, tempfile::TempDir) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("pid");
         let args =
             ["-c".to_owned(), format!("echo $$ >'{0}.new'; mv '{0}.new' '{0}'; {script}", file.display())];
-        let guarded = Guarded::spawn(Path::new("sh"), &args, [], &folder.path().join("log")).unwrap();
+        let lock = File::create(folder.path().join("lock")).unwrap();
+        lock.lock().unwrap();
+        let guarded = Guarded::spawn(Path::new("sh"), &args, [], &folder.path().join("log"), &lock).unwrap();
         let start = Instant::now();
         let pid = loop {
             if let Ok(text) = std::fs::read_to_string(&file) {
@@ -118,6 +131,15 @@ mod tests {
         assert!(alive(pid));
         drop(guarded);
         assert!(!alive(pid));
+    }
+
+    #[test]
+    fn a_lock_is_held_until_the_program_is_gone() {
+        let (guarded, _, folder) = sleeper("while :; do sleep 0.05; done");
+        let lock = File::open(folder.path().join("lock")).unwrap();
+        assert!(lock.try_lock().is_err());
+        drop(guarded);
+        lock.try_lock().unwrap();
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The little HTTP that a runtime API, a webhook and a counting proxy need.
+//! The part of HTTP that a Runtime API, a webhook and a counting proxy need.
 //!
 //! A server is a listener and a handler; dropping it closes the listener and every connection.
 
@@ -20,12 +20,12 @@ use crate::error::{Error, Result};
 
 pub(crate) type Body = BoxBody<Bytes, hyper::Error>;
 
-/// A whole body.
+/// Returns a complete body.
 pub(crate) fn full(bytes: impl Into<Bytes>) -> Body {
     Full::new(bytes.into()).map_err(|never: Infallible| match never {}).boxed()
 }
 
-/// An answer with a JSON body.
+/// Returns a response with a JSON body.
 pub(crate) fn json(status: StatusCode, body: &serde_json::Value) -> Response<Body> {
     let mut answer = Response::new(full(body.to_string()));
     *answer.status_mut() = status;
@@ -33,12 +33,12 @@ pub(crate) fn json(status: StatusCode, body: &serde_json::Value) -> Response<Bod
     answer
 }
 
-/// Where to listen when it does not matter: any free port of the loopback address.
+/// Returns the address for any free port on the loopback interface.
 pub fn any_port() -> SocketAddr {
     SocketAddr::from(([127, 0, 0, 1], 0))
 }
 
-/// Listens on `address`, port 0 standing for any free one.
+/// Listens on `address`. Port 0 stands for any free port.
 pub(crate) async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr)> {
     let failed = |source| Error::Listen { address: address.to_string(), source };
     let listener = TcpListener::bind(address).await.map_err(failed)?;
@@ -51,7 +51,8 @@ pub(crate) async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAd
 pub(crate) struct Server(JoinHandle<()>);
 
 impl Server {
-    /// Answers every request on `listener` by `handler`. A connection closes in the middle when the handler gives none.
+    /// Replies to every request on `listener` by `handler`. If the handler returns no response, the connection is
+    /// closed.
     pub(crate) fn start<H, F>(listener: TcpListener, handler: H) -> Self
     where
         H: Fn(Request<Incoming>) -> F + Clone + Send + 'static,
@@ -69,7 +70,7 @@ impl Server {
                         let answer = handler(request);
                         async move { answer.await.ok_or("no answer") }
                     });
-                    // A peer that goes away in the middle is that peer's end, told where it matters.
+                    // An error of the connection concerns only that peer, and is reported where it matters.
                     let _ = hyper::server::conn::http1::Builder::new()
                         .timer(TokioTimer::new())
                         .preserve_header_case(true)
@@ -82,7 +83,7 @@ impl Server {
 }
 
 impl Server {
-    /// Closes the listener and every connection, and returns when they are closed.
+    /// Closes the listener and every connection. Returns after they are closed.
     pub(crate) async fn stop(mut self) {
         self.0.abort();
         let _ = (&mut self.0).await;

@@ -1,15 +1,17 @@
-//! Lambda's part on one machine: it runs the function binaries, unmodified, on Lambda's own terms.
+//! Lambda's part on one machine: runs the unmodified function binaries like Lambda does.
 //!
-//! Each process gets a Runtime API of its own and a proxy to the store that counts its requests. Refuses to know what
-//! the functions do: it sees events, answers and exit codes.
+//! Each process gets its own Runtime API and a proxy to the store that counts its requests. The invoker has no
+//! knowledge of the functions' work: it sees events, replies and exit codes.
 //!
-//! Invariants: no more processes of a function run at once than the concurrency allows; an event's tries share its
-//! request id; a process that crashed, or was killed at its deadline, is never used again; dropping the invoker kills
-//! every process it started.
+//! Invariants: at most as many processes of a function run at once as the concurrency allows. All attempts at an event
+//! have the same request id. A process that crashed, or was killed at its deadline, is never used again. Dropping the
+//! invoker kills every process that it started.
 
 mod chaos;
 mod events;
 mod failures;
+mod listing;
+mod members;
 mod meter;
 mod pool;
 mod queue;
@@ -30,23 +32,25 @@ use tokio::task::JoinSet;
 
 pub use chaos::{Chaos, Fate, Fates};
 pub use ramp::Ramp;
-pub use settings::Settings;
+pub use settings::{Listing, Settings};
 
 use crate::error::{Error, Result};
 use crate::http::{Server, listen};
 use crate::observation::{Observation, Observer, Outcome};
 use crate::routes::Function;
-use events::Pools;
+use events::{Delivery, Pools};
+use listing::Watcher;
+use members::Members;
 use pool::Workers;
 use queue::{Caller, Job, Pending, Pool};
 
-/// What the schedule of `infra/terraform` sends.
+/// The event that the schedule of `infra/terraform` sends.
 const SWEEP: &str = r#"{"sweep":true}"#;
 
-/// The same when nobody has listened for events: what is pending is not on its way.
+/// The event for a sweep after a time in which the invoker did not receive events: pending work is not in progress.
 const CATCH_UP: &str = r#"{"sweep":true,"catch_up":true}"#;
 
-/// Between two looks at whether everything has ended.
+/// The time between two checks whether everything has ended.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// A running invoker.
@@ -54,12 +58,14 @@ pub struct Invoker {
     pools: Pools,
     pending: Pending,
     webhook: SocketAddr,
+    watcher: Option<Watcher>,
+    members: Option<Arc<Members>>,
     server: Server,
     tasks: JoinSet<()>,
 }
 
 impl Invoker {
-    /// Listens for events, and sweeps what was missed before.
+    /// Listens for events, and sweeps to catch up on missed ones.
     ///
     /// # Errors
     /// [`Error::NoFunction`], [`Error::Listen`].
@@ -68,7 +74,7 @@ impl Invoker {
         Self::start_on(listener, settings, observer)
     }
 
-    /// The same on a listener that is there already.
+    /// Starts an invoker on an existing listener.
     pub(crate) fn start_on(
         listener: TcpListener,
         settings: Settings,
@@ -97,77 +103,112 @@ impl Invoker {
         });
         tasks.spawn(failures::deliver(failed, assemble.clone(), pending.clone(), observer.clone()));
         let pools = Pools { render, assemble };
-        let server = events::receive(
-            listener,
-            &settings.webhook_token,
-            pools.clone(),
-            dice,
-            observer,
-            pending.clone(),
-            &mut tasks,
-        );
-        match settings.kept_events {
-            None => pools.assemble.submit(Job::event(CATCH_UP)),
-            Some(soon) => {
-                pending.add();
-                tasks.spawn(catch_up_after(soon, pools.assemble.clone(), pending.clone()));
+        let delivery = Delivery::start(pools.clone(), dice, observer.clone(), pending.clone(), &mut tasks);
+        let hearing = delivery.clone();
+        let (mut watcher, mut members) = (None, None);
+        if let Some(listing) = &settings.listing {
+            let shared = Members::start(
+                listing,
+                settings.concurrency,
+                pools.assemble.clone(),
+                observer.clone(),
+                &mut tasks,
+            );
+            let catch_up = pools.assemble.clone();
+            watcher = Some(Watcher::start(
+                listing.clone(),
+                shared.clone(),
+                delivery,
+                pending.clone(),
+                move || catch_up.submit(Job::event(CATCH_UP)),
+                &mut tasks,
+            ));
+            members = Some(shared);
+        } else {
+            match settings.kept_events {
+                None => pools.assemble.submit(Job::event(CATCH_UP)),
+                Some(soon) => {
+                    pending.add();
+                    tasks.spawn(catch_up_after(soon, pools.assemble.clone(), pending.clone()));
+                }
             }
         }
+        let hint = watcher.as_ref().map(Watcher::hint);
+        let server = events::receive(listener, &settings.webhook_token, move |name, key, payload| {
+            match &hint {
+                // What is listed is delivered, once and by one of the invokers.
+                Some(hint) => hint.notify_one(),
+                None => hearing.take(name, key, payload),
+            }
+        });
         if let Some(pause) = settings.sweep_every {
-            let assemble = pools.assemble.clone();
+            let (assemble, members) = (pools.assemble.clone(), members.clone());
             tasks.spawn(async move {
                 loop {
                     tokio::time::sleep(pause).await;
-                    assemble.submit(Job::event(SWEEP));
+                    // One sweep is enough for all invokers of a bucket.
+                    if members.as_ref().is_none_or(|members| members.leads()) {
+                        assemble.submit(Job::event(SWEEP));
+                    }
                 }
             });
         }
-        Ok(Self { pools, pending, webhook, server, tasks })
+        Ok(Self { pools, pending, webhook, watcher, members, server, tasks })
     }
 
-    /// Kills every process, and returns when no event can be heard any more.
+    /// Kills every process. No event is received after this returns.
     pub async fn stop(mut self) {
         self.tasks.shutdown().await;
         self.server.stop().await;
+        if let Some(members) = self.members {
+            members.leave().await;
+        }
     }
 
-    /// Where events are heard.
+    /// Returns the address at which events are received.
     pub fn webhook(&self) -> SocketAddr {
         self.webhook
     }
 
-    /// The schedule's event, now.
+    /// Sends the schedule's event now.
     pub fn sweep(&self) {
         self.pools.assemble.submit(Job::event(SWEEP));
     }
 
-    /// Invokes as an event does: tried again when it fails, then delivered to the failure queue.
+    /// Invokes a function like an event does: failures are retried, then delivered to the failure queue.
     pub fn send(&self, function: Function, payload: impl Into<Bytes>) {
         self.pools.of(function).submit(Job::event(payload));
     }
 
-    /// Invokes and waits for the end of the one attempt.
+    /// Invokes a function once and waits for the end of this attempt.
     pub async fn invoke(&self, function: Function, payload: impl Into<Bytes>) -> Outcome {
         let (done, outcome) = oneshot::channel();
         self.pools.of(function).submit(Job { caller: Caller::Waiting(done), ..Job::event(payload) });
         outcome.await.unwrap_or_else(|_| Outcome::Crashed("the invoker stopped".into()))
     }
 
-    /// Returns when nothing is queued, running, or waiting for another try.
+    /// Returns when the events of all changes before the call are delivered. Returns at once if the store sends events.
+    pub async fn look(&self) {
+        if let Some(watcher) = &self.watcher {
+            watcher.look().await;
+        }
+    }
+
+    /// Returns when no invocation is queued, running, or waiting for a retry.
     pub async fn idle(&self) {
         self.pending.none().await;
     }
 
-    /// Invocations that are queued, running, or waiting for another try.
+    /// Returns the number of invocations that are queued, running, or waiting for a retry.
     pub fn pending(&self) -> usize {
         self.pending.count()
     }
 }
 
-/// Sweeps when the events that the store has kept were heard, and all that they woke has ended.
+/// Sweeps after the events that the store had kept were received and all resulting invocations have ended.
 async fn catch_up_after(soon: Duration, assemble: Pool, pending: Pending) {
     tokio::time::sleep(soon).await;
-    // This sweep itself is one of them, so that nobody takes the invoker for idle before.
+    // This sweep is counted, so that the invoker does not appear idle before it.
     while pending.count() > 1 {
         tokio::time::sleep(LOOK).await;
     }

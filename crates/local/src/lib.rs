@@ -1,29 +1,36 @@
-//! Lambda's and S3's part on one machine: a local invoker and a bucket.
+//! The parts of Lambda and S3 on one machine: a local invoker and a bucket.
 //!
-//! [`S3Server`] is the bucket's server, built in or MinIO; [`invoker`] runs the function binaries on Lambda's terms and
-//! feeds them with the bucket's events by the shared [`routes`]. What happens can be listened to as [`observation`]s.
+//! [`S3Server`] is the bucket's server: built in, MinIO or SeaweedFS. [`invoker`] runs the function binaries like Lambda does,
+//! and sends them the bucket's events by the shared [`routes`]. [`cluster`] runs an invoker on a bucket of any other S3 server.
+//! A listener can receive [`observation`]s of all activity.
 //!
-//! Knows the pipeline's keys and store, and nothing of scenes or pixels. Everything listens on loopback alone, and
-//! nothing that was started outlives the process, however it ends.
+//! The crate knows the pipeline's keys and store, but no scenes or pixels. Everything listens only on loopback
+//! addresses, and no started process outlives this one, however it ends.
 
+pub mod cluster;
 mod credentials;
 mod error;
 mod functions;
 mod guard;
 mod http;
+mod install;
 pub mod invoker;
-pub mod minio;
+mod minio;
 pub mod observation;
 mod platform;
+mod process;
+mod program;
 mod region;
 pub mod routes;
 mod s3_server;
+mod seaweedfs;
 
 pub use credentials::Credentials;
 pub use error::{Error, Result};
 pub use functions::Functions;
 pub use http::any_port;
 pub use platform::{Plan, Platform, notify};
+pub use program::Program;
 pub use rayfold_bucket::Webhook;
 pub use region::REGION;
 pub use s3_server::{S3Server, StoreKind};

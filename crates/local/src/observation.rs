@@ -1,4 +1,4 @@
-//! What the invoker saw, for those who show, count or test it.
+//! The invoker's observations, for display, statistics and tests.
 
 use std::time::{Duration, Instant};
 
@@ -7,111 +7,121 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::routes::Function;
 
-/// Something that happened, and when.
+/// An observation and its time.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// On the machine's steady clock.
+    /// The time of the machine's monotonic clock.
     pub at: Instant,
-    /// What.
+    /// The kind of observation.
     pub seen: Seen,
 }
 
-/// What can happen.
+/// A kind of observation.
 #[derive(Clone, Debug)]
 pub enum Seen {
-    /// The store reported a change of an object; `function` is whom it wakes, if any.
+    /// The store sent an event for a change of an object.
     Event {
-        /// Whom it wakes.
+        /// The function that the event invokes, if any.
         function: Option<Function>,
-        /// S3's name of what happened.
+        /// S3's name of the event.
         name: String,
         /// The object's key.
         key: String,
     },
-    /// An invocation was handed to a process.
+    /// An invocation was assigned to a process.
     Started(Attempt),
     /// A process is about to send a request to the store.
     Requested {
-        /// For which invocation.
+        /// The invocation's attempt.
         attempt: Attempt,
-        /// What for.
+        /// The request.
         request: StoreRequest,
     },
-    /// An invocation came to its end.
+    /// An invocation ended.
     Finished {
-        /// Which.
+        /// The invocation's attempt.
         attempt: Attempt,
-        /// How.
+        /// The outcome of the attempt.
         outcome: Outcome,
-        /// From the handing out to the end.
+        /// The time from the assignment to the end.
         took: Duration,
-        /// From the process's start to its first call of `next`, for a cold start.
+        /// The time from the process's start to its first call of `next`, for a cold start.
         init: Option<Duration>,
-        /// Sent to the store meanwhile.
+        /// The requests sent to the store in between.
         requests: Requests,
     },
     /// A process wrote a line.
     Log {
-        /// Of which function.
+        /// The function of the process.
         function: Function,
-        /// Without its end.
+        /// The line without its line break.
         line: String,
+    },
+    /// Another invoker has come, with which the events of the bucket are shared.
+    Joined {
+        /// Its name.
+        invoker: String,
+    },
+    /// Another invoker has gone.
+    Lost {
+        /// Its name.
+        invoker: String,
     },
     /// A message of the failure queue was given up.
     DeadLetter {
-        /// Its body.
+        /// The body of the message.
         body: String,
     },
 }
 
-/// One try of one invocation.
+/// An attempt at an invocation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Attempt {
-    /// Of which function.
+    /// The invoked function.
     pub function: Function,
-    /// The same for all tries of an event.
+    /// The request id, which is the same for all attempts at an event.
     pub request_id: String,
-    /// From 1.
+    /// The number of the attempt, from 1.
     pub number: u32,
-    /// Of the process.
+    /// The id of the process.
     pub pid: u32,
 }
 
-/// How an attempt ended.
+/// The outcome of an attempt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// With an answer.
+    /// The function returned this response.
     Succeeded(String),
-    /// With an error that the function reported.
+    /// The function reported this error.
     Failed(String),
-    /// Without a word: the process ended.
+    /// The process ended without a report.
     Crashed(String),
-    /// At the deadline.
+    /// The attempt reached its deadline.
     TimedOut,
 }
 
 impl Outcome {
-    /// The function's answer was good.
+    /// Returns whether the function succeeded.
     pub fn is_success(&self) -> bool {
         matches!(self, Self::Succeeded(_))
     }
 }
 
-/// A request to the store, as it is billed.
+/// A request to the store, as S3 bills it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoreRequest {
-    /// What it is.
+    /// The kind of request.
     pub kind: RequestKind,
-    /// Decoded, without the bucket; the prefix for a listing.
+    /// The decoded key without the bucket; the prefix for a listing.
     pub key: String,
 }
 
-/// The kinds of requests that are counted apart.
+/// A kind of request that is counted separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RequestKind {
     /// GET and HEAD of an object.
     Get,
-    /// PUT, and the parts and ends of a multipart upload.
+    /// PUT, and the parts and the completion of a multipart upload.
     Put,
     /// A page of a listing.
     List,
@@ -119,21 +129,21 @@ pub enum RequestKind {
     Delete,
 }
 
-/// How many of each kind.
+/// The number of requests of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Requests {
-    /// Of [`RequestKind::Get`].
+    /// The number of [`RequestKind::Get`].
     pub get: u64,
-    /// Of [`RequestKind::Put`].
+    /// The number of [`RequestKind::Put`].
     pub put: u64,
-    /// Of [`RequestKind::List`].
+    /// The number of [`RequestKind::List`].
     pub list: u64,
-    /// Of [`RequestKind::Delete`].
+    /// The number of [`RequestKind::Delete`].
     pub delete: u64,
 }
 
 impl Requests {
-    /// Those that S3 bills.
+    /// Returns the number of requests that S3 bills.
     pub fn billed(&self) -> u64 {
         self.get + self.put + self.list
     }
@@ -157,14 +167,14 @@ impl std::ops::AddAssign for Requests {
     }
 }
 
-/// Whoever listens, if anyone.
+/// The receiver of observations, if there is one.
 #[derive(Clone, Debug)]
 pub(crate) struct Observer(pub(crate) Option<UnboundedSender<Observation>>);
 
 impl Observer {
     pub(crate) fn see(&self, seen: Seen) {
         if let Some(listener) = &self.0 {
-            // One who has stopped listening has no need to know.
+            // The receiver may have been dropped.
             let _ = listener.send(Observation { at: Instant::now(), seen });
         }
     }

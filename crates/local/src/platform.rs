@@ -1,4 +1,4 @@
-//! Everything that Terraform sets up on AWS, on one machine: bucket, notifications, functions, schedule.
+//! The local counterpart of the Terraform stack: bucket, notifications, functions, schedule.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -13,30 +13,30 @@ use crate::credentials::token;
 use crate::error::{Error, Result};
 use crate::functions::Functions;
 use crate::http::{any_port, listen};
-use crate::invoker::{Invoker, Settings};
+use crate::invoker::{Invoker, Listing, Settings};
 use crate::observation::Observation;
 use crate::routes::Routes;
 use crate::s3_server::{S3Server, StoreKind};
 
-/// How long MinIO may take to know its webhook.
+/// The time limit until MinIO has its webhook.
 const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// The store built in connects to the webhook when it starts: what it has kept comes as soon as the invoker listens.
+/// The built-in store connects to the webhook at its start. It delivers kept events as soon as the invoker listens.
 const KEPT_AT_START: Duration = Duration::from_millis(20);
 
-/// It tries again after at most a second, when nobody has listened for a while.
+/// If there was no listener for a while, the store retries after at most a second.
 const KEPT_AFTER_A_PAUSE: Duration = Duration::from_millis(1200);
 
-/// What a platform is made of.
+/// The parts of a platform.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Which S3 server holds the bucket.
+    /// The S3 server that holds the bucket.
     pub store: StoreKind,
-    /// Where it keeps its objects.
+    /// The folder of the bucket's objects.
     pub data: PathBuf,
-    /// Where S3 is to listen; port 0 stands for any.
+    /// The address for S3; port 0 stands for any.
     pub address: SocketAddr,
-    /// The bucket's name.
+    /// The name of the bucket.
     pub bucket: String,
     /// The function binaries.
     pub functions: Functions,
@@ -45,7 +45,7 @@ pub struct Plan {
 /// An S3 server with a bucket whose events reach an invoker.
 pub struct Platform {
     invoker: Option<Invoker>,
-    /// Until the first invoker takes it, so that nobody else gets the port that the server was told.
+    /// The listener until the first invoker takes it. It reserves the port that the server was configured with.
     listener: Option<TcpListener>,
     server: S3Server,
     store: S3Store,
@@ -53,12 +53,12 @@ pub struct Platform {
 }
 
 impl Platform {
-    /// Starts the S3 server and sets the bucket up; the invoker is started apart.
+    /// Starts the S3 server and sets up the bucket. The invoker is started separately.
     ///
-    /// `change` may alter the invoker's settings; `say` hears what takes time.
+    /// `change` may alter the invoker's settings. `say` gets a line before each step that takes time.
     ///
     /// # Errors
-    /// Whatever keeps the server from starting or the bucket from being set up.
+    /// Fails if the server cannot be started or the bucket cannot be set up.
     pub async fn start(
         plan: &Plan,
         change: impl FnOnce(&mut Settings),
@@ -72,19 +72,24 @@ impl Platform {
         let store = S3Store::at(&server.connection(), &plan.bucket);
         let failed = |source| Error::Bucket { bucket: plan.bucket.clone(), source };
         store.create_bucket().await.map_err(failed)?;
-        let notifications = Routes::shared().notifications(server.queue_arn());
-        notify(&store, &notifications).await.map_err(failed)?;
-        let mut settings = Settings::new(plan.functions.clone(), server.address(), webhook, secret);
+        if let Some(queue) = server.queue_arn() {
+            notify(&store, &Routes::shared().notifications(queue)).await.map_err(failed)?;
+        }
+        let mut settings = Settings::new(plan.functions.clone(), Some(server.address()), webhook, secret);
+        if server.queue_arn().is_none() {
+            // Of a fixed name: the next invoker on this bucket takes the place of the one before.
+            settings.listing = Some(Listing::new(store.clone(), "local"));
+        }
         settings.environment = server.environment();
         settings.environment.push(("RAYFOLD_BUCKET".into(), plan.bucket.clone()));
         change(&mut settings);
         Ok(Self { invoker: None, listener: Some(listener), server, store, settings })
     }
 
-    /// Starts the invoker, which sweeps up what happened while there was none.
+    /// Starts the invoker, which sweeps to catch up on changes while there was none.
     ///
     /// # Errors
-    /// As [`Invoker::start`].
+    /// Fails like [`Invoker::start`].
     pub async fn start_invoker(
         &mut self,
         observer: Option<UnboundedSender<Observation>>,
@@ -96,13 +101,13 @@ impl Platform {
         };
         self.settings.kept_events = match self.server.kind() {
             StoreKind::BuiltIn => Some(soon),
-            StoreKind::Minio => None,
+            StoreKind::Minio | StoreKind::SeaweedFs => None,
         };
         let invoker = Invoker::start_on(listener, self.settings.clone(), observer)?;
         Ok(self.invoker.insert(invoker))
     }
 
-    /// On the same port, which an outgoing connection of anybody may have for a moment.
+    /// Listens on the same port, which an outgoing connection of another program may use for a moment.
     async fn listen_again(&self) -> Result<TcpListener> {
         let start = Instant::now();
         loop {
@@ -114,45 +119,45 @@ impl Platform {
         }
     }
 
-    /// Stops the invoker and its processes; the S3 server goes on.
+    /// Stops the invoker and its processes. The S3 server continues.
     pub async fn stop_invoker(&mut self) {
         if let Some(invoker) = self.invoker.take() {
             invoker.stop().await;
         }
     }
 
-    /// The invoker, while there is one.
+    /// Returns the invoker, if it is running.
     pub fn invoker(&self) -> Option<&Invoker> {
         self.invoker.as_ref()
     }
 
-    /// The settings of the next invoker.
+    /// Returns the settings of the next invoker.
     pub fn settings_mut(&mut self) -> &mut Settings {
         &mut self.settings
     }
 
-    /// The bucket, with its owner's credentials.
+    /// Returns the bucket, with its owner's credentials.
     pub fn store(&self) -> &S3Store {
         &self.store
     }
 
-    /// The S3 server.
+    /// Returns the S3 server.
     pub fn server(&self) -> &S3Server {
         &self.server
     }
 
-    /// Stops everything, and returns when the data may be used again.
+    /// Stops everything. Returns when the data may be used again.
     pub async fn stop(mut self) {
         self.stop_invoker().await;
         self.server.stop().await;
     }
 }
 
-/// Has a bucket's changes told. MinIO says that it is ready some moments before it knows its webhooks, and refuses their queues
-/// until then: that is waited for.
+/// Configures the bucket's notifications. MinIO reports that it is ready some moments before it knows its webhooks, and
+/// rejects their queues until then, so this waits.
 ///
 /// # Errors
-/// The store's.
+/// Fails like the store.
 pub async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipeline::Result<()> {
     let start = Instant::now();
     loop {
@@ -168,7 +173,7 @@ pub async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_
 }
 
 impl Plan {
-    /// A bucket named `rayfold` with its data in `data`.
+    /// Returns the plan of a bucket named `rayfold` with its data in `data`.
     pub fn new(store: StoreKind, data: &Path, functions: Functions) -> Self {
         Self { store, data: data.to_owned(), address: any_port(), bucket: "rayfold".into(), functions }
     }

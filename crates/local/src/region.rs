@@ -1,4 +1,4 @@
-//! The region that everything on this machine says it is in.
+//! The region of all local parts.
 
-/// The one that S3 itself takes when none is named.
+/// S3's default region.
 pub const REGION: &str = "us-east-1";

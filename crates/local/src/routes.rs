@@ -1,4 +1,4 @@
-//! Which function an event wakes, by the key's prefix: the same file that Terraform reads.
+//! Maps an event to a function by the prefix of its key, by the same file that Terraform reads.
 //!
 //! ```
 //! use rayfold_local::routes::{Function, Routes};
@@ -19,17 +19,17 @@ const SHARED: &str = include_str!("../../../infra/terraform/routes.json");
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Function {
-    /// Draws a frame.
+    /// The function that draws frames.
     Render,
-    /// Writes the GIF, and sweeps.
+    /// The function that builds GIFs, and sweeps.
     Assemble,
 }
 
 impl Function {
-    /// Both.
+    /// Both functions.
     pub const ALL: [Self; 2] = [Self::Render, Self::Assemble];
 
-    /// Of its binary.
+    /// Returns the name of the function's binary.
     pub fn binary(self) -> &'static str {
         match self {
             Self::Render => "rayfold-render",
@@ -47,19 +47,19 @@ impl fmt::Display for Function {
     }
 }
 
-/// Keys below a prefix wake a function.
+/// A rule by which keys with a prefix invoke a function.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Route {
-    /// Of the keys.
+    /// The prefix of the keys.
     pub prefix: String,
-    /// What they wake.
+    /// The function that they invoke.
     pub function: Function,
-    /// On what: S3's names of events, `*` at the end standing for any.
+    /// S3's names of the events; a `*` at the end stands for any.
     pub events: Vec<String>,
 }
 
-/// All of them.
+/// All routes.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Routes {
@@ -67,21 +67,21 @@ pub struct Routes {
 }
 
 impl Routes {
-    /// Those of `infra/terraform/routes.json`.
+    /// Returns the routes of `infra/terraform/routes.json`.
     ///
     /// # Panics
-    /// Never: the file is part of the program, and a test reads it.
+    /// Does not panic: the file is compiled in, and a test reads it.
     #[expect(clippy::expect_used, reason = "compiled in and read by a test")]
     pub fn shared() -> Self {
         serde_json::from_str(SHARED).expect("routes.json is well formed")
     }
 
-    /// One by one.
+    /// Returns an iterator over the routes.
     pub fn iter(&self) -> impl Iterator<Item = &Route> {
         self.routes.iter()
     }
 
-    /// What a store is to tell to this queue, so that it wakes them.
+    /// Returns the notifications that a store must send to this queue.
     pub fn notifications(&self, queue_arn: &str) -> Vec<Notification> {
         let to_queue = |route: &Route| Notification {
             prefix: route.prefix.clone(),
@@ -91,7 +91,8 @@ impl Routes {
         self.iter().map(to_queue).collect()
     }
 
-    /// What an event on a key (as it is, not form-encoded) wakes. AWS writes event names without the `s3:`.
+    /// Returns the function that an event on a key invokes. The key is decoded. AWS writes event names without the
+    /// `s3:`.
     pub fn function(&self, key: &str, event: &str) -> Option<Function> {
         let event = event.strip_prefix("s3:").unwrap_or(event);
         let wakes = |pattern: &String| {

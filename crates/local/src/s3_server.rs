@@ -1,8 +1,8 @@
-//! The S3 server that holds the bucket: the store built in, in this process, or MinIO, as a child process.
+//! The S3 server that holds the bucket: the store built in, in this process, or MinIO or SeaweedFS, as a child process.
 //!
-//! A folder can hold the data of both, each in a folder of its own below it: they never touch each other's, and share the
-//! owner's credentials, so that what a terminal has exported stays right. Buckets and objects are the S3 store's business
-//! (`rayfold_pipeline::store`), which speaks the same to both and to AWS.
+//! A folder can hold the data of all three, each in a folder of its own below it: they never touch each other's, and share
+//! the owner's credentials, so that what a terminal has exported stays right. Buckets and objects are the S3 store's business
+//! (`rayfold_pipeline::store`), which speaks the same to all and to AWS.
 //!
 //! Invariants: it ends with us, however we end; two processes never share a data folder; a folder that MinIO itself has
 //! for its data is refused, not written into.
@@ -11,20 +11,38 @@ use std::fmt;
 use std::fs::{self, File};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rayfold_bucket::{Options, Webhook, private};
 use rayfold_pipeline::store::Connection;
 
 use crate::credentials::Credentials;
 use crate::error::{Error, Result};
-use crate::minio::{self, Minio};
+use crate::process::ServerProcess;
+use crate::program::{MINIO, Program, SEAWEEDFS};
 use crate::region::REGION;
+use crate::{minio, seaweedfs};
 
 /// What MinIO keeps at the top of its data.
 const MINIO_MARK: &str = ".minio.sys";
 
+/// Between two attempts to lock a data folder.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A server that does not stop is killed after five seconds.
+const ATTEMPTS: u32 = 140;
+
 /// What lies in a data folder.
-const OURS: [&str; 5] = ["lock", "credentials.json", "minio.log", "bucket", "objects"];
+const OURS: [&str; 8] = [
+    "lock",
+    "credentials.json",
+    "minio.log",
+    "bucket",
+    "objects",
+    "seaweedfs",
+    "seaweedfs.log",
+    seaweedfs::CONFIG,
+];
 
 /// Which S3 server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,17 +52,29 @@ pub enum StoreKind {
     BuiltIn,
     /// MinIO.
     Minio,
+    /// SeaweedFS, which sends no events: the invoker lists the bucket.
+    SeaweedFs,
 }
 
 impl StoreKind {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::BuiltIn, Self::Minio];
+    /// All.
+    pub const ALL: [Self; 3] = [Self::BuiltIn, Self::Minio, Self::SeaweedFs];
 
     /// As a flag has it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::BuiltIn => "built-in",
             Self::Minio => "minio",
+            Self::SeaweedFs => "seaweedfs",
+        }
+    }
+
+    /// The program that has to be on the machine.
+    pub fn program(self) -> Option<&'static Program> {
+        match self {
+            Self::BuiltIn => None,
+            Self::Minio => Some(&MINIO),
+            Self::SeaweedFs => Some(&SEAWEEDFS),
         }
     }
 
@@ -58,21 +88,20 @@ impl StoreKind {
         data.join(match self {
             Self::BuiltIn => "bucket",
             Self::Minio => "objects",
+            Self::SeaweedFs => "seaweedfs",
         })
     }
 }
 
 impl fmt::Display for StoreKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::BuiltIn => "the store built in",
-            Self::Minio => "MinIO",
-        })
+        f.write_str(self.program().map_or("the store built in", |program| program.name))
     }
 }
 
 /// A running server; dropping it stops it.
 pub struct S3Server {
+    kind: StoreKind,
     running: Running,
     data: PathBuf,
     credentials: Credentials,
@@ -82,13 +111,13 @@ pub struct S3Server {
 
 enum Running {
     BuiltIn(rayfold_bucket::Server),
-    Minio(Minio),
+    Beside(ServerProcess),
 }
 
 impl S3Server {
     /// Starts a server on the folder `data` (made when missing), which is ready when this returns.
     ///
-    /// MinIO is found, or installed from source; `say` hears what takes time, a line at a time.
+    /// MinIO and SeaweedFS are found, or installed from source; `say` hears what takes time, a line at a time.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::MinioFolder`], and whatever keeps the server from starting.
@@ -107,7 +136,7 @@ impl S3Server {
         private::make(&objects).map_err(Error::file(&objects))?;
         let lock_path = data.join("lock");
         let lock = File::create(&lock_path).map_err(Error::file(&lock_path))?;
-        lock.try_lock().map_err(|_| Error::DataInUse(data.to_owned()))?;
+        take(&lock, data, say).await?;
         if holds_nothing_else(data).map_err(Error::file(data))? {
             private::close(data);
         }
@@ -130,28 +159,40 @@ impl S3Server {
                 Running::BuiltIn(server)
             }
             StoreKind::Minio => {
-                let binary = minio::find_or_install(say)?;
+                let binary = MINIO.find_or_install(say)?;
                 let log = data.join("minio.log");
-                let minio = Minio::start(&binary, &objects, &log, address, &credentials, webhook.as_ref());
-                Running::Minio(minio.await?)
+                let server =
+                    minio::start(&binary, &objects, &log, address, &credentials, webhook.as_ref(), &lock);
+                Running::Beside(server.await?)
+            }
+            StoreKind::SeaweedFs => {
+                let binary = SEAWEEDFS.find_or_install(say)?;
+                let log = data.join("seaweedfs.log");
+                let server = seaweedfs::start(&binary, &objects, &log, address, &credentials, &lock);
+                Running::Beside(server.await?)
             }
         };
-        Ok(Self { running, data: data.to_owned(), credentials, _lock: lock })
+        Ok(Self { kind, running, data: data.to_owned(), credentials, _lock: lock })
     }
 
     /// Which one it is.
     pub fn kind(&self) -> StoreKind {
-        match &self.running {
-            Running::BuiltIn(_) => StoreKind::BuiltIn,
-            Running::Minio(_) => StoreKind::Minio,
-        }
+        self.kind
     }
 
     /// Of the S3 endpoint.
     pub fn address(&self) -> SocketAddr {
         match &self.running {
             Running::BuiltIn(server) => server.address(),
-            Running::Minio(minio) => minio.address(),
+            Running::Beside(server) => server.address(),
+        }
+    }
+
+    /// Of the server's process, if it is not this one.
+    pub fn pid(&self) -> Option<u32> {
+        match &self.running {
+            Running::BuiltIn(_) => None,
+            Running::Beside(server) => Some(server.pid()),
         }
     }
 
@@ -170,11 +211,12 @@ impl S3Server {
         &self.credentials
     }
 
-    /// The queue that bucket notifications name to reach the webhook.
-    pub fn queue_arn(&self) -> &'static str {
-        match &self.running {
-            Running::BuiltIn(_) => rayfold_bucket::QUEUE_ARN,
-            Running::Minio(_) => minio::QUEUE_ARN,
+    /// The queue that bucket notifications name to reach the webhook; none if the server has no notifications.
+    pub fn queue_arn(&self) -> Option<&'static str> {
+        match self.kind {
+            StoreKind::BuiltIn => Some(rayfold_bucket::QUEUE_ARN),
+            StoreKind::Minio => Some(minio::QUEUE_ARN),
+            StoreKind::SeaweedFs => None,
         }
     }
 
@@ -182,7 +224,7 @@ impl S3Server {
     pub async fn ended(&self) -> std::process::ExitStatus {
         match &self.running {
             Running::BuiltIn(_) => std::future::pending().await,
-            Running::Minio(minio) => minio.ended().await,
+            Running::Beside(server) => server.ended().await,
         }
     }
 
@@ -190,7 +232,7 @@ impl S3Server {
     pub async fn stop(self) {
         match self.running {
             Running::BuiltIn(server) => server.stop().await,
-            Running::Minio(minio) => drop(minio),
+            Running::Beside(server) => drop(server),
         }
     }
 
@@ -216,6 +258,20 @@ impl S3Server {
             session_token: None,
         }
     }
+}
+
+/// Locks the data folder. The server of a process that was killed holds it until it has stopped.
+async fn take(lock: &File, data: &Path, say: &mut (dyn FnMut(&str) + Send)) -> Result<()> {
+    for attempt in 0..ATTEMPTS {
+        if lock.try_lock().is_ok() {
+            return Ok(());
+        }
+        if attempt == 0 {
+            say(&format!("waiting for the rayfold that uses {} to stop", data.display()));
+        }
+        tokio::time::sleep(LOOK).await;
+    }
+    Err(Error::DataInUse(data.to_owned()))
 }
 
 /// Whether all in the folder is ours. A folder of the user's that we were only put into stays open to whom it was.

@@ -16,14 +16,14 @@ use crate::animator::Animator;
 use crate::build::Built;
 use crate::invocation::{Invocation, Known, Mutation};
 use crate::keys::{Animation, Generation, Key, Receipt, Tag};
-use crate::lease::Held;
+use crate::lease::HeldLease;
 use crate::manifest::{Frame, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::store::{ETag, ObjectInfo, Store};
-use crate::wakings::Wakings;
+use crate::wake_count::WakeCount;
 use crate::{Clock, Error, Result, Timestamp};
 
-pub use crate::build::{GENERATION, MOST_PIECES, frame_key, generation_of, is_current};
+pub use crate::build::{GENERATION, MAX_PIECES, frame_key, generation_of, is_current};
 
 /// What an invocation of the assembler did.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,7 +135,7 @@ struct Tally {
     waited: Duration,
     building: Duration,
     /// The animation's lease, while this invocation holds it.
-    lease: Option<Held>,
+    lease: Option<HeldLease>,
 }
 
 impl Quiet {
@@ -178,13 +178,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut tally = Tally::new(self.clock.now());
         loop {
             tally.rounds += 1;
-            self.goes_on_with(&(&tally.quiet, tally.lease));
+            self.forget_history_before(&(&tally.quiet, tally.lease));
             let known = self.manifest(animation).await?;
             let gif = self.head(&animation.gif()).await?;
             let seen = gif.as_ref().map(|gif| gif.etag.clone());
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
-            self.goes_on_with(&(&tally.quiet, tally.lease, &known, &gif, &observation));
+            self.forget_history_before(&(&tally.quiet, tally.lease, &known, &gif, &observation));
             if known.is_none() && observation.is_of_nothing() {
                 if self.clear(animation, gif.is_some(), &observation, &mut tally).await? {
                     continue;
@@ -214,7 +214,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             };
             if next == Next::End && tally.lease.is_none() && observation.has_lease {
                 // An earlier attempt at the same event died with it, or nobody has taken it up.
-                tally.lease = self.take_left_lease(animation).await?;
+                tally.lease = self.reclaim_lease(animation).await?;
                 if tally.lease.is_some_and(|held| held.has_checkpoint) {
                     // The GIF may have been another one when it was handed over, since this round looked.
                     continue;
@@ -261,7 +261,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.delete(&animation.gif()).await?;
         }
         if tally.lease.is_none() && observation.has_lease {
-            tally.lease = self.take_left_lease(animation).await?;
+            tally.lease = self.reclaim_lease(animation).await?;
         }
         let Some(mut held) = tally.lease.take() else { return Ok(has_gif) };
         self.give_up_lease(&observation.manifest.head, &mut held).await?;
@@ -269,7 +269,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Gives the lease back, and with it the GIF that nobody will go on with.
-    async fn give_up_lease(&self, head: &Head, held: &mut Held) -> Result<()> {
+    async fn give_up_lease(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         self.abandon_checkpoint(head, held).await?;
         self.release_lease(&head.animation).await
     }
@@ -330,7 +330,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let Some(key) = frame_key(animation, frame) else { return Ok(()) };
         let wakings = self.wakings(animation, observation).await?;
         let subject = (frame.script.clone(), frame.version.clone(), frame.part);
-        let Wakings { attempts, begun, .. } = wakings.get(&subject).copied().unwrap_or_default();
+        let WakeCount { attempts, begun, .. } = wakings.get(&subject).copied().unwrap_or_default();
         self.delete(&key).await?;
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
         if begun >= self.policy.attempts {

@@ -10,10 +10,10 @@ use std::time::Duration;
 use futures_util::stream::{self, StreamExt};
 
 use crate::animator::{Animator, Encoding, Unfit};
-use crate::checkpoint::{Checkpoint, CheckpointHead, TakenUp};
+use crate::checkpoint::{Checkpoint, CheckpointHead, ResumedUpload};
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::{Animation, Receipt, Tag};
-use crate::lease::Held;
+use crate::lease::HeldLease;
 use crate::manifest::{Frame, FrameState, Head, Manifest, Reason};
 use crate::store::{Condition, ETag, ObjectInfo, PutOptions, Store, Upload};
 use crate::{Clock, Error, Result, Timestamp};
@@ -23,7 +23,7 @@ pub const GENERATION: &str = "generation";
 
 /// The most invocations that may build a GIF, one after the other. 15 minutes each are 22 hours and a half: after a day the
 /// bucket's rules remove the unfinished upload, and all would begin anew.
-pub const MOST_PIECES: u32 = 90;
+pub const MAX_PIECES: u32 = 90;
 
 /// How a build ended.
 pub(crate) enum Built<'a> {
@@ -57,7 +57,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         manifest: &'m Manifest,
         gif: Option<ObjectInfo>,
         began: Timestamp,
-        held: &mut Held,
+        held: &mut HeldLease,
     ) -> Result<Built<'m>> {
         let head = &manifest.head;
         let replaces = gif.map(|gif| gif.etag);
@@ -72,22 +72,23 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut taken_up = match self.take_up(animator, head, replaces.as_ref(), &options, held).await? {
             Some(taken_up) => taken_up,
             None => {
-                let encoding = match animator.begin(&head.settings.value.unwrap_or_default()) {
+                let settings = head.settings.value.clone().unwrap_or_default();
+                let encoding = match animator.begin(&settings.of_frames(head.total)) {
                     Ok(encoding) => encoding,
                     Err(reason) => return Ok(Built::Refused(reason)),
                 };
                 let upload = self.store.upload(&head.animation.gif(), options).await?;
-                TakenUp { encoding, upload, frames: 0, pieces: 0 }
+                ResumedUpload { encoding, upload, frames: 0, pieces: 0 }
             }
         };
         let ended = match self.encode(&mut taken_up, manifest, began).await {
             Ok(Encoded::All) => return self.finish(taken_up, head, held).await,
             Ok(Encoded::SoFar(frames)) => {
-                let TakenUp { encoding, upload, pieces, .. } = taken_up;
+                let ResumedUpload { encoding, upload, pieces, .. } = taken_up;
                 let pieces = pieces + 1;
-                if pieces == MOST_PIECES {
+                if pieces == MAX_PIECES {
                     let reason = Reason::new(format!(
-                        "{frames} of {} frames were assembled in {MOST_PIECES} invocations: give the assemble function \
+                        "{frames} of {} frames were assembled in {MAX_PIECES} invocations: give the assemble function \
                          more time or memory and retry, or fetch the frames and assemble them locally",
                         head.total
                     ));
@@ -118,7 +119,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         &self,
         upload: S::Upload,
         head: &Head,
-        held: &mut Held,
+        held: &mut HeldLease,
         ended: Result<Built<'m>>,
     ) -> Result<Built<'m>> {
         upload.abort().await?;
@@ -128,11 +129,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     async fn finish<'m, E: Encoding>(
         &self,
-        made: TakenUp<E, S::Upload>,
+        made: ResumedUpload<E, S::Upload>,
         head: &Head,
-        held: &mut Held,
+        held: &mut HeldLease,
     ) -> Result<Built<'m>> {
-        let TakenUp { encoding, mut upload, .. } = made;
+        let ResumedUpload { encoding, mut upload, .. } = made;
         let rest = match encoding.finish().await {
             Ok(rest) => rest,
             Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
@@ -162,13 +163,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// Fetches the frames that the encoder has not taken, a few ahead of it, and sends what it writes.
     async fn encode<'m, E: Encoding>(
         &self,
-        made: &mut TakenUp<E, S::Upload>,
+        made: &mut ResumedUpload<E, S::Upload>,
         manifest: &'m Manifest,
         began: Timestamp,
     ) -> Result<Encoded<'m>> {
-        let TakenUp { encoding, upload, frames: before, .. } = made;
+        let ResumedUpload { encoding, upload, frames: before, .. } = made;
         let animation = &manifest.head.animation;
-        let keys = manifest.frames.iter().filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
+        let settings = manifest.head.settings.value.clone().unwrap_or_default();
+        let shown = settings.shown(&manifest.frames);
+        let keys = shown.filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
         let keys = keys.skip(usize::try_from(*before).unwrap_or(usize::MAX));
         // A request of the SDK takes 10 KB from the moment it is made: those that have not begun are small ones.
         let fetch = |(frame, key): (&'m Frame, String)| async move {

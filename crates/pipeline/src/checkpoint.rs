@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use crate::animator::Animator;
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::Generation;
-use crate::lease::Held;
+use crate::lease::HeldLease;
 use crate::manifest::Head;
 use crate::store::{ETag, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Clock, Error, Result};
@@ -101,7 +101,7 @@ fn hash(parts: &[&[u8]]) -> String {
 }
 
 /// A GIF that is gone on with.
-pub(crate) struct TakenUp<E, U> {
+pub(crate) struct ResumedUpload<E, U> {
     pub(crate) encoding: E,
     pub(crate) upload: U,
     /// Frames that the encoder has taken.
@@ -119,8 +119,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         head: &Head,
         replaces: Option<&ETag>,
         options: &PutOptions,
-        held: &mut Held,
-    ) -> Result<Option<TakenUp<A::Encoding, S::Upload>>> {
+        held: &mut HeldLease,
+    ) -> Result<Option<ResumedUpload<A::Encoding, S::Upload>>> {
         if !held.has_checkpoint {
             return Ok(None);
         }
@@ -135,7 +135,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             if (fits || self.breaks(Mutation::TakeUpAnyCheckpoint))
                 && let Ok(encoding) = animator.resume(encoding).await
             {
-                return Ok(Some(TakenUp { encoding, upload, frames: of.frames, pieces: of.pieces }));
+                return Ok(Some(ResumedUpload { encoding, upload, frames: of.frames, pieces: of.pieces }));
             }
             // What cannot be aborted is left to the bucket's rule for unfinished uploads.
             let _ = upload.abort().await;
@@ -152,7 +152,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Removes what is written down, if there is something.
-    pub(crate) async fn drop_checkpoint(&self, head: &Head, held: &mut Held) -> Result<()> {
+    pub(crate) async fn drop_checkpoint(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         if std::mem::take(&mut held.has_checkpoint) {
             self.delete(&head.animation.checkpoint()).await?;
         }
@@ -160,7 +160,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Removes what is written down and aborts its upload: nobody will go on with it.
-    pub(crate) async fn abandon_checkpoint(&self, head: &Head, held: &mut Held) -> Result<()> {
+    pub(crate) async fn abandon_checkpoint(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         if !held.has_checkpoint {
             return Ok(());
         }

@@ -12,7 +12,7 @@ use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
 use crate::keys::{Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
 use crate::manifest::{Fact, Reason, Status};
-use crate::observe::standing;
+use crate::observe::version_result;
 use crate::render::bands::Bands;
 use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result};
@@ -144,7 +144,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 .map(Recorded::Resolved);
         }
         let receipts = self.receipts_of(&animation, &name, &version, part).await?;
-        if let Some(standing) = standing(&receipts, part) {
+        if let Some(standing) = version_result(&receipts, part) {
             let fact = standing.fact(name, version, part);
             return self.fold(&animation, &fact, Age::Old).await.map(Recorded::Resolved);
         }

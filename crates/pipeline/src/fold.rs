@@ -1,49 +1,51 @@
-//! The fold: an invocation that has put a result sees to it that the manifest shows it, and claims for the revision
-//! that it commits.
+//! The fold: an invocation that has put a result commits manifests until one shows that result, and puts the claim for
+//! the revision that it has committed.
 //!
 //! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
-//! 2. Whoever has put a result takes a frame by lot that the manifest shows to come, and leaves if it still is: its script
-//!    has that version, and there is no result. Whoever draws that one folds later (below).
-//! 3. Pause a few times as long as a look at the manifest takes, and look again, until a pause has passed in which no one
-//!    wrote: with many finishers at once one listing serves all.
-//! 4. List, reconcile, and where the manifest differs put it on the condition that it is still the one that was read.
+//! 2. An invocation that has put a result selects by lot a frame that the manifest shows as pending. It leaves if that
+//!    frame is still to come: its script has that version, and there is no result (`survey`). The invocation that draws
+//!    that frame folds later (below).
+//! 3. Pause a few times as long as it takes to read the manifest, and read it again, until no one has written it during a
+//!    pause: with many finishers at once one listing serves all.
+//! 4. List, reconcile, and if the manifest differs, put it on the condition that it is still the one that was read.
 //! 5. Leave as in 2, or **list again**, and commit again until a listing agrees with what was committed: the first listing
 //!    may be older than a quick change and change back.
-//!    Where there is neither a manifest nor anything uploaded, nothing is put: an animation that was removed stays so.
-//! 6. If nothing is left to come, put the claim of that revision, whose name is new because only its writer claims.
+//!    If there is neither a manifest nor an upload, nothing is put: an animation that was removed stays removed.
+//! 6. If no frame is to come, put the claim of that revision. Its name is new, because only the writer of a revision
+//!    claims it.
 //!
-//! Who leaves for a frame to come is covered: when that frame's result comes, or its script changes, the manifest does not
-//! show that, whichever it is by then; so the invocation of that event lists, and then it sees both, or leaves for a frame
-//! that is still to come after it. The last one finds none and lists. As most frames that a fresh manifest shows to come
-//! are, few list; the older the manifest, the more do.
+//! The result of an invocation that leaves for a frame to come is covered. When that frame's result comes, or its
+//! script changes, the manifest of that time does not show this. So the invocation of that event lists, and sees both
+//! results, or it leaves for a frame that is still to come after it. The last invocation finds no such frame and lists.
+//! Most frames that a fresh manifest shows as pending are still to come, so few invocations list; the older the
+//! manifest, the more do.
 //!
 //! A manifest covers a fact if it shows it, or if it is at least the second revision after one that was read when the
 //! fact held already: each revision is put on the condition that its predecessor is still there, and its listing starts
 //! after the predecessor was read. So the listing of the second one started after the first was put, hence after the
 //! fact; it has seen the fact, or what came later.
 //!
-//! Invariant: whoever finds its own commit, as after a crash or a lost answer, still owes the claim, and leaves only for a
-//! frame to come.
+//! Invariant: an invocation that finds its own commit, as after a crash or a lost answer, has still to put the claim,
+//! and leaves only for a frame to come.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Duration;
 
-use futures_util::future::try_join;
-
-use crate::invocation::{Glimpse, Invocation, Known, Mutation};
+use crate::invocation::{Invocation, Known, ManifestPrefix, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Fact, Frame, FrameState, Gif, Manifest};
+use crate::manifest::{Fact, Gif, Manifest};
+use crate::observe::Observation;
 use crate::store::{ETag, PAGE, PutOptions, Store};
+use crate::survey::{Next, Page};
 use crate::{Clock, Error, Result, invariants};
 
-/// How a fold ended.
+/// The outcome of a fold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Folded {
-    /// Nothing has come that a manifest shows: it was not looked at.
+    /// No result has come that a manifest shows: the manifest was not read.
     Untouched,
     /// The manifest, someone else's, showed the fact: nothing was listed.
     Covered,
-    /// Another frame is to come, and whoever draws it folds: nothing was listed.
+    /// Another frame is to come, and the invocation that draws it folds: nothing was listed.
     Awaited,
     /// The manifest agreed with the listing.
     Agreed,
@@ -53,79 +55,84 @@ pub enum Folded {
     Claimed,
 }
 
-/// How often an invocation commits, one listing after the other, before it lets others do so.
-const MOST_COMMITS: u32 = 16;
+/// The largest number of commits of an invocation, one listing after the other, before it lets others commit.
+const MAX_COMMITS: u32 = 16;
 
-/// How long a fact has held.
+/// The age of a fact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Age {
-    /// This invocation has just put what makes it hold: hardly anyone can have listed it.
+    /// This invocation has just put the object that makes it hold: hardly any other can have listed that.
     New,
-    /// For a while, perhaps.
+    /// It may have held for a while.
     Old,
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Sees to it that the manifest shows `fact`. What an invocation does after it depends on nothing from before it.
+    /// Makes sure that the manifest shows `fact`. The later steps of an invocation depend on nothing from before it.
     pub(crate) async fn fold(&self, animation: &Animation, fact: &Fact, age: Age) -> Result<Folded> {
-        self.goes_on_with(&(animation, fact, age));
+        self.forget_history_before(&(animation, fact, age));
         let start = self.clock.now();
-        let glimpse = self.glimpse(animation).await?;
+        let glimpse = self.read_prefix(animation).await?;
         self.fold_from(animation, fact, age, (glimpse, self.clock.now().since(start))).await
     }
 
-    /// The same from a look at the manifest that was taken when the fact held already, and took so long.
+    /// Folds as [`fold`](Self::fold) does, from a read of the manifest that was made when the fact held already, and
+    /// took so long.
     pub(crate) async fn fold_from(
         &self,
         animation: &Animation,
         fact: &Fact,
         age: Age,
-        (mut glimpse, look): (Glimpse, Duration),
+        (mut glimpse, look): (ManifestPrefix, Duration),
     ) -> Result<Folded> {
         let first = glimpse.revision();
-        // Of a large manifest that would be one more request, mostly in vain.
-        let is_worth_it = age == Age::Old || !matches!(glimpse, Glimpse::Start { .. });
+        // For a large manifest this would be one more request, mostly in vain.
+        let is_worth_it = age == Age::Old || !matches!(glimpse, ManifestPrefix::Start { .. });
         if is_worth_it && self.may_leave(&glimpse) && self.shows(animation, &glimpse, fact).await? {
             return Ok(Folded::Covered);
         }
+        let mut page: Option<Page> = None;
         loop {
-            self.goes_on_with(&(animation, fact, first, look, &glimpse));
-            let is_due = self.is_due(&glimpse, fact);
-            if !is_due
-                && self.is_another_awaited(animation, fact, glimpse.revision(), glimpse.frames()).await?
-            {
-                return Ok(Folded::Awaited);
-            }
-            let before = glimpse.revision();
-            self.goes_on_with(&(animation, fact, first, look, before));
-            self.pause(look).await;
-            glimpse = self.glimpse(animation).await?;
-            if glimpse.revision() != before {
-                if self.is_covered(animation, &glimpse, fact, first).await? {
-                    return Ok(Folded::Covered);
+            self.forget_history_before(&(animation, fact, first, look, &glimpse, &page));
+            let listed = match self.survey(animation, fact, &glimpse, &mut page).await? {
+                Next::Leave => return Ok(Folded::Awaited),
+                Next::Write(observation) => Some(*observation),
+                Next::Wait => None,
+            };
+            if listed.is_none() {
+                let before = glimpse.revision();
+                self.forget_history_before(&(animation, fact, first, look, before, &page));
+                self.pause(look).await;
+                glimpse = self.read_prefix(animation).await?;
+                if glimpse.revision() != before {
+                    if self.is_covered(animation, &glimpse, fact, first).await? {
+                        return Ok(Folded::Covered);
+                    }
+                    page = page.map(Page::aged);
+                    continue;
                 }
-                continue;
             }
             let mut known = match glimpse {
-                Glimpse::Nothing => None,
-                Glimpse::Unreadable(known) | Glimpse::Whole(known) => Some(known),
-                Glimpse::Start { .. } => self.manifest(animation).await?,
+                ManifestPrefix::Nothing => None,
+                ManifestPrefix::Unreadable(known) | ManifestPrefix::Whole(known) => Some(known),
+                ManifestPrefix::Start { .. } => self.manifest(animation).await?,
             };
-            self.goes_on_with(&(animation, fact, first, look, &known));
-            if let Some(folded) = self.commit_until_agreed(animation, fact, &mut known).await? {
+            self.forget_history_before(&(animation, fact, first, look, &known, &listed, &page));
+            if let Some(folded) = self.commit_until_agreed(animation, fact, &mut known, listed).await? {
                 return Ok(folded);
             }
-            self.goes_on_with(&(animation, fact, first, look));
-            glimpse = self.glimpse(animation).await?;
+            page = page.map(Page::aged);
+            self.forget_history_before(&(animation, fact, first, look, &page));
+            glimpse = self.read_prefix(animation).await?;
             if self.is_covered(animation, &glimpse, fact, first).await? {
                 return Ok(Folded::Covered);
             }
         }
     }
 
-    /// Whether the manifest is to be written in any case: to show what is no frame's result, or because people have waited
-    /// for long to see how far it is, the longer the dearer a listing is.
-    fn is_due(&self, glimpse: &Glimpse, fact: &Fact) -> bool {
+    /// Returns whether the manifest is to be written in any case: to show a fact that is no frame's result, or because
+    /// it has not shown the progress for long. That time grows with the cost of a listing.
+    pub(crate) fn is_due(&self, glimpse: &ManifestPrefix, fact: &Fact) -> bool {
         let Some(head) = glimpse.head() else { return true };
         let pages = u32::try_from(head.total / PAGE as u64).unwrap_or(u32::MAX).saturating_add(1);
         let age = self.clock.now().since(glimpse.modified());
@@ -134,44 +141,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             || age >= self.policy.fresh.saturating_mul(pages)
     }
 
-    /// Whether one of the frames, another than the fact's, is still to come: one that is taken by lot of those that the
-    /// manifest shows pending.
-    async fn is_another_awaited(
-        &self,
-        animation: &Animation,
-        fact: &Fact,
-        revision: u64,
-        frames: &[Frame],
-    ) -> Result<bool> {
-        let is_other = |frame: &&Frame| {
-            frame.state == FrameState::Pending && fact.subject() != Some((&frame.script, frame.part))
-        };
-        let others: Vec<&Frame> = frames.iter().filter(is_other).collect();
-        let mut lot = DefaultHasher::new();
-        (self.request_id(), revision).hash(&mut lot);
-        let place =
-            lot.finish().checked_rem(others.len() as u64).and_then(|place| usize::try_from(place).ok());
-        let Some(frame) = place.and_then(|place| others.get(place)) else { return Ok(false) };
-        if self.breaks(Mutation::LeaveForAnyFrame) {
-            return Ok(true);
-        }
-        let key = animation.script(&frame.script);
-        let result = self.has_result(animation, &frame.script, &frame.version, frame.part);
-        let (script, has_result) = try_join(self.head(&key), result).await?;
-        Ok(!has_result && script.is_some_and(|script| script.etag == frame.version))
-    }
-
-    /// Whether whoever wrote the manifest will see to its claim: this invocation and earlier attempts at its event have
-    /// not, or it would not be here.
-    fn may_leave(&self, glimpse: &Glimpse) -> bool {
+    /// Returns whether the writer of the manifest will put its claim. This invocation and earlier attempts at its event
+    /// have not, or it would not be here.
+    fn may_leave(&self, glimpse: &ManifestPrefix) -> bool {
         glimpse.head().is_some_and(|head| !self.is_own(head) || self.breaks(Mutation::LeaveOwnCommit))
     }
 
-    /// Whether someone else's manifest shows the fact, or follows late enough on the revision that was read when it held.
+    /// Returns whether another invocation's manifest shows the fact, or follows late enough on the revision that was
+    /// read when the fact held.
     async fn is_covered(
         &self,
         animation: &Animation,
-        glimpse: &Glimpse,
+        glimpse: &ManifestPrefix,
         fact: &Fact,
         first: u64,
     ) -> Result<bool> {
@@ -181,24 +162,29 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if *fact != Fact::Fold && glimpse.revision() >= first + 2 {
             return Ok(true);
         }
-        // Of a large manifest the lines are one more request, in vain while most frames are to come.
+        // For a large manifest the lines are one more request, in vain while most frames are to come.
         let is_worth_it = match glimpse {
-            Glimpse::Start { beginning, .. } => beginning.head.done > beginning.head.pending,
+            ManifestPrefix::Start { beginning, .. } => beginning.head.done > beginning.head.pending,
             _ => true,
         };
         Ok(is_worth_it && self.shows(animation, glimpse, fact).await?)
     }
 
-    /// Lists and commits until a listing agrees, or until whoever draws a frame to come will list; `None` when someone
-    /// else's commit came first, or when frames come as fast as they are written down and it is others' turn to do that.
+    /// Lists and commits until a listing agrees, or until a frame is to come whose invocation will list. Returns `None`
+    /// when another invocation's commit came first, or when frames come as fast as they are committed and it is the
+    /// turn of others. `listed` is a listing that was made after the manifest was read.
     async fn commit_until_agreed(
         &self,
         animation: &Animation,
         fact: &Fact,
         known: &mut Option<Known>,
+        mut listed: Option<Observation>,
     ) -> Result<Option<Folded>> {
-        for _ in 0..MOST_COMMITS {
-            let observation = self.observe(animation, known.as_ref()).await?;
+        for _ in 0..MAX_COMMITS {
+            let observation = match listed.take() {
+                Some(listed) => listed,
+                None => self.observe(animation, known.as_ref()).await?,
+            };
             if known.is_none() && observation.is_of_nothing() {
                 return Ok(Some(Folded::Agreed));
             }
@@ -214,10 +200,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     return self.end(&committed).await.map(Some);
                 }
                 Some(committed) => {
-                    let Manifest { head, frames } = &committed.manifest;
-                    let may_leave = !head.is_terminal() && *fact != Fact::Fold;
-                    if may_leave && self.is_another_awaited(animation, fact, head.revision, frames).await? {
-                        return Ok(Some(Folded::Committed));
+                    if !committed.manifest.head.is_terminal() && *fact != Fact::Fold {
+                        listed = match self.survey_again(animation, fact, &committed).await? {
+                            Next::Leave => return Ok(Some(Folded::Committed)),
+                            Next::Write(observation) => Some(*observation),
+                            Next::Wait => None,
+                        };
                     }
                     *known = Some(committed);
                 }
@@ -227,7 +215,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(None)
     }
 
-    /// Claims for what this invocation has committed, if nothing is left to come.
+    /// Puts the claim for the revision that this invocation has committed, if no frame is to come.
     async fn end(&self, known: &Known) -> Result<Folded> {
         if !self.is_own(&known.manifest.head) {
             return Ok(Folded::Agreed);
@@ -240,7 +228,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Folded::Claimed)
     }
 
-    /// Puts the next revision; `None` when the manifest is no longer, or perhaps not, the one that was known.
+    /// Puts the next revision. Returns `None` when the manifest is no longer, or perhaps not, the one that was known.
     pub(crate) async fn commit(
         &self,
         animation: &Animation,
@@ -266,8 +254,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_manifest(next, options).await
     }
 
-    /// Writes down which GIF is this generation's; `None` as of a commit. It is no revision: whatever else the manifest says
-    /// was listed before it.
+    /// Records the GIF of this generation in the manifest; `None` as for a commit. This is no new revision: everything
+    /// else in the manifest was listed before it.
     pub(crate) async fn record_gif(&self, known: &Known, version: ETag) -> Result<Option<Known>> {
         if known.manifest.head.gif_version() == Some(&version) {
             return Ok(Some(known.clone()));
@@ -287,7 +275,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Wakes the assembler.
+    /// Puts a claim, which wakes the assembler.
     pub(crate) async fn claim(&self, manifest: &Manifest) -> Result<()> {
         let head = &manifest.head;
         let key = Key::Claim {
@@ -300,11 +288,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// Folds in any case: what a command does after it has changed results behind the functions' back.
+/// Folds in any case, for a command that has changed results without the functions.
 ///
 /// # Errors
 ///
-/// Those of the store, and [`Error::Malformed`] when an object of the pipeline's cannot be read.
+/// The errors of the store, and [`Error::Malformed`] when an object of the pipeline cannot be read.
 pub async fn fold<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     animation: &Animation,

@@ -101,18 +101,18 @@ pub struct Invocation<'a, S, C> {
     #[cfg(any(test, feature = "simulation"))]
     mutation: Option<Mutation>,
     #[cfg(any(test, feature = "simulation"))]
-    carried: Option<&'a Carried>,
+    replay_state: Option<&'a ReplayState>,
 }
 
-/// What an invocation has said last that its doings depend on: see [`Invocation::goes_on_with`].
+/// The latest statement of an invocation about what the rest of its steps depends on. The search of small worlds reads it.
 #[cfg(any(test, feature = "simulation"))]
 #[derive(Debug, Default)]
-pub(crate) struct Carried(std::sync::Mutex<Option<String>>);
+pub struct ReplayState(std::sync::Mutex<Option<String>>);
 
 #[cfg(any(test, feature = "simulation"))]
-impl Carried {
+impl ReplayState {
     /// What was said since the last call.
-    pub(crate) fn take(&self) -> Option<String> {
+    pub fn take(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take()
     }
 }
@@ -194,7 +194,7 @@ fn blank(animation: &Animation) -> Manifest {
 
 /// What one small request shows of a manifest.
 #[derive(Debug)]
-pub(crate) enum Glimpse {
+pub(crate) enum ManifestPrefix {
     /// There is none.
     Nothing,
     /// It cannot be read.
@@ -205,40 +205,40 @@ pub(crate) enum Glimpse {
     Start { beginning: Beginning, info: ObjectInfo },
 }
 
-impl From<Option<Known>> for Glimpse {
+impl From<Option<Known>> for ManifestPrefix {
     fn from(known: Option<Known>) -> Self {
         match known {
-            None => Glimpse::Nothing,
-            Some(known) if known.unreadable.is_some() => Glimpse::Unreadable(known),
-            Some(known) => Glimpse::Whole(known),
+            None => ManifestPrefix::Nothing,
+            Some(known) if known.unreadable.is_some() => ManifestPrefix::Unreadable(known),
+            Some(known) => ManifestPrefix::Whole(known),
         }
     }
 }
 
-impl Glimpse {
+impl ManifestPrefix {
     pub(crate) fn head(&self) -> Option<&Head> {
         match self {
-            Glimpse::Nothing | Glimpse::Unreadable(_) => None,
-            Glimpse::Whole(known) => Some(&known.manifest.head),
-            Glimpse::Start { beginning, .. } => Some(&beginning.head),
+            ManifestPrefix::Nothing | ManifestPrefix::Unreadable(_) => None,
+            ManifestPrefix::Whole(known) => Some(&known.manifest.head),
+            ManifestPrefix::Start { beginning, .. } => Some(&beginning.head),
         }
     }
 
     /// The manifest's frames, or some of those to come.
     pub(crate) fn frames(&self) -> &[Frame] {
         match self {
-            Glimpse::Nothing | Glimpse::Unreadable(_) => &[],
-            Glimpse::Whole(known) => &known.manifest.frames,
-            Glimpse::Start { beginning, .. } => &beginning.awaited,
+            ManifestPrefix::Nothing | ManifestPrefix::Unreadable(_) => &[],
+            ManifestPrefix::Whole(known) => &known.manifest.frames,
+            ManifestPrefix::Start { beginning, .. } => &beginning.awaited,
         }
     }
 
     /// When the manifest was written.
     pub(crate) fn modified(&self) -> Timestamp {
         match self {
-            Glimpse::Nothing => Timestamp::default(),
-            Glimpse::Unreadable(known) | Glimpse::Whole(known) => known.modified,
-            Glimpse::Start { info, .. } => info.modified,
+            ManifestPrefix::Nothing => Timestamp::default(),
+            ManifestPrefix::Unreadable(known) | ManifestPrefix::Whole(known) => known.modified,
+            ManifestPrefix::Start { info, .. } => info.modified,
         }
     }
 
@@ -268,7 +268,7 @@ impl<'a, S, C> Invocation<'a, S, C> {
             #[cfg(any(test, feature = "simulation"))]
             mutation: None,
             #[cfg(any(test, feature = "simulation"))]
-            carried: None,
+            replay_state: None,
         }
     }
 
@@ -290,22 +290,23 @@ impl<'a, S, C> Invocation<'a, S, C> {
 
     /// The same, leaving there what it goes on with.
     #[cfg(any(test, feature = "simulation"))]
-    pub(crate) fn leaving(self, carried: &'a Carried) -> Self {
-        Invocation { carried: Some(carried), ..self }
+    pub fn leaving(self, replay_state: &'a ReplayState) -> Self {
+        Invocation { replay_state: Some(replay_state), ..self }
     }
 
     /// Says that all that this invocation will do from here on depends on these alone, besides its event and the answers to
     /// come. The search of small worlds forgets everything else that has happened to it.
     #[cfg(any(test, feature = "simulation"))]
-    pub(crate) fn goes_on_with(&self, what: &dyn std::fmt::Debug) {
-        if let Some(Carried(carried)) = self.carried {
-            *carried.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(format!("{what:?}"));
+    pub(crate) fn forget_history_before(&self, what: &dyn std::fmt::Debug) {
+        if let Some(ReplayState(replay_state)) = self.replay_state {
+            *replay_state.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
+                Some(format!("{what:?}"));
         }
     }
 
     #[cfg(not(any(test, feature = "simulation")))]
     #[expect(clippy::unused_self, reason = "without the search nobody asks")]
-    pub(crate) fn goes_on_with(&self, _: &dyn std::fmt::Debug) {}
+    pub(crate) fn forget_history_before(&self, _: &dyn std::fmt::Debug) {}
 
     /// Whether this rule is to be broken.
     #[cfg(any(test, feature = "simulation"))]
@@ -380,26 +381,31 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Reads the manifest's beginning, or all of it when it is small.
-    pub(crate) async fn glimpse(&self, animation: &Animation) -> Result<Glimpse> {
+    pub(crate) async fn read_prefix(&self, animation: &Animation) -> Result<ManifestPrefix> {
         let key = animation.manifest();
         let read = self.persist(|| self.store.get_range(&key, 0..self.policy.glimpse)).await;
-        let Some(object) = found(read)? else { return Ok(Glimpse::Nothing) };
+        let Some(object) = found(read)? else { return Ok(ManifestPrefix::Nothing) };
         if object.info.size == object.body.len() as u64 {
             return Ok(Some(Known::of(animation, object)).into());
         }
         match Beginning::decode(animation, &object.body) {
-            Ok(Some(beginning)) => Ok(Glimpse::Start { beginning, info: object.info }),
+            Ok(Some(beginning)) => Ok(ManifestPrefix::Start { beginning, info: object.info }),
             Ok(None) | Err(_) => Ok(self.manifest(animation).await?.into()),
         }
     }
 
     /// Whether the manifest shows the fact. Of a large one the lines are read that would; if it has been replaced since,
     /// it does not.
-    pub(crate) async fn shows(&self, animation: &Animation, glimpse: &Glimpse, fact: &Fact) -> Result<bool> {
+    pub(crate) async fn shows(
+        &self,
+        animation: &Animation,
+        glimpse: &ManifestPrefix,
+        fact: &Fact,
+    ) -> Result<bool> {
         let (beginning, info) = match glimpse {
-            Glimpse::Nothing | Glimpse::Unreadable(_) => return Ok(false),
-            Glimpse::Whole(known) => return Ok(known.manifest.shows(fact)),
-            Glimpse::Start { beginning, info } => (beginning, info),
+            ManifestPrefix::Nothing | ManifestPrefix::Unreadable(_) => return Ok(false),
+            ManifestPrefix::Whole(known) => return Ok(known.manifest.shows(fact)),
+            ManifestPrefix::Start { beginning, info } => (beginning, info),
         };
         let Some((name, part)) = fact.subject() else {
             return Ok(fact.is_shown_by(&beginning.head, &[]));

@@ -39,6 +39,7 @@ pub const MANIFESTS: &str = "manifests/";
 
 /// What a lease's file is called. No receipt ends like this.
 const LEASE_FILE: &str = "@assembler.json";
+const SWEEP_LEASE_FILE: &str = "@sweep.json";
 
 /// Where unfinished GIFs are written down, and what their names end in.
 const CHECKPOINTS: &str = "checkpoints/";
@@ -122,6 +123,11 @@ pub enum Key {
     },
     /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
     Lease {
+        /// The animation.
+        animation: Animation,
+    },
+    /// `frames/<animation>/@sweep.json`: which sweep deletes what may have to be drawn again.
+    SweepLease {
         /// The animation.
         animation: Animation,
     },
@@ -376,6 +382,7 @@ impl Key {
             | Key::Band { animation, .. }
             | Key::Receipt { animation, .. }
             | Key::Lease { animation }
+            | Key::SweepLease { animation }
             | Key::Manifest { animation }
             | Key::SetAside { animation, .. }
             | Key::Claim { animation, .. }
@@ -409,8 +416,10 @@ impl FromStr for Key {
                 Key::Part { animation: Animation::new(animation)?, name, tag, number }
             }
             "frames" if rest.ends_with(LEASE_FILE) => {
-                let animation = rest.strip_suffix(LEASE_FILE).and_then(|above| above.strip_suffix('/'));
-                Key::Lease { animation: Animation::new(animation.ok_or_else(unknown)?)? }
+                Key::Lease { animation: above(rest, LEASE_FILE).ok_or_else(unknown)? }
+            }
+            "frames" if rest.ends_with(SWEEP_LEASE_FILE) => {
+                Key::SweepLease { animation: above(rest, SWEEP_LEASE_FILE).ok_or_else(unknown)? }
             }
             "frames" => {
                 let (animation, receipt) = receipt(rest).ok_or_else(unknown)?;
@@ -503,6 +512,11 @@ fn script(text: &str, rest: &str) -> Result<Key> {
         Name::Script(name) => Key::Script { animation, name: ScriptName(name.to_owned()) },
         _ => Key::Settings { animation },
     })
+}
+
+/// The animation of `<animation>/<file>`.
+fn above(rest: &str, file: &str) -> Option<Animation> {
+    Animation::new(rest.strip_suffix(file)?.strip_suffix('/')?).ok()
 }
 
 /// `<animation>/<name>@<tag>/<file>`, cut at the slashes.
@@ -620,6 +634,7 @@ impl fmt::Display for Key {
             }
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
             Key::Lease { animation } => write!(f, "{}{LEASE_FILE}", animation.frames()),
+            Key::SweepLease { animation } => write!(f, "{}{SWEEP_LEASE_FILE}", animation.frames()),
             Key::Manifest { animation } => f.write_str(&animation.manifest()),
             Key::SetAside { animation, version } => {
                 write!(f, "{}~{}", animation.manifest(), escape(version))

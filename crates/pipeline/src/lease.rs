@@ -1,10 +1,10 @@
-//! At most one assembler an animation waits or builds at a time: an object that says which, and until when.
+//! At most one assembler per animation waits or builds at a time: an object, the lease, says which one, and until when.
 //!
-//! The holder deletes it when there is nothing left to do, and then looks at the manifest and the GIF once more: whoever has
-//! found the lease taken, and left, was woken for a manifest that was written before, and may have deleted the GIF before. A
-//! holder that dies leaves it to the platform's next attempt at its event, which has the same request id, or for anyone to
-//! take over once its time is up. A holder whose GIF is not finished in its time leaves it to whoever comes next, and says so
-//! in it.
+//! The holder deletes the lease when there is nothing left to do, and then reads the manifest and the GIF once more: an
+//! invocation that found the lease taken, and left, was woken for a manifest that was written before, and may have
+//! deleted the GIF before. A holder that dies leaves the lease to the platform's next attempt at its event, which has
+//! the same request id. Once the lease has expired, any invocation may take it over. A holder that does not finish its
+//! GIF in its time hands the lease over to the next invocation, and says so in the lease.
 
 use std::time::Duration;
 
@@ -16,42 +16,66 @@ use crate::keys::{Animation, Key};
 use crate::store::{ETag, PutOptions, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// How often a lease that comes and goes is asked for.
+/// The number of attempts to take a lease that comes and goes.
 const ATTEMPTS: u32 = 3;
 
-/// The longest time that a lease can still have: Lambda's 15 minutes, and clocks that disagree by a few. One that says more
-/// was written by a clock that was wrong, and would hold others off for as long as that was ahead.
+/// The longest time until a lease can expire: Lambda's 15 minutes, and a few minutes for clocks that disagree. A lease
+/// with more time left was written by a clock that was ahead, and would keep others waiting for as long as that.
 const LONGEST: Duration = Duration::from_secs(20 * 60);
 
-/// What the object says.
+/// The largest difference between two clocks.
+const SLACK: Duration = Duration::from_secs(2 * 60);
+
+/// The content of the lease object.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Lease {
     /// The holder's request id.
     assembler: String,
-    /// When the platform will have ended the holder.
+    /// The time by which the platform has ended the holder.
     until: Timestamp,
-    /// Whether an unfinished GIF is written down.
+    /// Whether there is a checkpoint of an unfinished GIF.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     checkpoint: bool,
 }
 
-/// The lease in the hands of an invocation.
+/// The owner of the lease for the sweep that deletes results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SweepLease {
+    /// Another sweep.
+    Anothers,
+    /// This sweep; there was no lease before.
+    New,
+    /// This sweep now. A sweep that died, perhaps an earlier attempt at this one, has held the lease since then.
+    Left(Timestamp),
+}
+
+/// A lease that this invocation holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Held {
-    /// Whether an unfinished GIF is written down.
+pub(crate) struct HeldLease {
+    /// Whether there is a checkpoint of an unfinished GIF.
     pub(crate) has_checkpoint: bool,
 }
 
-/// What stands for the holder of a lease that was handed over and not yet taken.
+/// The `assembler` of a lease that was handed over and not yet taken.
 const NOBODY: &str = "";
 
+/// The outcome of an attempt to take a lease.
+enum Taken {
+    /// Another invocation holds it.
+    Anothers,
+    /// There was no lease.
+    New,
+    /// A dead holder or an earlier attempt at this event left it: its content, and the time since which it was held.
+    Left(Option<Lease>, Timestamp),
+}
+
 impl Lease {
-    /// One that anyone may take, with the GIF that is written down.
+    /// Returns a lease that any invocation may take, with a checkpoint of the GIF.
     fn of_nobody() -> Self {
         Lease { assembler: NOBODY.to_owned(), until: Timestamp(0), checkpoint: true }
     }
 
-    /// Whether its time is not up.
+    /// Returns whether the lease has not expired.
     fn stands(&self, now: Timestamp) -> bool {
         self.until > now && self.until <= now.after(LONGEST)
     }
@@ -63,76 +87,113 @@ fn encode(key: &str, lease: &Lease) -> Result<Bytes> {
     Ok(body.into())
 }
 
-/// Whose lease it is; one that cannot be read is nobody's.
+/// Decodes a lease; one that cannot be read has no holder.
 fn holder(body: &[u8]) -> Option<Lease> {
     serde_json::from_slice(body).ok()
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Takes the animation's lease, if no other invocation has it.
+    /// Takes the animation's lease if no other invocation holds it.
     ///
     /// # Errors
     ///
-    /// Those of the store, and [`Error::Conflict`] for a lease that comes and goes.
-    pub(crate) async fn take_lease(&self, animation: &Animation) -> Result<Option<Held>> {
-        let key = Key::Lease { animation: animation.clone() }.to_string();
+    /// The errors of the store, and [`Error::Conflict`] for a lease that comes and goes.
+    pub(crate) async fn take_lease(&self, animation: &Animation) -> Result<Option<HeldLease>> {
+        let key = Key::Lease { animation: animation.clone() };
+        Ok(match self.take(&key, |holder| holder.stands(self.clock.now())).await? {
+            Taken::Anothers => None,
+            Taken::New => Some(HeldLease::default()),
+            Taken::Left(holder, _) => {
+                Some(HeldLease { has_checkpoint: holder.is_some_and(|holder| holder.checkpoint) })
+            }
+        })
+    }
+
+    async fn take(&self, key: &Key, stands: impl Fn(&Lease) -> bool) -> Result<Taken> {
+        let key = key.to_string();
         for _ in 0..ATTEMPTS {
-            let body = encode(&key, &self.own_lease(Held::default()))?;
+            let body = encode(&key, &self.own_lease(HeldLease::default()))?;
             if self.put_receipt(&key, body, "application/json").await?.is_some() {
-                return Ok(Some(Held::default()));
+                return Ok(Taken::New);
             }
             let Some(there) = self.get(&key).await? else { continue };
             let holder = holder(&there.body);
             let is_own = self.is_held(holder.as_ref());
-            let held = Held { has_checkpoint: holder.as_ref().is_some_and(|holder| holder.checkpoint) };
-            if holder.is_some_and(|holder| !is_own && holder.stands(self.clock.now())) {
-                return Ok(None);
+            if holder.as_ref().is_some_and(|holder| !is_own && stands(holder)) {
+                return Ok(Taken::Anothers);
             }
-            // An own one need not be renewed.
+            let held = HeldLease { has_checkpoint: holder.as_ref().is_some_and(|holder| holder.checkpoint) };
+            // A lease of its own need not be renewed.
             if self.replace_lease(&key, &self.own_lease(held), there.info.etag).await? || is_own {
-                return Ok(Some(held));
+                return Ok(Taken::Left(holder, there.info.modified));
             }
         }
         Err(Error::Conflict { key })
     }
 
-    fn own_lease(&self, held: Held) -> Lease {
+    /// Takes the lease for the sweep that deletes results. Returns since when a dead sweep has held it, if one has.
+    ///
+    /// # Errors
+    ///
+    /// As [`Invocation::take_lease`].
+    pub(crate) async fn take_sweep_lease(&self, animation: &Animation) -> Result<SweepLease> {
+        let key = Key::SweepLease { animation: animation.clone() };
+        // The holder does not check that it still has the lease, so the lease stays another's for a while after it has
+        // expired.
+        let stands = |holder: &Lease| {
+            let until = holder.until.after(SLACK);
+            !self.policy.is_fresh_start && Lease { until, ..holder.clone() }.stands(self.clock.now())
+        };
+        Ok(match self.take(&key, stands).await? {
+            Taken::Anothers => SweepLease::Anothers,
+            Taken::New => SweepLease::New,
+            Taken::Left(_, since) => SweepLease::Left(since),
+        })
+    }
+
+    /// Releases the lease for the sweep.
+    pub(crate) async fn release_sweep_lease(&self, animation: &Animation) -> Result<()> {
+        self.delete(&Key::SweepLease { animation: animation.clone() }.to_string()).await
+    }
+
+    fn own_lease(&self, held: HeldLease) -> Lease {
         let until = self.deadline.unwrap_or_else(|| self.clock.now().after(self.policy.stuck_after));
         Lease { assembler: self.request_id().to_owned(), until, checkpoint: held.has_checkpoint }
     }
 
-    /// Whether it is this event's, perhaps from an earlier attempt at it.
+    /// Returns whether this event holds the lease, perhaps by an earlier attempt at it.
     fn is_held(&self, holder: Option<&Lease>) -> bool {
         holder.is_some_and(|holder| holder.assembler == self.request_id())
     }
 
-    /// Whether another invocation holds the lease. It looks at the manifest once more when it has given it back, so whoever
-    /// is woken for a manifest that was written before need not look.
+    /// Returns whether another invocation holds the lease. The holder reads the manifest again after it has released
+    /// the lease, so that an invocation that was woken for an earlier manifest need not.
     pub(crate) async fn is_held_by_another(&self, animation: &Animation) -> Result<bool> {
         let there = self.get(&Key::Lease { animation: animation.clone() }.to_string()).await?;
         let holder = there.and_then(|there| holder(&there.body));
         Ok(holder.is_some_and(|holder| !self.is_held(Some(&holder)) && holder.stands(self.clock.now())))
     }
 
-    /// Frees the lease of an event that the platform has given up.
+    /// Releases the lease of an event that the platform has given up.
     pub(crate) async fn free_lease_of(&self, animation: &Animation, request_id: &str) -> Result<()> {
         self.free_lease(animation, |holder| holder.assembler == request_id).await
     }
 
-    /// Frees the lease of whoever began before this invocation, to which the platform gives as much time.
-    pub(crate) async fn free_lease_from_before(&self, animation: &Animation) -> Result<()> {
-        let own = self.own_lease(Held::default());
+    /// Releases a lease that expires before one taken now would. Its holder started earlier, and both have the same
+    /// time limit.
+    pub(crate) async fn release_stale_lease(&self, animation: &Animation) -> Result<()> {
+        let own = self.own_lease(HeldLease::default());
         self.free_lease(animation, |holder| holder.until < own.until).await
     }
 
-    /// Leaves the lease of a dead holder to whoever comes next, with what it has written down.
+    /// Leaves the lease of a dead holder to the next invocation, with its checkpoint.
     async fn free_lease(&self, animation: &Animation, is_dead: impl Fn(&Lease) -> bool) -> Result<()> {
         let key = Key::Lease { animation: animation.clone() }.to_string();
         let Some(there) = self.get(&key).await? else { return Ok(()) };
         let Some(holder) = holder(&there.body) else { return Ok(()) };
         if holder.assembler != NOBODY && is_dead(&holder) {
             let free = Lease { checkpoint: holder.checkpoint, ..Lease::of_nobody() };
-            // If that fails, the lease is another's by now, or stands until its time is up.
+            // If this fails, another invocation has the lease by now, or it stays until it expires.
             self.replace_lease(&key, &free, there.info.etag).await?;
         }
         Ok(())
@@ -148,13 +209,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Takes the lease of an earlier attempt at this event, or one that was handed over and not taken.
-    pub(crate) async fn take_left_lease(&self, animation: &Animation) -> Result<Option<Held>> {
+    pub(crate) async fn reclaim_lease(&self, animation: &Animation) -> Result<Option<HeldLease>> {
         let key = Key::Lease { animation: animation.clone() }.to_string();
-        // Again where the answer was lost: it may be ours by then.
+        // Tried again after a lost answer: the lease may be this event's by then.
         for _ in 0..ATTEMPTS {
             let Some(there) = self.get(&key).await? else { return Ok(None) };
             let Some(holder) = holder(&there.body) else { return Ok(None) };
-            let held = Held { has_checkpoint: holder.checkpoint };
+            let held = HeldLease { has_checkpoint: holder.checkpoint };
             if self.is_held(Some(&holder)) {
                 return Ok(Some(held));
             }
@@ -168,12 +229,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key })
     }
 
-    /// Leaves the lease to whoever comes next, with the GIF that is written down.
+    /// Leaves the lease to the next invocation, with the checkpoint of the GIF.
     ///
     /// # Errors
     ///
-    /// Those of the store, and [`Error::Conflict`] for a lease that comes and goes.
-    pub(crate) async fn hand_over_lease(&self, animation: &Animation, held: &Held) -> Result<()> {
+    /// The errors of the store, and [`Error::Conflict`] for a lease that comes and goes.
+    pub(crate) async fn hand_over_lease(&self, animation: &Animation, held: &HeldLease) -> Result<()> {
         if !held.has_checkpoint {
             return self.release_lease(animation).await;
         }
@@ -181,7 +242,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         for _ in 0..ATTEMPTS {
             let there = self.get(&key).await?;
             let Some(there) = there.filter(|there| self.is_held(holder(&there.body).as_ref())) else {
-                // Taken over already, by somebody for whom its time was up.
+                // Another invocation has taken it over already, because it had expired.
                 return Ok(());
             };
             if self.replace_lease(&key, &Lease::of_nobody(), there.info.etag).await? {
@@ -191,7 +252,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key })
     }
 
-    /// Gives the animation's lease back.
+    /// Releases the animation's lease.
     pub(crate) async fn release_lease(&self, animation: &Animation) -> Result<()> {
         self.delete(&Key::Lease { animation: animation.clone() }.to_string()).await
     }
@@ -214,7 +275,7 @@ mod tests {
         step(&invocation, &Animation::new("film").unwrap()).await.unwrap()
     }
 
-    async fn held(store: &MemoryStore<SystemClock>, request_id: &str) -> Option<Held> {
+    async fn held(store: &MemoryStore<SystemClock>, request_id: &str) -> Option<HeldLease> {
         with(store, request_id, async |invocation, animation| invocation.take_lease(animation).await).await
     }
 
@@ -222,13 +283,12 @@ mod tests {
         held(store, request_id).await.is_some()
     }
 
-    async fn left(store: &MemoryStore<SystemClock>, request_id: &str) -> Option<Held> {
-        with(store, request_id, async |invocation, animation| invocation.take_left_lease(animation).await)
-            .await
+    async fn left(store: &MemoryStore<SystemClock>, request_id: &str) -> Option<HeldLease> {
+        with(store, request_id, async |invocation, animation| invocation.reclaim_lease(animation).await).await
     }
 
     async fn hands_over(store: &MemoryStore<SystemClock>, request_id: &str, has_checkpoint: bool) {
-        let held = Held { has_checkpoint };
+        let held = HeldLease { has_checkpoint };
         with(store, request_id, async |invocation, animation| {
             invocation.hand_over_lease(animation, &held).await
         })
@@ -261,7 +321,7 @@ mod tests {
         assert!(takes(&store, "a").await && !takes(&store, "b").await);
     }
 
-    /// The holder's clock was an hour ahead, the holder died, and nobody would have built for an hour.
+    /// The holder's clock was an hour ahead and the holder died: no invocation would have built for an hour.
     #[tokio::test]
     async fn a_lease_of_a_clock_that_ran_ahead_holds_nobody_off() {
         let store = MemoryStore::new(SystemClock);
@@ -270,11 +330,12 @@ mod tests {
         assert!(takes(&store, "b").await && !takes(&store, "a").await);
     }
 
-    /// Whoever takes the lease over knows of the unfinished GIF, also when its holder has died.
+    /// An invocation that takes the lease over learns of the checkpoint, also when the holder has died.
     #[tokio::test]
     async fn a_lease_that_is_handed_over_tells_of_what_is_unfinished() {
         let store = MemoryStore::new(SystemClock);
-        let (with, without) = (Some(Held { has_checkpoint: true }), Some(Held { has_checkpoint: false }));
+        let (with, without) =
+            (Some(HeldLease { has_checkpoint: true }), Some(HeldLease { has_checkpoint: false }));
         assert_eq!(held(&store, "a").await, without);
         hands_over(&store, "a", true).await;
         assert_eq!(held(&store, "b").await, with);
@@ -292,9 +353,9 @@ mod tests {
         assert_eq!(left(&store, "a").await, None);
         assert!(takes(&store, "a").await);
         assert_eq!(left(&store, "b").await, None, "a holds it");
-        assert_eq!(left(&store, "a").await, Some(Held::default()));
+        assert_eq!(left(&store, "a").await, Some(HeldLease::default()));
         hands_over(&store, "a", true).await;
-        assert_eq!(left(&store, "b").await, Some(Held { has_checkpoint: true }));
+        assert_eq!(left(&store, "b").await, Some(HeldLease { has_checkpoint: true }));
         assert_eq!(left(&store, "a").await, None, "b has taken it");
     }
 }

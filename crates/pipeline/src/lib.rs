@@ -10,6 +10,8 @@ mod checkpoint;
 pub mod clock;
 mod error;
 pub mod failure;
+#[cfg(any(test, feature = "simulation"))]
+pub mod fakes;
 pub mod fold;
 pub mod invariants;
 mod invocation;
@@ -20,13 +22,12 @@ mod observe;
 pub mod reconcile;
 pub mod render;
 pub mod retry;
-#[cfg(any(test, feature = "simulation"))]
-pub mod simulation;
 pub mod store;
+mod survey;
 pub mod sweep;
 #[cfg(test)]
 mod tests;
-mod wakings;
+mod wake_count;
 
 pub use animator::{Animator, Encoding, Unfit};
 pub use assemble::assemble;
@@ -35,9 +36,9 @@ pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
 pub use fold::fold;
 #[cfg(any(test, feature = "simulation"))]
-pub(crate) use invocation::Carried;
+pub use invocation::ReplayState;
 pub use invocation::{Invocation, Mutation, Policy};
 pub use reconcile::reconcile;
-pub use render::{Drawing, Joining, Renderer, render_frame};
+pub use render::{BandJoiner, Drawing, Renderer, render_frame};
 pub use retry::retry;
 pub use sweep::sweep;

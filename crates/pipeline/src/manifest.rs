@@ -28,7 +28,7 @@ pub const SCHEMA: u32 = 1;
 pub const DIAGNOSTICS_SHOWN: usize = 3;
 
 /// The largest `animation.json` that is read: thousands of times what its fields need.
-pub const MOST_SETTINGS_BYTES: u64 = 64 * 1024;
+pub const MAX_SETTINGS_BYTES: u64 = 64 * 1024;
 
 /// The manifest of an animation.
 #[derive(Debug, Clone, PartialEq)]
@@ -349,7 +349,7 @@ impl Settings {
 
     /// Of an `animation.json` that is too large to be one.
     pub fn too_large(version: ETag, size: u64) -> Self {
-        let message = format!("{SETTINGS_FILE} has {size} bytes: expected at most {MOST_SETTINGS_BYTES}");
+        let message = format!("{SETTINGS_FILE} has {size} bytes: expected at most {MAX_SETTINGS_BYTES}");
         Settings { version: Some(version), value: None, fault: Some(Reason::new(message)) }
     }
 

@@ -9,16 +9,26 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag, Uploaded};
-use crate::manifest::{Fault, FrameState, MOST_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings};
+use crate::manifest::{Fault, FrameState, MAX_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings};
 use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
-use crate::store::{ETag, ListRequest, Listed, Listing, Object, Store};
+use crate::store::{ETag, ListPage, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
 /// How often an animation is listed whose receipts are replaced between the listing and their reading.
 const LOOKS: u32 = 8;
 
 /// How many rejected keys a manifest names: whoever may upload could else make it as large as they like.
-const MOST_REJECTED: usize = 100;
+const MAX_REJECTED: usize = 100;
+
+/// The receipts of an animation that a listing shows.
+#[derive(Debug, Clone)]
+pub(crate) struct Receipts {
+    pub(crate) found: Vec<ReceiptFound>,
+    /// Whether those of the parts of split scripts are among them.
+    pub(crate) has_parts: bool,
+    has_lease: bool,
+    has_sweep_lease: bool,
+}
 
 /// A listing of an animation and what it amounts to.
 #[derive(Debug)]
@@ -28,6 +38,21 @@ pub(crate) struct Observation {
     pub(crate) manifest: Manifest,
     /// An assembler waits or builds, or died in it.
     pub(crate) has_lease: bool,
+    /// A sweep deletes results, or died in it.
+    pub(crate) has_sweep_lease: bool,
+}
+
+impl Receipts {
+    fn of(animation: &Animation, listed: Vec<Listed>, has_parts: bool) -> Self {
+        let has = |key: Key| {
+            let key = key.to_string();
+            listed.iter().any(|listed| listed.key == key)
+        };
+        let has_lease = has(Key::Lease { animation: animation.clone() });
+        let has_sweep_lease = has(Key::SweepLease { animation: animation.clone() });
+        let found = listed.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
+        Receipts { found, has_parts, has_lease, has_sweep_lease }
+    }
 }
 
 impl Observation {
@@ -53,21 +78,68 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut pause = self.policy.request_pause;
         for _ in 0..LOOKS {
             let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
-            let (scripts, (receipts, has_lease)) =
+            let (scripts, receipts) =
                 try_join(self.list_scripts(animation, marks), self.list_receipts(animation, marks)).await?;
-            let (scripts, settings) = scripts;
-            let settings = self.settings(animation, settings, known).await?;
-            let mut results = Results { receipts };
-            self.add_parts(animation, &scripts, &mut results).await?;
-            let manifest = reconcile(animation, &scripts, &results, &settings);
-            let mut manifest = manifest.bounded(self.policy.most_frames);
-            if self.add_reasons(animation, &results, known, &mut manifest).await? {
-                return Ok(Observation { scripts, results, manifest, has_lease });
+            if let Some(observation) = self.amount(animation, known, scripts, receipts).await? {
+                return Ok(observation);
             }
             self.clock.sleep(self.random.up_to(pause)).await;
             pause = pause.saturating_mul(2);
         }
         Err(Error::Conflict { key: animation.frames() })
+    }
+
+    /// Observes the animation with receipts that have been listed already; `None` if one of them has been replaced
+    /// since.
+    pub(crate) async fn observe_with(
+        &self,
+        animation: &Animation,
+        known: Option<&Known>,
+        receipts: &Receipts,
+    ) -> Result<Option<Observation>> {
+        let marks = known.map_or(&[][..], |known| &known.manifest.head.marks);
+        let scripts = self.list_scripts(animation, marks).await?;
+        self.amount(animation, known, scripts, receipts.clone()).await
+    }
+
+    async fn amount(
+        &self,
+        animation: &Animation,
+        known: Option<&Known>,
+        (scripts, settings): (Scripts, Option<ETag>),
+        receipts: Receipts,
+    ) -> Result<Option<Observation>> {
+        let settings = self.settings(animation, settings, known).await?;
+        let Receipts { found, has_parts, has_lease, has_sweep_lease } = receipts;
+        let mut results = Results { receipts: found };
+        if !has_parts {
+            self.add_parts(animation, &scripts, &mut results).await?;
+        }
+        let manifest = reconcile(animation, &scripts, &results, &settings);
+        let mut manifest = manifest.bounded(self.policy.most_frames);
+        let has_reasons = self.add_reasons(animation, &results, known, &mut manifest).await?;
+        Ok(has_reasons.then_some(Observation { scripts, results, manifest, has_lease, has_sweep_lease }))
+    }
+
+    /// The versions of the scripts on the first page of a listing.
+    pub(crate) async fn scripts_on_a_page(&self, animation: &Animation) -> Result<Vec<(ScriptName, ETag)>> {
+        let page = self.list(ListRequest::level(animation.scripts())).await?;
+        let script = |listed: Listed| match Uploaded::of(&listed.key, listed.size) {
+            Uploaded::Script(_, name) => Some((name, listed.etag)),
+            _ => None,
+        };
+        Ok(page.objects.into_iter().filter_map(script).collect())
+    }
+
+    /// The receipts if a page shows them all, also those of parts if `has_parts`.
+    pub(crate) async fn receipts_on_a_page(
+        &self,
+        animation: &Animation,
+        has_parts: bool,
+    ) -> Result<Option<Receipts>> {
+        let request = ListRequest { delimiter: !has_parts, ..ListRequest::all(animation.frames()) };
+        let ListPage { objects, next, .. } = self.list(request).await?;
+        Ok(next.is_none().then(|| Receipts::of(animation, objects, has_parts)))
     }
 
     pub(crate) async fn list_scripts(
@@ -98,19 +170,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((scripts, settings))
     }
 
-    /// The receipts, and whether there is a lease among them.
-    async fn list_receipts(
-        &self,
-        animation: &Animation,
-        marks: &[ScriptName],
-    ) -> Result<(Vec<ReceiptFound>, bool)> {
+    async fn list_receipts(&self, animation: &Animation, marks: &[ScriptName]) -> Result<Receipts> {
         let prefix = animation.frames();
         let bounds = marks.iter().map(|name| format!("{prefix}{name}@")).collect();
         let listed = self.list_level(prefix, bounds).await?;
-        let lease = Key::Lease { animation: animation.clone() }.to_string();
-        let has_lease = listed.iter().any(|listed| listed.key == lease);
-        let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
-        Ok((receipts, has_lease))
+        Ok(Receipts::of(animation, listed, false))
     }
 
     /// The objects right below a prefix, the ranges between the bounds side by side.
@@ -151,9 +215,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         {
             return Ok(settings.clone());
         }
-        Ok(match self.get_start(&animation.settings(), MOST_SETTINGS_BYTES).await? {
+        Ok(match self.get_start(&animation.settings(), MAX_SETTINGS_BYTES).await? {
             None => Settings::absent(),
-            Some(Object { info, .. }) if info.size > MOST_SETTINGS_BYTES => {
+            Some(Object { info, .. }) if info.size > MAX_SETTINGS_BYTES => {
                 Settings::too_large(info.etag, info.size)
             }
             Some(object) => Settings::parse(object.info.etag, &object.body),
@@ -280,8 +344,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
 /// The first ones, and of the others how many there are.
 fn bounded(mut rejected: Vec<Rejected>, folder: String, which: &str) -> Vec<Rejected> {
-    let more = rejected.len().saturating_sub(MOST_REJECTED);
-    rejected.truncate(MOST_REJECTED);
+    let more = rejected.len().saturating_sub(MAX_REJECTED);
+    rejected.truncate(MAX_REJECTED);
     if more > 0 {
         let keys = if more == 1 { "key" } else { "keys" };
         rejected.push(Rejected { key: folder, problem: format!("{more} more {keys} {which}") });
@@ -315,16 +379,27 @@ fn faults_mut(manifest: &mut Manifest) -> impl Iterator<Item = &mut Fault> {
     frames.chain(&mut manifest.head.refusal)
 }
 
+/// Whether it says what has come of a script's version, or of a part of it.
+pub(crate) fn is_result_of(found: &ReceiptFound, script: &ScriptName, version: &ETag, part: Part) -> bool {
+    match &found.receipt {
+        Receipt::Frame { name, tag, part: of } | Receipt::Fault { name, tag, part: of } => {
+            (name, &tag.version, *of) == (script, version, part)
+        }
+        Receipt::Split { name, tag, .. } => part.is_none() && (name, &tag.version) == (script, version),
+        _ => false,
+    }
+}
+
 /// What has come of one script's version, from the receipts of one listing.
-pub(crate) fn standing(receipts: &[ReceiptFound], part: Part) -> Option<Standing> {
+pub(crate) fn version_result(receipts: &[ReceiptFound], part: Part) -> Option<VersionResult> {
     let mut standing = None;
     for found in receipts {
         let next = match &found.receipt {
             Receipt::Split { tag, count, .. } if part.is_none() => {
-                Standing::Split { tag: tag.clone(), count: *count }
+                VersionResult::Split { tag: tag.clone(), count: *count }
             }
-            Receipt::Frame { tag, part: of, .. } if *of == part => Standing::Drawn(tag.pixels),
-            Receipt::Fault { part: of, .. } if *of == part => Standing::Faulty(found.etag.clone()),
+            Receipt::Frame { tag, part: of, .. } if *of == part => VersionResult::Drawn(tag.pixels),
+            Receipt::Fault { part: of, .. } if *of == part => VersionResult::Faulty(found.etag.clone()),
             _ => continue,
         };
         standing = standing.max(Some(next));
@@ -334,7 +409,7 @@ pub(crate) fn standing(receipts: &[ReceiptFound], part: Part) -> Option<Standing
 
 /// What a script's version has come to, the stronger the later.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Standing {
+pub(crate) enum VersionResult {
     /// An error receipt.
     Faulty(ETag),
     /// A frame of this pixel version.
@@ -359,7 +434,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<bool> {
         let has_receipt = async {
             let receipts = self.receipts_of(animation, name, version, part).await?;
-            Ok(standing(&receipts, part).is_some())
+            Ok(version_result(&receipts, part).is_some())
         };
         if part.is_none() {
             return has_receipt.await;

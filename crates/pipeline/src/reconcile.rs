@@ -17,7 +17,7 @@ use crate::store::ETag;
 pub const MARK_EVERY: usize = crate::store::PAGE;
 
 /// The most marks that a manifest holds.
-const MOST_MARKS: usize = 200;
+const MAX_MARKS: usize = 200;
 
 /// The scripts of an animation, as a listing of `scripts/<animation>/` shows them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -233,7 +233,7 @@ fn marks(scripts: &Scripts) -> Vec<ScriptName> {
     }
     let mut names: Vec<&ScriptName> = scripts.found.iter().map(|script| &script.name).collect();
     names.sort();
-    let stride = MARK_EVERY.max(count.div_ceil(MOST_MARKS));
+    let stride = MARK_EVERY.max(count.div_ceil(MAX_MARKS));
     names.into_iter().skip(stride - 1).step_by(stride).cloned().collect()
 }
 

@@ -16,10 +16,10 @@ use futures_util::future::{Either, select};
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::fold::{Age, Folded};
-use crate::invocation::{Glimpse, Invocation};
+use crate::invocation::{Invocation, ManifestPrefix};
 use crate::keys::{Animation, Band, Key, Part, Receipt, ScriptName, Tag, Uploaded};
 use crate::manifest::{Fact, Reason};
-use crate::observe::{Standing, standing};
+use crate::observe::{VersionResult, version_result};
 use crate::store::{ETag, ListRequest, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
@@ -27,12 +27,12 @@ pub(crate) mod bands;
 
 use bands::{Bands, Woken};
 
-pub use bands::Joining;
+pub use bands::BandJoiner;
 
 /// What draws. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
     /// A frame being put together of its bands.
-    type Joining: Joining;
+    type BandJoiner: BandJoiner;
 
     /// How large a script may be. Of a larger one no more than the first bytes are read, one more than these.
     fn most_bytes(&self) -> u64;
@@ -52,7 +52,7 @@ pub trait Renderer: Send + Sync {
         left: Option<Duration>,
     ) -> impl Future<Output = Result<Drawing>> + Send;
 
-    /// Draws a band of a frame that was found too big, as a file that [`Joining`] reads; the reason if that cannot be done.
+    /// Draws a band of a frame that was found too big, as a file that [`BandJoiner`] reads; the reason if that cannot be done.
     ///
     /// # Errors
     ///
@@ -76,7 +76,7 @@ pub trait Renderer: Send + Sync {
         script: Bytes,
         part: Part,
         count: NonZeroU64,
-    ) -> impl Future<Output = Result<Result<Self::Joining, Reason>>> + Send;
+    ) -> impl Future<Output = Result<Result<Self::BandJoiner, Reason>>> + Send;
 }
 
 /// What came of a script.
@@ -224,6 +224,7 @@ impl Subject {
             Key::Settings { .. }
             | Key::Receipt { .. }
             | Key::Lease { .. }
+            | Key::SweepLease { .. }
             | Key::Manifest { .. }
             | Key::SetAside { .. }
             | Key::Claim { .. }
@@ -290,8 +291,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Due::Version(script) => {
                 let Subject { animation, name, part, .. } = &subject;
                 let receipts = self.receipts_of(animation, name, &script.version, *part).await?;
-                match standing(&receipts, *part) {
-                    Some(Standing::Split { tag, count }) => {
+                match version_result(&receipts, *part) {
+                    Some(VersionResult::Split { tag, count }) => {
                         stages.read = self.clock.now().since(start);
                         return self.follow_split(subject, tag, count, script.uploaded, stages).await;
                     }
@@ -323,7 +324,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if self.policy.most_frames.is_none() {
             return Ok(false);
         }
-        Ok(self.glimpse(animation).await?.head().is_some_and(|head| head.excess.is_some()))
+        Ok(self.read_prefix(animation).await?.head().is_some_and(|head| head.excess.is_some()))
     }
 
     /// Works on a frame of which there is no result: on the band that the event is about, or on all of it. Whoever was woken
@@ -525,7 +526,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.wake_lost_parts(&animation, &name, &tag, count, uploaded).await?;
         }
         let fact = Fact::Split(name.clone(), tag.version);
-        let folded = self.fold_from(&animation, &fact, Age::Old, (Glimpse::from(known), look)).await?;
+        let folded = self.fold_from(&animation, &fact, Age::Old, (ManifestPrefix::from(known), look)).await?;
         stages.fold = self.clock.now().since(start);
         Ok(Rendered { animation, script: Some(name), outcome: Outcome::Present, folded, stages })
     }
@@ -568,12 +569,12 @@ fn part_object(
     (Key::Part { animation, name, tag, number }.to_string(), body.to_string().into())
 }
 
-impl Standing {
+impl VersionResult {
     pub(crate) fn fact(self, name: ScriptName, version: ETag, part: Part) -> Fact {
         match self {
-            Standing::Split { .. } => Fact::Split(name, version),
-            Standing::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
-            Standing::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
+            VersionResult::Split { .. } => Fact::Split(name, version),
+            VersionResult::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
+            VersionResult::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
         }
     }
 }

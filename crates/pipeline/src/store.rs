@@ -3,7 +3,7 @@
 //! The trait is what the protocol needs of S3 and no more; it knows nothing of animations. Every call is one request
 //! (an [`Upload`] is several), and every `await` of one is a point at which an invocation may be killed.
 //!
-//! What every store guarantees, and the suite `conformance` holds:
+//! Every store guarantees this, and the suite `conformance` of `crates/simulation` holds it:
 //!
 //! - A read or listing that starts after a put was answered sees that put, or a later one.
 //! - An object appears whole or not at all.
@@ -36,8 +36,6 @@ use crate::Result;
 use crate::clock::Timestamp;
 
 mod bucket;
-#[cfg(any(test, feature = "conformance"))]
-pub mod conformance;
 mod listing;
 mod memory;
 #[cfg(feature = "s3")]

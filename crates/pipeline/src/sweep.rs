@@ -14,11 +14,12 @@ use futures_util::stream::{self, StreamExt, TryStreamExt};
 use crate::assemble::{Due, due, new_gif};
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag, Uploaded};
+use crate::lease::SweepLease;
 use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
 use crate::observe::Observation;
 use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, ListRequest, Store};
-use crate::wakings::Wakings;
+use crate::wake_count::WakeCount;
 use crate::{Clock, Result, Timestamp};
 
 /// How many animations are visited side by side.
@@ -51,7 +52,7 @@ pub struct Visit {
 }
 
 /// The pause between wakings doubles no more than so often.
-const MOST_DOUBLINGS: u64 = 6;
+const MAX_DOUBLINGS: u64 = 6;
 
 /// Visits all animations.
 ///
@@ -125,13 +126,19 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn visit(&self, animation: &Animation) -> Result<Visit> {
         let known = self.manifest(animation).await?;
         let gif = self.head(&animation.gif()).await?;
-        let observation = self.observe(animation, known.as_ref()).await?;
+        let mut observation = self.observe(animation, known.as_ref()).await?;
         let mut visit = Visit::default();
-        if self.policy.is_fresh_start && observation.has_lease {
-            self.free_lease_from_before(animation).await?;
+        let mut lease = None;
+        if observation.has_sweep_lease {
+            lease = Some(self.take_sweep_lease(animation).await?);
+            // Its holder may have deleted more since the listing.
+            observation = self.observe(animation, known.as_ref()).await?;
         }
-        self.wake(animation, &observation, &mut visit).await?;
-        let is_healed = self.heal_receipts(animation, &observation, &mut visit).await?;
+        if self.policy.is_fresh_start && observation.has_lease {
+            self.release_stale_lease(animation).await?;
+        }
+        self.wake(animation, &observation, lease, &mut visit).await?;
+        let is_healed = self.heal_receipts(animation, &observation, &mut lease, &mut visit).await?;
         let head = &observation.manifest.head;
         let stands = known.as_ref().filter(|known| known.manifest.agrees_with(&observation.manifest));
         // A GIF that nobody has named could be cut off unnoticed.
@@ -144,8 +151,23 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
             visit.claimed = true;
         }
-        self.tidy(animation, &observation, &mut visit).await?;
+        self.tidy(animation, &observation, &mut lease, &mut visit).await?;
+        if lease.is_some_and(|lease| lease != SweepLease::Anothers) {
+            self.release_sweep_lease(animation).await?;
+        }
         Ok(visit)
+    }
+
+    /// Whether this sweep may delete what may have to be drawn again: only while it has the lease.
+    async fn may_delete(&self, animation: &Animation, lease: &mut Option<SweepLease>) -> Result<bool> {
+        if lease.is_none() {
+            *lease = Some(match self.take_sweep_lease(animation).await? {
+                // What a dead sweep has deleted was not looked for: the lease stays, and the next visit finds it.
+                SweepLease::Left(_) => SweepLease::Anothers,
+                taken => taken,
+            });
+        }
+        Ok(*lease != Some(SweepLease::Anothers))
     }
 
     /// Whether what nobody needs any more is old enough to go.
@@ -153,14 +175,24 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.clock.now().since(modified) >= self.policy.superseded_after
     }
 
-    /// Wakes what is pending, or gives it up.
-    async fn wake(&self, animation: &Animation, observation: &Observation, visit: &mut Visit) -> Result<()> {
+    /// Wakes what is pending, or gives it up. What a dead sweep may have deleted is woken however new its script is.
+    async fn wake(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+        lease: Option<SweepLease>,
+        visit: &mut Visit,
+    ) -> Result<()> {
         let pending: Vec<&Frame> =
             observation.manifest.frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
         let now = self.clock.now();
-        let last = self.last_progress(observation);
+        let is_stuck = now.since(self.last_progress(observation)) >= self.policy.stuck_after;
+        let swept = match lease {
+            Some(SweepLease::Left(since)) => Some(since),
+            Some(SweepLease::New | SweepLease::Anothers) | None => None,
+        };
         let is_hopeless = observation.manifest.head.excess.is_some();
-        if pending.is_empty() || is_hopeless || now.since(last) < self.policy.stuck_after {
+        if pending.is_empty() || is_hopeless || !is_stuck && swept.is_none() {
             return Ok(());
         }
         if self.policy.is_fresh_start {
@@ -169,7 +201,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let wakings = self.wakings(animation, observation).await?;
         let steps = pending.into_iter().map(|frame| {
             let waking = wakings.get(&(frame.script.clone(), frame.version.clone(), frame.part)).copied();
-            self.wake_frame(animation, frame, waking, now)
+            let waking = waking.unwrap_or_default();
+            // Nobody has been woken since for what a sweep has deleted that died then.
+            let is_swept = swept.is_some_and(|since| waking.last <= since);
+            async move {
+                match is_swept || is_stuck {
+                    true => self.wake_frame(animation, frame, waking, (now, is_swept)).await,
+                    false => Ok(Step::Patient),
+                }
+            }
         });
         let steps: Vec<_> = steps.collect();
         let mut steps = stream::iter(steps).buffer_unordered(self.policy.concurrency);
@@ -208,17 +248,17 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         &self,
         animation: &Animation,
         frame: &Frame,
-        waking: Option<Wakings>,
-        now: Timestamp,
+        waking: WakeCount,
+        (now, is_swept): (Timestamp, bool),
     ) -> Result<Step> {
-        let Wakings { attempts, last, begun } = waking.unwrap_or_default();
-        let doublings = attempts.saturating_sub(1).min(MOST_DOUBLINGS) as u32;
+        let WakeCount { attempts, last, begun } = waking;
+        let doublings = attempts.saturating_sub(1).min(MAX_DOUBLINGS) as u32;
         let patience = self.policy.stuck_after.saturating_mul(2_u32.saturating_pow(doublings));
-        if attempts > 0 && now.since(last) < patience {
+        if attempts > 0 && now.since(last) < patience && !is_swept {
             return Ok(Step::Patient);
         }
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-        if begun >= self.policy.attempts && !self.policy.is_fresh_start {
+        if begun >= self.policy.attempts && !self.policy.is_fresh_start && !is_swept {
             let reason = Reason::new(format!("no result in each of {begun} attempts"));
             self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
             return Ok(Step::GivenUp);
@@ -232,6 +272,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         &self,
         animation: &Animation,
         observation: &Observation,
+        lease: &mut Option<SweepLease>,
         visit: &mut Visit,
     ) -> Result<bool> {
         let manifest = &observation.manifest;
@@ -243,6 +284,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         });
         let refusal = manifest.head.refusal.iter().filter(|fault| is_unreadable(fault));
         let faults: Vec<_> = faults.chain(refusal.map(|fault| (None, fault))).collect();
+        if faults.is_empty() || !self.may_delete(animation, lease).await? {
+            return Ok(false);
+        }
         for (frame, fault) in &faults {
             let is_it = |found: &&ReceiptFound| match (&found.receipt, frame) {
                 (Receipt::Fault { name, tag, part }, Some(frame)) => {
@@ -262,7 +306,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 visit.woken += 1;
             }
         }
-        Ok(!faults.is_empty())
+        Ok(true)
     }
 
     /// Wakes an invocation for a frame.
@@ -282,7 +326,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Deletes results of versions that are no longer current, once they are old, and the parts that led to them.
-    async fn tidy(&self, animation: &Animation, observation: &Observation, visit: &mut Visit) -> Result<()> {
+    async fn tidy(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+        lease: &mut Option<SweepLease>,
+        visit: &mut Visit,
+    ) -> Result<()> {
         let current: BTreeMap<&ScriptName, &ETag> =
             observation.scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
         let used = used_pixels(&observation.manifest);
@@ -344,6 +394,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             doomed.sort();
             doomed.dedup();
         }
+        let gone: BTreeSet<_> = doomed.iter().filter_map(version_of).collect();
+        let gone: BTreeSet<_> =
+            gone.into_iter().filter(|(name, version)| current.get(name) != Some(version)).collect();
+        if !gone.is_empty() && !self.may_delete(animation, lease).await? {
+            return Ok(());
+        }
         visit.deleted += doomed.len() as u64;
         // For the same reason that goes last, when the rest has gone.
         let (last, first): (Vec<&Key>, Vec<&Key>) = doomed.iter().partition(|key| tells_of_parts(key));
@@ -355,7 +411,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 .try_collect::<Vec<()>>()
                 .await?;
         }
-        self.wake_returned(animation, &current, &doomed, visit).await
+        self.wake_returned(animation, &gone, visit).await
     }
 
     /// A script may have come back to a version while what came of that was being deleted, and its event may have found
@@ -363,12 +419,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn wake_returned(
         &self,
         animation: &Animation,
-        before: &BTreeMap<&ScriptName, &ETag>,
-        deleted: &[Key],
+        gone: &BTreeSet<(&ScriptName, &ETag)>,
         visit: &mut Visit,
     ) -> Result<()> {
-        let gone = deleted.iter().filter_map(version_of);
-        let gone: BTreeSet<_> = gone.filter(|(name, version)| before.get(name) != Some(version)).collect();
         if gone.is_empty() {
             return Ok(());
         }

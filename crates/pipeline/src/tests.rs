@@ -23,11 +23,11 @@ use rayfold_scene::AnimationSettings;
 
 use crate::assemble::Assembled;
 use crate::failure::{End, Failure, Recorded};
+use crate::fakes::{InstantRenderer, Listed, picture};
 use crate::keys::{Animation, Key, ScriptName};
 use crate::manifest::{FrameState, Manifest, Reason, Status};
 use crate::render::{Outcome, Rendered};
 use crate::retry::{Scope, retry};
-use crate::simulation::acting::{Drawer, Listed, picture};
 use crate::store::{
     Bucket, ETag, ListPage, ListRequest, Metadata, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
     Upload,
@@ -325,7 +325,8 @@ impl World {
     }
 
     async fn try_render(&self, key: &str) -> Result<Rendered> {
-        self.with(async |invocation| render_frame(invocation, &Drawer { bands: BANDS }, key).await).await
+        self.with(async |invocation| render_frame(invocation, &InstantRenderer { bands: BANDS }, key).await)
+            .await
     }
 
     /// Takes no time, and has no trouble.
@@ -544,7 +545,7 @@ async fn a_reason_that_cannot_be_had_is_waited_for_and_not_left_out() {
     let before = world.store.clock.now();
     let rendering = world
         .with(async |invocation| {
-            render_frame(invocation, &Drawer { bands: BANDS }, "scripts/film/1.txt").await
+            render_frame(invocation, &InstantRenderer { bands: BANDS }, "scripts/film/1.txt").await
         })
         .await;
     assert!(rendering.unwrap_err().is_retryable());

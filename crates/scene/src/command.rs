@@ -1,15 +1,14 @@
 //! The commands of the language, and the correction of misspelt ones.
 //!
-//! This is the only list of commands. Each refers to its [`Form`], which is defined beside the type
+//! This is the only list of commands, but for the shapes, whose list is in [`shapes`]. Each command refers to its [`Form`], which is defined beside the type
 //! that the command makes.
 
 use std::fmt;
 
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Faults, FrameNumbers, Lamp,
-    Lens, Light, Look, MATERIAL, ORTHOCAMERA, Object, Pinhole, Plane, Samples, Screen, Shutter, Sphere, Tone,
-    Torus, Triangle, USE,
+    Background, Camera, Depth, DirectionalLight, Faults, FrameNumbers, Lamp, Lens, Light, Look, MATERIAL,
+    ORTHOCAMERA, Object, Pinhole, Samples, Screen, Shutter, Tone, USE, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -51,6 +50,17 @@ fn read<T: Scripted + Into<U>, U>(numbers: &mut Numbers<'_>) -> Result<U, Faults
 
 /// Defines [`Command`] from its names, so that the list of all commands is complete.
 macro_rules! commands {
+    (
+        before { $($before:tt)* }
+        after { $($after:tt)* }
+        shapes { $($module:ident::$Shape:ident: $summary:literal;)* }
+    ) => {
+        commands! {
+            $($before)*
+            $($Shape: shapes::$Shape::FORM, Effect::Object(read::<shapes::$Shape, _>), $summary;)*
+            $($after)*
+        }
+    };
     ($($command:ident: $form:expr, $effect:expr, $summary:literal;)*) => {
         /// A command of the scene language.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -90,35 +100,31 @@ const fn group(name: &'static str) -> Form {
     Form::new(name, &[]).with_subject(Subject::Defines(Names::Groups))
 }
 
-commands! {
-    Screen: Screen::FORM, Effect::Screen, "The size of the image.";
-    Orthocamera: ORTHOCAMERA, Effect::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
-    Camera: Pinhole::FORM, Effect::Camera(read::<Pinhole, _>), "A pinhole camera.";
-    Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
-    Lens: Lens::FORM, Effect::Lens, "A lens that is in focus at one distance.";
-    Background: Background::FORM, Effect::Background, "The colour of rays that hit nothing.";
-    Samples: Samples::FORM, Effect::Samples, "The number of rays per pixel.";
-    Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
-    Tone: Tone::FORM, Effect::Tone, "The conversion of colours to levels.";
-    Depth: Depth::FORM, Effect::Depth, "The largest number of reflections and refractions of a ray.";
-    Sphere: Sphere::FORM, Effect::Object(read::<Sphere, _>), "A sphere.";
-    Triangle: Triangle::FORM, Effect::Object(read::<Triangle, _>), "A triangle.";
-    Cuboid: Cuboid::FORM, Effect::Object(read::<Cuboid, _>), "A box along the axes.";
-    Plane: Plane::FORM, Effect::Object(read::<Plane, _>), "An infinite plane.";
-    Disc: Disc::FORM, Effect::Object(read::<Disc, _>), "A flat, round disc.";
-    Cylinder: Cylinder::FORM, Effect::Object(read::<Cylinder, _>), "A closed cylinder.";
-    Cone: Cone::FORM, Effect::Object(read::<Cone, _>), "A closed cone or truncated cone.";
-    Torus: Torus::FORM, Effect::Object(read::<Torus, _>), "A ring (torus).";
-    Material: MATERIAL, Effect::Material, "A surface material with a name.";
-    Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
-    End: Form::new("End", &[]), Effect::End, "Ends a group.";
-    Use: USE, Effect::Use, "Draws a group.";
-    Ilight: DirectionalLight::FORM, Effect::Light(read::<DirectionalLight, _>), "A directional light.";
-    Plight: Lamp::FORM, Effect::Light(read::<Lamp, _>), "A light with a position.";
-    Frames: FrameNumbers::FORM, Effect::Frames, "The frame numbers of a `Trace`.";
-    Clear: Form::new("Clear", &[]), Effect::Clear, "Removes objects and lights.";
-    Trace: Form::new("Trace", &[]), Effect::Trace, "Renders a frame.";
-}
+with_shapes! { commands! {
+    before {
+        Screen: Screen::FORM, Effect::Screen, "The size of the image.";
+        Orthocamera: ORTHOCAMERA, Effect::Camera(|_| Ok(Camera::Orthographic)), "A parallel projection.";
+        Camera: Pinhole::FORM, Effect::Camera(read::<Pinhole, _>), "A pinhole camera.";
+        Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
+        Lens: Lens::FORM, Effect::Lens, "A lens that is in focus at one distance.";
+        Background: Background::FORM, Effect::Background, "The colour of rays that hit nothing.";
+        Samples: Samples::FORM, Effect::Samples, "The number of rays per pixel.";
+        Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
+        Tone: Tone::FORM, Effect::Tone, "The conversion of colours to levels.";
+        Depth: Depth::FORM, Effect::Depth, "The largest number of reflections and refractions of a ray.";
+    }
+    after {
+        Material: MATERIAL, Effect::Material, "A surface material with a name.";
+        Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
+        End: Form::new("End", &[]), Effect::End, "Ends a group.";
+        Use: USE, Effect::Use, "Draws a group.";
+        Ilight: DirectionalLight::FORM, Effect::Light(read::<DirectionalLight, _>), "A directional light.";
+        Plight: Lamp::FORM, Effect::Light(read::<Lamp, _>), "A light with a position.";
+        Frames: FrameNumbers::FORM, Effect::Frames, "The frame numbers of a `Trace`.";
+        Clear: Form::new("Clear", &[]), Effect::Clear, "Removes objects and lights.";
+        Trace: Form::new("Trace", &[]), Effect::Trace, "Renders a frame.";
+    }
+} }
 
 impl fmt::Display for Command {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -89,6 +89,20 @@ pub enum Code {
     UnclosedGroup,
     /// A picture with pixels that are not square.
     SquashedImage,
+    /// A file that is no text.
+    NotText,
+    /// A lens, a shutter or the size of a light, with one ray per pixel.
+    NeedsSamples,
+    /// Colours that need light in a scene without lights.
+    NoLight,
+    /// Several triangles of glass, which do not refract.
+    GlassPanes,
+    /// A field of view that is probably in radians.
+    NarrowView,
+    /// A colour that is probably written as levels from 0 to 255.
+    FarAboveOne,
+    /// A `#` that begins a comment directly after a word, or a colour such as `#ff8000`.
+    GluedComment,
     /// More faults than are described individually.
     TooManyFaults,
     /// Settings that are not JSON, or not an object.

@@ -36,14 +36,22 @@ pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
+pub use model::shapes::{
+    Cone, Cuboid, Cylinder, Disc, Instance, Motion, Object, Placement, Plane, Sphere, Torus, Triangle,
+};
 pub use model::{
-    Background, Camera, Clause, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
-    Glass, Instance, InvalidValue, Lamp, Lens, Light, Look, Material, Object, Parameter, Pattern, Pinhole,
-    Placement, Plane, Samples, Scene, Screen, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight,
+    Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Glass, InvalidValue, Lamp,
+    Lens, Light, Look, Material, Parameter, Pattern, Pinhole, Samples, Scene, Screen, Shine, Shutter, Tone,
+    Weight,
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;
 pub use parse::{Parsed, parse, parse_curve};
 pub use script::{Script, ShotSummary};
-pub use settings::{AnimationSettings, ParsedSettings, parse_settings};
+pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};
 pub use shared_slice::SharedSlice;
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

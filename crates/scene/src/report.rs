@@ -138,6 +138,24 @@ impl<'a> Report<'a> {
         }
     }
 
+    /// Describes fewer faults of each severity, and counts the others.
+    pub(crate) fn describe_at_most(&mut self, most: usize) {
+        for (severity, tally) in
+            [(Severity::Error, &mut self.errors), (Severity::Warning, &mut self.warnings)]
+        {
+            let mut described = 0;
+            self.kept.retain(|diagnostic| {
+                let is_kept = diagnostic.severity != severity || described < most;
+                described += usize::from(diagnostic.severity == severity);
+                if !is_kept && described == most + 1 {
+                    tally.first_left_out = Some(diagnostic.clone());
+                }
+                is_kept
+            });
+        }
+        self.max_described = self.max_described.min(most);
+    }
+
     /// Returns all diagnostics in the order of the text. Those not described are counted at the place of the first.
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         for (tally, name) in [(self.errors, "error"), (self.warnings, "warning")] {

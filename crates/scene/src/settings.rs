@@ -8,6 +8,7 @@
 //! assert_eq!((settings.frames(), settings.fps(), settings.loops()), (None, 25.0, 0));
 //! ```
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -21,15 +22,17 @@ use crate::model::{InvalidValue, Parameter};
 use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report};
 use crate::shown::quoted;
 
-const FIELDS: [&str; 3] = ["frames", "fps", "loop"];
+const FIELDS: [&str; 5] = ["frames", "fps", "loop", "bounce", "durations"];
 
 /// The settings of an animation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Fields", into = "Fields")]
 pub struct AnimationSettings {
     frames: Option<u64>,
     fps: f64,
     loops: u16,
+    bounce: bool,
+    durations: BTreeMap<u64, f64>,
 }
 
 /// The fields in the JSON file.
@@ -38,9 +41,35 @@ pub struct AnimationSettings {
 struct Fields {
     #[serde(skip_serializing_if = "Option::is_none")]
     frames: Option<u64>,
+    #[serde(deserialize_with = "any_rate")]
     fps: f64,
     #[serde(rename = "loop")]
     loops: u16,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    bounce: bool,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    durations: BTreeMap<u64, f64>,
+}
+
+/// Reads a number, or a fraction such as `"30000/1001"`.
+fn any_rate<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Rate {
+        Number(f64),
+        Fraction(String),
+    }
+    match Rate::deserialize(deserializer)? {
+        Rate::Number(fps) => Ok(fps),
+        Rate::Fraction(text) => fraction(&text).ok_or_else(|| serde::de::Error::custom("this is no rate")),
+    }
+}
+
+/// Returns the value of a fraction of whole numbers, such as `30000/1001`.
+pub fn fraction(text: &str) -> Option<f64> {
+    let (above, below) = text.split_once('/')?;
+    let whole = |text: &str| text.parse::<u32>().ok().filter(|number| *number > 0).map(f64::from);
+    Some(whole(above)? / whole(below)?)
 }
 
 impl AnimationSettings {
@@ -49,6 +78,9 @@ impl AnimationSettings {
     /// The allowed frame rates. A frame of a hundred seconds is a slide, and no animation format can time a
     /// thousandth of a second.
     pub const FPS: RangeInclusive<f64> = 0.01..=1000.0;
+
+    /// The allowed times of a frame in seconds. Players slow down a shorter one, and a GIF can hold no longer one.
+    pub const DURATION: RangeInclusive<f64> = 0.02..=655.35;
 
     /// Makes settings. `frames` is the expected number of frames, or `None` for the existing ones. `fps` is the frame
     /// rate. `loops` is the number of repetitions, 0 for endless.
@@ -62,7 +94,89 @@ impl AnimationSettings {
         if !Self::FPS.contains(&fps) {
             return Err(InvalidValue::OutOfRange(Parameter::FrameRate, *Self::FPS.start(), *Self::FPS.end()));
         }
-        Ok(Self { frames, fps, loops })
+        Ok(Self { frames, fps, loops, bounce: false, durations: BTreeMap::new() })
+    }
+
+    /// Sets the expected number of frames.
+    ///
+    /// # Errors
+    /// Fails if it is 0.
+    pub fn with_frames(self, frames: Option<u64>) -> Result<Self, InvalidValue> {
+        Self::new(frames, self.fps, self.loops).map(|of| Self { frames: of.frames, ..self })
+    }
+
+    /// Fills in the number of frames that there are.
+    #[must_use]
+    pub fn of_frames(self, frames: u64) -> Self {
+        Self { frames: Some(frames).filter(|frames| *frames > 0), ..self }
+    }
+
+    /// Sets the frame rate.
+    ///
+    /// # Errors
+    /// Fails if it is outside of [`AnimationSettings::FPS`].
+    pub fn with_fps(self, fps: f64) -> Result<Self, InvalidValue> {
+        Self::new(self.frames, fps, self.loops).map(|of| Self { fps: of.fps, ..self })
+    }
+
+    /// Sets whether the animation runs back after its last frame.
+    #[must_use]
+    pub fn bouncing(self, bounce: bool) -> Self {
+        Self { bounce, ..self }
+    }
+
+    /// Sets times of frames in seconds, by frame from 1. The others are shown as the frame rate says.
+    ///
+    /// # Errors
+    /// Fails if a frame is 0 or a time is outside of [`AnimationSettings::DURATION`].
+    pub fn with_durations(self, durations: BTreeMap<u64, f64>) -> Result<Self, InvalidValue> {
+        if durations.contains_key(&0) {
+            return Err(InvalidValue::Zero(Parameter::FrameOfDuration));
+        }
+        if !durations.values().all(|seconds| Self::DURATION.contains(seconds)) {
+            let (least, most) = Self::DURATION.into_inner();
+            return Err(InvalidValue::OutOfRange(Parameter::Duration, least, most));
+        }
+        Ok(Self { durations, ..self })
+    }
+
+    /// Returns whether the animation runs back after its last frame.
+    pub fn bounces(&self) -> bool {
+        self.bounce
+    }
+
+    /// Returns the times of frames in seconds, by frame from 1.
+    pub fn durations(&self) -> &BTreeMap<u64, f64> {
+        &self.durations
+    }
+
+    /// Returns the frames in the order in which they are shown: there, and back if the animation
+    /// [bounces](Self::bounces), without showing the two ends twice.
+    pub fn shown<'f, T>(&self, frames: &'f [T]) -> impl Iterator<Item = &'f T> + Clone + use<'f, T> {
+        let inner = match frames {
+            [_, inner @ .., _] if self.bounce => inner,
+            _ => &[],
+        };
+        frames.iter().chain(inner.iter().rev())
+    }
+
+    /// Returns the number of frames that are [shown](Self::shown) of `frames`.
+    pub fn shown_count(&self, frames: u64) -> u64 {
+        frames + if self.bounce { frames.saturating_sub(2) } else { 0 }
+    }
+
+    /// Returns the times in seconds by the place of the frame among those that are [shown](Self::shown) of `frames`,
+    /// from 0.
+    pub fn shown_durations(&self, frames: u64) -> BTreeMap<u64, f64> {
+        let places = |frame: u64| {
+            let there = frame - 1;
+            let is_inner = self.bounce && there > 0 && frame < frames;
+            [Some(there), is_inner.then(|| 2 * (frames - 1) - there)]
+        };
+        let known = self.durations.iter().filter(|(frame, _)| **frame <= frames);
+        known
+            .flat_map(|(frame, seconds)| places(*frame).into_iter().flatten().map(|place| (place, *seconds)))
+            .collect()
     }
 
     /// Returns the expected number of frames, or `None` for the existing ones.
@@ -83,7 +197,7 @@ impl AnimationSettings {
 
 impl Default for AnimationSettings {
     fn default() -> Self {
-        Self { frames: None, fps: Self::DEFAULT_FPS, loops: 0 }
+        Self { frames: None, fps: Self::DEFAULT_FPS, loops: 0, bounce: false, durations: BTreeMap::new() }
     }
 }
 
@@ -97,13 +211,16 @@ impl TryFrom<Fields> for AnimationSettings {
     type Error = InvalidValue;
 
     fn try_from(fields: Fields) -> Result<Self, InvalidValue> {
-        Self::new(fields.frames, fields.fps, fields.loops)
+        Self::new(fields.frames, fields.fps, fields.loops)?
+            .bouncing(fields.bounce)
+            .with_durations(fields.durations)
     }
 }
 
 impl From<AnimationSettings> for Fields {
     fn from(settings: AnimationSettings) -> Self {
-        Self { frames: settings.frames, fps: settings.fps, loops: settings.loops }
+        let AnimationSettings { frames, fps, loops, bounce, durations } = settings;
+        Self { frames, fps, loops, bounce, durations }
     }
 }
 
@@ -160,6 +277,10 @@ fn settings(text: &str, report: &mut Report<'_>) -> Option<AnimationSettings> {
             "frames" => whole(value, 1..=u64::MAX).map(|frames| fields.frames = Some(frames)),
             "loop" => whole(value, 0..=u16::MAX.into()).map(|loops| fields.loops = loops as u16),
             "fps" => rate(value).map(|fps| fields.fps = fps),
+            "bounce" => serde_json::from_str(value.get())
+                .map(|bounce| fields.bounce = bounce)
+                .map_err(|_| "expected true or false".to_string()),
+            "durations" => durations(text, value, report).map(|durations| fields.durations = durations),
             _ => {
                 tell(text, key, report, || unknown(&name));
                 Ok(())
@@ -188,9 +309,49 @@ fn whole(value: &RawValue, range: RangeInclusive<u64>) -> Result<u64, String> {
 
 /// Returns the frame rate in `value`, or a description of the allowed ones.
 fn rate(value: &RawValue) -> Result<f64, String> {
-    let number = serde_json::from_str(value.get()).ok().filter(|fps| AnimationSettings::FPS.contains(fps));
+    let number = serde_json::from_str(value.get())
+        .ok()
+        .or_else(|| fraction(&serde_json::from_str::<String>(value.get()).ok()?))
+        .filter(|fps| AnimationSettings::FPS.contains(fps));
     let (least, most) = AnimationSettings::FPS.into_inner();
-    number.ok_or_else(|| format!("expected a number from {least} to {most}"))
+    number.ok_or_else(|| {
+        format!("expected a number from {least} to {most}, or a fraction such as \"30000/1001\"")
+    })
+}
+
+/// Returns the times of frames in `value`, or a description of what is expected. Reports wrong frames and times.
+fn durations(text: &str, value: &RawValue, report: &mut Report<'_>) -> Result<BTreeMap<u64, f64>, String> {
+    let expected = "expected seconds by frame, such as {\"5\": 0.5}";
+    let entries = serde_json::from_str::<Entries<'_>>(value.get()).map_err(|_| expected)?;
+    let mut durations = BTreeMap::new();
+    for (key, value) in entries.0 {
+        let name: String = serde_json::from_str(key.get()).unwrap_or_default();
+        // As the keys of a map are read, without a sign or zeros in front.
+        let Some(frame) = serde_json::from_str::<u64>(&name).ok().filter(|frame| *frame > 0) else {
+            tell(text, key, report, || {
+                Fault::new(Code::InvalidField, format!("{} is no frame", quoted(&name)))
+                    .expected("expected the number of a frame, from \"1\"")
+            });
+            continue;
+        };
+        let seconds = serde_json::from_str::<f64>(value.get()).ok();
+        let Some(seconds) = seconds.filter(|seconds| AnimationSettings::DURATION.contains(seconds)) else {
+            let (least, most) = AnimationSettings::DURATION.into_inner();
+            tell(text, value, report, || {
+                let value = value.get().lines().next().unwrap_or_default();
+                Fault::new(Code::InvalidField, format!("frame {frame} cannot be shown for {}", quoted(value)))
+                    .expected(format!("expected seconds from {least} to {most}"))
+            });
+            continue;
+        };
+        if durations.insert(frame, seconds).is_some() {
+            tell(text, key, report, || {
+                Fault::new(Code::DuplicateField, format!("frame {frame} has two times"))
+                    .expected("expected each frame at most once")
+            });
+        }
+    }
+    Ok(durations)
 }
 
 fn unknown(name: &str) -> Fault {
@@ -314,6 +475,55 @@ mod tests {
         ] {
             check(text, None);
         }
+    }
+
+    #[test]
+    fn rates_are_numbers_or_fractions() {
+        check(r#"{"fps": "30000/1001"}"#, settings(None, 30_000.0 / 1_001.0, 0));
+        check(r#"{"fps": "25/1"}"#, settings(None, 25.0, 0));
+        for text in ["25", "25/", "/1", "0/1", "1/0", "-25/1", "2.5/1", "1/1000", "9999/1", "a/b"] {
+            check(&format!(r#"{{"fps": "{text}"}}"#), None);
+        }
+    }
+
+    #[test]
+    fn frames_have_times() {
+        let timed = |durations: &[(u64, f64)]| {
+            AnimationSettings::default().with_durations(durations.iter().copied().collect()).ok()
+        };
+        check(r#"{"durations": {"5": 0.5, "1": 2}}"#, timed(&[(1, 2.0), (5, 0.5)]));
+        check(r#"{"durations": {}}"#, timed(&[]));
+        check(r#"{"bounce": true}"#, Some(AnimationSettings::default().bouncing(true)));
+        for value in ["1", "null", "[1]", r#"{"0": 1}"#, r#"{"+5": 1}"#, r#"{"05": 1}"#, r#"{"x": 1}"#] {
+            check(&format!(r#"{{"durations": {value}}}"#), None);
+        }
+        for seconds in ["0", "0.019", "655.36", "-1", "\"1\"", "null"] {
+            check(&format!(r#"{{"durations": {{"5": {seconds}}}}}"#), None);
+        }
+        for bounce in ["1", "\"yes\"", "null"] {
+            check(&format!(r#"{{"bounce": {bounce}}}"#), None);
+        }
+        let parsed = parse_settings("a", br#"{"durations": {"5": 1, "5": 2}}"#);
+        assert!(parsed.settings.is_none());
+    }
+
+    #[test]
+    fn there_and_back_shows_the_ends_once() {
+        let settings = AnimationSettings::default().bouncing(true);
+        let settings = settings.with_durations([(1, 1.0), (2, 2.0), (4, 4.0), (9, 9.0)].into()).unwrap();
+        for (count, expect) in [(0, vec![]), (1, vec![1]), (2, vec![1, 2]), (4, vec![1, 2, 3, 4, 3, 2])] {
+            let frames: Vec<u64> = (1..=count).collect();
+            let shown: Vec<u64> = settings.shown(&frames).copied().collect();
+            assert_eq!(shown, expect);
+            assert_eq!(settings.shown_count(count), expect.len() as u64);
+            let timed = settings.shown_durations(count);
+            for (place, frame) in expect.iter().enumerate() {
+                let seconds = settings.durations().get(frame);
+                assert_eq!(timed.get(&(place as u64)), seconds, "{count} frames, place {place}");
+            }
+            assert!(timed.keys().all(|place| *place < expect.len() as u64));
+        }
+        assert_eq!(AnimationSettings::default().shown(&[1, 2, 3]).count(), 3);
     }
 
     #[test]

@@ -285,17 +285,19 @@ fn a_radius_of_nothing() {
     check(
         "Screen 4 3\nSphere 0 0 0 -5 1 0 0 0 0 0\nSphere -1, 0 0 -5, 1 0 0, 0 0 0\nTrace",
         expect![[r#"
-        error: the radius must be greater than zero
-         --> a.txt:2:8
-          |
-        2 | Sphere 0 0 0 -5 1 0 0 0 0 0
-          |        ^ expected a number greater than 0
+            error: the radius must be greater than zero
+             --> a.txt:2:8
+              |
+            2 | Sphere 0 0 0 -5 1 0 0 0 0 0
+              |        ^ expected a number greater than 0
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
 
-        error: the radius must be greater than zero
-         --> a.txt:3:8
-          |
-        3 | Sphere -1, 0 0 -5, 1 0 0, 0 0 0
-          |        ^^ expected a number greater than 0"#]],
+            error: the radius must be greater than zero
+             --> a.txt:3:8
+              |
+            3 | Sphere -1, 0 0 -5, 1 0 0, 0 0 0
+              |        ^^ expected a number greater than 0"#]],
     );
 }
 

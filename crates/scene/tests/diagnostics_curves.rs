@@ -18,7 +18,9 @@ fn a_radius_that_is_negative_at_a_frame() {
              --> a.txt:2:8
               |
             2 | Sphere (1:1 17:-.2 20:1) 0 0 -5 1 0 0 0 0 0
-              |        ^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 1 to 50"#]],
+              |        ^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 1 to 50
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0"#]],
     );
 }
 
@@ -27,11 +29,50 @@ fn a_radius_that_is_zero_between_frames_while_the_shutter_is_open() {
     check(
         "Screen 4 3\nShutter .5\nSphere (smooth 1:1 2.25:0 2.3:1) 0 0 -5 1 0 0 0 0 0\nFrames 2\nTrace",
         expect![[r#"
+            warning: the shutter has no effect: there is one ray per pixel
+             --> a.txt:2:1
+              |
+            2 | Shutter .5
+              | ^^^^^^^ expected `Samples` before the `Trace`
+              |
+              = help: write for example `Samples 64`
+
             error: the radius is 0 at frame 2.25
              --> a.txt:3:8
               |
             3 | Sphere (smooth 1:1 2.25:0 2.3:1) 0 0 -5 1 0 0 0 0 0
-              |        ^^^^^^^^^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 0.75 to 2.25"#]],
+              |        ^^^^^^^^^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 0.75 to 2.25
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0"#]],
+    );
+}
+
+#[test]
+fn a_radius_that_overshoots_below_zero_between_its_keys() {
+    check(
+        "Screen 4 3\nSphere (elastic 1:1 11:.1) 0 0 -5 1 0 0 0 0 0\nSphere (bounce 1:1 11:.1) 0 0 -5 1 0 0 0 0 0\nSphere (bezier .2 .2 1.2 1 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nSphere (bezier .2 .2 1:1 2:2) 0 0 -5 1 0 0 0 0 0\nFrames 11\nTrace",
+        expect![[r#"
+            error: the radius is -0.125 at frame 2
+             --> a.txt:2:8
+              |
+            2 | Sphere (elastic 1:1 11:.1) 0 0 -5 1 0 0 0 0 0
+              |        ^^^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 1 to 11
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
+
+            error: `c` of `bezier` must not be 1.2
+             --> a.txt:4:22
+              |
+            4 | Sphere (bezier .2 .2 1.2 1 1:1 2:2) 0 0 -5 1 0 0 0 0 0
+              |                      ^^^ expected `c`, 0 to 1: the time of a control point
+
+            error: `bezier` lacks its four numbers
+             --> a.txt:5:9
+              |
+            5 | Sphere (bezier .2 .2 1:1 2:2) 0 0 -5 1 0 0 0 0 0
+              |         ^^^^^^ expected four numbers after this, then the keys
+              |
+              = help: as CSS's cubic-bezier: `(bezier .25 .1 .25 1  1:0 25:3)`"#]],
     );
 }
 
@@ -44,7 +85,9 @@ fn a_cycle_that_comes_near_its_last_key() {
              --> a.txt:2:8
               |
             2 | Sphere (cycle 0:1 10:-1) 0 0 -5 1 0 0 0 0 0
-              |        ^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 1 to 20"#]],
+              |        ^^^^^^^^^^^^^^^^^ expected a number greater than 0 from frame 1 to 20
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0"#]],
     );
 }
 
@@ -211,7 +254,7 @@ fn modes() {
             3 | Sphere (wild 1:1 2:2) 0 0 -5 1 0 0 0 0 0
               |         ^^^^ expected a mode, or a key such as `25:3`
               |
-              = help: the modes are `linear`, `smooth`, `step`, `cycle`
+              = help: the modes are `linear`, `smooth`, `step`, `in`, `out`, `inout`, `back`, `elastic`, `bounce`, `bezier`, `cycle`
 
             error: `step` must come before the keys, and only once
              --> a.txt:4:16
@@ -219,7 +262,7 @@ fn modes() {
             4 | Sphere (smooth step 1:1 2:2) 0 0 -5 1 0 0 0 0 0
               |                ^^^^ expected a key such as `25:3`
               |
-              = help: a curve starts with at most one of `linear`, `smooth`, `step`, and `cycle`
+              = help: a curve starts with at most one of `linear`, `smooth`, `step`, `in`, `out`, `inout`, `back`, `elastic`, `bounce`, `bezier`, and `cycle`
 
             error: `cycle` must come before the keys, and only once
              --> a.txt:5:13
@@ -227,7 +270,7 @@ fn modes() {
             5 | Sphere (1:1 cycle 2:2) 0 0 -5 1 0 0 0 0 0
               |             ^^^^^ expected a key such as `25:3`
               |
-              = help: a curve starts with at most one of `linear`, `smooth`, `step`, and `cycle`
+              = help: a curve starts with at most one of `linear`, `smooth`, `step`, `in`, `out`, `inout`, `back`, `elastic`, `bounce`, `bezier`, and `cycle`
 
             error: a cycle of one key has no length
              --> a.txt:6:8
@@ -474,6 +517,8 @@ fn values_of_the_new_commands() {
               |
             3 | Disc 0 0 0 0 0 0 0 1 1 1 0 0 0
               |      ^ expected a number greater than 0
+              |
+              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
 
             error: the ends of the axis must differ
              --> a.txt:4:12

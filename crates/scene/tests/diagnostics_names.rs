@@ -446,7 +446,15 @@ fn a_material_whose_shine_fails_at_a_frame() {
              --> a.txt:2:24
               |
             2 | Material a shine 1 1 1 (1:9 10:.5)
-              |                        ^^^^^^^^^^^ expected a number from 1 from frame 1 to 10"#]],
+              |                        ^^^^^^^^^^^ expected a number from 1 from frame 1 to 10
+
+            warning: there is no light: diffuse colours are black
+             --> a.txt:8:1
+              |
+            8 | Trace
+              | ^^^^^ expected an `Ilight` or `Plight` before this
+              |
+              = help: write for example `Ilight 1 1 1  -1 -2 -1`"#]],
     );
 }
 

@@ -38,7 +38,21 @@ fn value() -> impl Strategy<Value = f64> {
 }
 
 fn number() -> impl Strategy<Value = Number> {
-    let modes = ["", "linear ", "smooth ", "STEP ", "cycle ", "smooth Cycle ", "cycle step "];
+    // None of these overshoots, so a number that fits at the keys fits between them.
+    let modes = [
+        "",
+        "linear ",
+        "smooth ",
+        "STEP ",
+        "cycle ",
+        "smooth Cycle ",
+        "cycle step ",
+        "in ",
+        "cycle Out ",
+        "inout ",
+        "bounce ",
+        "bezier .3 0,.7 1 ",
+    ];
     let keys = prop::collection::btree_map(-50..60i32, value(), 2..6);
     prop_oneof![
         3 => value().prop_map(Number::Constant),

@@ -27,7 +27,7 @@ fn all_faulty_fields_at_once() {
              --> animation.json:3:10
               |
             3 |   "fps": 0,
-              |          ^ expected a number from 0.01 to 1000
+              |          ^ expected a number from 0.01 to 1000, or a fraction such as "30000/1001"
 
             error: `loop` cannot be `true`
              --> animation.json:4:11
@@ -49,7 +49,7 @@ fn all_faulty_fields_at_once() {
             6 |   "shutter": [
               |   ^^^^^^^^^ expected a field's name
               |
-              = help: the fields are `frames`, `fps`, `loop`"#]],
+              = help: the fields are `frames`, `fps`, `loop`, `bounce`, `durations`"#]],
     );
 }
 
@@ -58,11 +58,11 @@ fn a_value_of_many_lines() {
     check(
         "{\"fps\": {\n  \"value\": 10\n}}",
         expect![[r#"
-        error: `fps` cannot be `{`
-         --> animation.json:1:9
-          |
-        1 | {"fps": {
-          |         ^ expected a number from 0.01 to 1000"#]],
+            error: `fps` cannot be `{`
+             --> animation.json:1:9
+              |
+            1 | {"fps": {
+              |         ^ expected a number from 0.01 to 1000, or a fraction such as "30000/1001""#]],
     );
 }
 

@@ -75,6 +75,11 @@ impl Document {
     /// without an end gets one before others follow it.
     pub fn apply(&mut self, splice: Splice, gesture: Option<u64>) -> Splice {
         let splice = self.fitted(splice);
+        self.apply_exactly(splice, gesture)
+    }
+
+    /// Makes a change like [`Document::apply`], but takes the line ends as given.
+    pub(crate) fn apply_exactly(&mut self, splice: Splice, gesture: Option<u64>) -> Splice {
         let inverse = self.splice(&splice);
         self.held -= self.undone.drain(..).map(|step| step.size()).sum::<usize>();
         match self.done.back_mut() {

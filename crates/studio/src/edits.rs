@@ -1,9 +1,10 @@
 //! Edits of a script that affect more than one number: new objects, copies, hidden lines. Lines in, splices out.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Kind, Parameter, Presence, parse_curve};
+use rayfold_scene::{Command, Field, Kind, Object, Parameter, Presence, Values as Range, parse_curve};
 
 use crate::document::Splice;
+use crate::extent;
 use crate::line::{Line, written};
 use crate::source_map::SourceMap;
 use crate::tables::{Role, fields, role};
@@ -19,6 +20,12 @@ const COLORS: [[f64; 3]; 6] = [
     [0.6, 0.4, 0.75],
     [0.75, 0.75, 0.75],
 ];
+
+/// The colour of a new plane, on which those of objects stand out.
+const FLOOR: [f64; 3] = [0.72, 0.7, 0.67];
+
+/// The number of places that are tried for a new object.
+const PLACES: i32 = 200;
 
 /// The lines that a script needs before an object is visible.
 const SCREEN: &str = "Screen 960 540";
@@ -40,7 +47,7 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     let places = all().filter(|field| field.kind == Kind::Position).count();
     let has_length = all().any(|field| field.kind == Kind::Length);
     let is_round = has_length && places == 1;
-    let color = COLORS[count % COLORS.len()];
+    let color = if command == Command::Plane { FLOOR } else { COLORS[count % COLORS.len()] };
     let (mut place, mut length) = (0u8, 0);
     let mut text = command.name().to_owned();
     for field in all() {
@@ -79,16 +86,51 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     Line::new(&text)
 }
 
+/// Makes the line of a setting with values that show what it does.
+pub(crate) fn new_setting(command: Command) -> Line {
+    let required =
+        fields(command).map(|(_, field)| field).filter(|field| field.presence == Presence::Required);
+    let value = |field: &Field| match (field.parameter, field.values) {
+        (_, Range::OneOf(words)) => words.last().copied().unwrap_or_default().to_owned(),
+        (Parameter::Samples, _) => "16".to_owned(),
+        (Parameter::Depth, _) => "8".to_owned(),
+        (_, Range::Whole(least, _)) => least.max(1).to_string(),
+        (_, Range::Share) => "0.5".to_owned(),
+        _ if field.kind == Kind::Color => "0.86 0.9 0.95".to_owned(),
+        _ => vec!["0.1"; field.names.len()].join(" "),
+    };
+    let words: Vec<_> = required.map(value).collect();
+    Line::new(&format!("{} {}", command.name(), words.join("  ")))
+}
+
+/// Returns the place nearest to `ground`, at its height, where a new object of this size stands in no other.
+pub(crate) fn free_place(objects: &[Object], ground: DVec3, size: f64) -> DVec3 {
+    let boxes: Vec<_> = objects.iter().filter_map(|object| extent::bounds([object])).collect();
+    let room = DVec3::new(1.1, 1.0, 1.1) * size;
+    let is_free = |at: DVec3| {
+        let center = at + DVec3::Y * size;
+        !boxes
+            .iter()
+            .any(|other| (center - room).cmplt(other.high).all() && (center + room).cmpgt(other.low).all())
+    };
+    // A spiral on the ground, in steps of half an object.
+    let places = (0..PLACES).map(|turn| {
+        let angle = f64::from(turn).sqrt() * 3.6;
+        ground + 0.35 * size * angle * DVec3::new(angle.cos(), 0.0, angle.sin())
+    });
+    places.into_iter().find(|&at| is_free(at)).unwrap_or(ground)
+}
+
 /// Adds a line to a frame, with all missing lines that make it visible. Returns the changes, and the new
 /// index of the line.
 pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Splice>, usize) {
     let mut before = Vec::new();
-    if source_map.screen.is_none() {
+    if source_map.setting(Command::Screen).is_none() {
         before.push(Line::new(SCREEN));
     }
     if source_map.camera.is_none() && source_map.objects.is_empty() && source_map.trace.is_none() {
         before.push(Line::new(CAMERA));
-        if source_map.background.is_none() {
+        if source_map.setting(Command::Background).is_none() {
             before.push(Line::new(BACKGROUND));
         }
     }
@@ -202,7 +244,7 @@ pub(crate) fn reorder(
 /// Sets the number of frames of a frame's `Trace`.
 pub(crate) fn set_frames(lines: &[Line], source_map: &SourceMap, count: u32) -> Vec<Splice> {
     let number = |count: u32| f64::from(count);
-    let old = source_map.frames.and_then(|at| Some((at, lines.get(at)?)));
+    let old = source_map.setting(Command::Frames).and_then(|at| Some((at, lines.get(at)?)));
     if let Some((at, line)) = old {
         let words = line.words().map_or(0, |words| words.parameters.len());
         let changed = match Values::of(line, 1.0).and_then(|values| values.number(0)) {
@@ -247,7 +289,9 @@ mod tests {
 
     fn check(text: &str) {
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
-        assert!(parsed.diagnostics.is_empty(), "{text}\n{:?}", parsed.diagnostics);
+        // What is added first has no light yet.
+        let is_meant = |d: &rayfold_scene::Diagnostic| d.code == rayfold_scene::Code::NoLight;
+        assert!(parsed.diagnostics.iter().all(is_meant), "{text}\n{:?}", parsed.diagnostics);
     }
 
     #[test]
@@ -264,6 +308,30 @@ mod tests {
                 check(&text);
                 assert_eq!(Line::split(text.as_bytes())[at].command(), Some(command), "{text}");
             }
+        }
+    }
+
+    #[test]
+    fn every_setting_can_be_added() {
+        let text =
+            "Screen 4 3\nLook 0 0 9 0 0 0 40\nIlight 1 1 1 0 -1 -1\nSphere 1 0 0 0 0 0 0 1 1 1\nTrace\n";
+        for &command in Command::ALL {
+            if role(command) != Role::Setting
+                || command.form().fields.is_empty()
+                || command == Command::Screen
+            {
+                continue;
+            }
+            let lines = Line::split(text.as_bytes());
+            let at = SourceMap::of(&lines, 0, 1.0).start();
+            let text = after(text, vec![Splice { at, removed: 0, inserted: vec![new_setting(command)] }]);
+            let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
+            assert!(parsed.script.is_some(), "{text}\n{:?}", parsed.diagnostics);
+            assert_eq!(
+                SourceMap::of(&Line::split(text.as_bytes()), 0, 1.0).setting(command),
+                Some(at),
+                "{text}"
+            );
         }
     }
 

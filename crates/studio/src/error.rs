@@ -18,9 +18,9 @@ pub enum Error {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] rayfold_files::Error),
-    /// The folder holds no script.
-    #[error("the folder {} holds no scene scripts (*.txt)", path.display())]
-    NoScripts {
+    /// The folder in which something should be written does not exist.
+    #[error("the folder {} does not exist", path.display())]
+    NoFolder {
         /// The path of the folder.
         path: PathBuf,
     },
@@ -46,9 +46,6 @@ pub enum Error {
     /// There is no free port, or the system has no randomness.
     #[error("cannot start the server of the page")]
     Server(#[source] io::Error),
-    /// The page is not available.
-    #[error("the page has not been built: {0}")]
-    NoPage(String),
     /// The animation cannot be rendered.
     #[error("{0}")]
     Output(String),

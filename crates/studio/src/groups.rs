@@ -12,7 +12,7 @@ use crate::edits::moved;
 use crate::extent::bounds;
 use crate::line::{Line, written};
 use crate::source_map::SourceMap;
-use crate::values::{Keying, Values};
+use crate::values::{Keying, Values, tidy};
 
 /// The reason why some lines cannot be grouped or ungrouped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +74,12 @@ pub(crate) fn group(
     inserted.push(Line::new(&format!("{} {name}  {x} {y} {z}", Command::Use.name())));
     let place = first + inserted.len() - 1;
     Ok((vec![Splice { at: first, removed: last + 1 - first, inserted }], place))
+}
+
+/// Makes the line that draws a group at a place.
+pub(crate) fn use_line(name: &str, place: DVec3) -> Line {
+    let [x, y, z] = place.to_array().map(|x| written(tidy(x)));
+    Line::new(&format!("{} {name}  {x} {y} {z}", Command::Use.name()))
 }
 
 /// Takes a `Use` apart: the lines of its group replace it, moved to its position. Removes the group if no other line

@@ -28,11 +28,18 @@ const PLANE: f64 = 0.35;
 /// smaller angles, a pixel would be a huge distance.
 const SLANTED: f64 = 0.12;
 
+/// The distance of a handle from the edge of its object in pixels, so that a finger can take either.
+const CLEAR: f64 = 24.0;
+
+/// The length in pixels below which an arrow points at the viewer and is left out.
+const POINTED: f64 = 8.0;
+
 /// The smallest width of the snapping grid in pixels.
 const SNAP: f64 = 12.0;
 
 /// The kind of a handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub(crate) enum HandleKind {
     /// All selected lines, along the ground.
@@ -69,6 +76,11 @@ pub(crate) enum HandleKind {
         /// The axis of the angle: 0 is x.
         axis: usize,
     },
+    /// The whole line at a key of its motion path.
+    Key {
+        /// The frame of the key.
+        frame: u32,
+    },
     /// The scale that is this number.
     Scale {
         /// The index in the line's numbers, from 0.
@@ -78,6 +90,7 @@ pub(crate) enum HandleKind {
 
 /// A handle in the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Handle {
     /// The kind of the handle.
     pub(crate) grip: HandleKind,
@@ -91,14 +104,45 @@ pub(crate) struct Handle {
     pub(crate) from: [f64; 2],
     /// The path along which the handle moves, as an SVG path.
     #[serde(skip_serializing_if = "String::is_empty")]
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
     pub(crate) way: String,
 }
 
-/// Returns the handles of a line with these values. `around` is the point where lights without a position are shown.
-pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, around: DVec3) -> Vec<Handle> {
+/// Returns the handles of a line with these values. `around` is the point where lights without a position are shown,
+/// and `size` the radius of what the line draws, if that is not in its numbers.
+pub(crate) fn handles(
+    number: usize,
+    values: &Values,
+    projection: &Projection,
+    around: DVec3,
+    size: Option<f64>,
+) -> Vec<Handle> {
     let mut handles = Vec::new();
+    let positions: Vec<_> = values.positions().collect();
+    let is_camera = role(values.command) == Role::Camera;
+    let (center, body) = if positions.is_empty() || is_camera {
+        (around, 0.0)
+    } else {
+        let center = middle(&positions);
+        let spread = positions.iter().map(|(_, at)| at.distance(center)).fold(0.0, f64::max);
+        (center, size.unwrap_or(spread + values.reach()))
+    };
+    let edge = projection.point(center).map(|at| (at, body / projection.pixel_at(center) + CLEAR));
+    // The body under the pointer is dragged, so no handle is in front of it.
+    let outside = |grip: HandleKind, at: DVec2| {
+        let Some((middle, least)) = edge.filter(|_| body > 0.0) else { return Some(at) };
+        let off = at - middle;
+        let is_arrow = matches!(grip, HandleKind::Axis { .. } | HandleKind::Plane { .. });
+        match off.length() {
+            length if length >= least => Some(at),
+            length if is_arrow && length < POINTED => None,
+            length if length < 1e-6 => Some(middle + least * DVec2::X),
+            length => Some(middle + off * (least / length)),
+        }
+    };
     let mut add = |grip, from: DVec3, to: DVec3, label: &str, way: String| {
-        if let (Some(from), Some(at)) = (projection.point(from), projection.point(to)) {
+        let at = projection.point(to).and_then(|at| outside(grip, at));
+        if let (Some(from), Some(at)) = (projection.point(from), at) {
             let label = format!("{} of {}", label, values.command.name());
             handles.push(Handle { grip, line: number, label, at: at.into(), from: from.into(), way });
         }
@@ -106,11 +150,11 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
     let straight = String::new;
     let anchor = values.positions().next().map_or(around, |(_, position)| position);
     let arrow = ARROW * projection.pixel_at(anchor);
-    let positions: Vec<_> = values.positions().collect();
-    if !positions.is_empty() && role(values.command) != Role::Camera {
-        let middle = middle(&positions);
+    // A camera is moved by its eye, if that is seen.
+    if !positions.is_empty() && (!is_camera || projection.point(anchor).is_some()) {
+        let middle = if is_camera { anchor } else { middle(&positions) };
         // Beyond the handle of a radius.
-        let arrow = arrow + values.reach();
+        let arrow = arrow + body;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             add(
                 HandleKind::Axis { axis },
@@ -138,7 +182,7 @@ pub(crate) fn handles(number: usize, values: &Values, projection: &Projection, a
                     add(HandleKind::Point { first }, position, position, &label, straight());
                 }
             }
-            Kind::Length if !positions.is_empty() => {
+            Kind::Length if !positions.is_empty() && !is_camera => {
                 if let Some(length) = values.number(first) {
                     let at = anchor + length * toward(lengths, projection);
                     lengths += 1;
@@ -218,6 +262,7 @@ pub(crate) struct Drag {
 
 /// The modifiers of a drag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct DragOptions {
     /// Move up and down instead of along the ground.
     #[serde(default)]
@@ -248,9 +293,14 @@ impl Drag {
         let positions: Vec<_> = values.positions().collect();
         let grabbed = match grip {
             HandleKind::Body => grabbed.unwrap_or(anchor),
-            HandleKind::Axis { .. } | HandleKind::Plane { .. } => middle(&positions),
+            HandleKind::Key { .. } => middle(&positions),
+            HandleKind::Axis { .. } | HandleKind::Plane { .. } if role(values.command) != Role::Camera => {
+                middle(&positions)
+            }
             HandleKind::Point { first } => values.vector(first)?,
-            HandleKind::Length { .. }
+            HandleKind::Axis { .. }
+            | HandleKind::Plane { .. }
+            | HandleKind::Length { .. }
             | HandleKind::Direction { .. }
             | HandleKind::Turn { .. }
             | HandleKind::Scale { .. } => anchor,
@@ -283,7 +333,7 @@ impl Drag {
             None => self.start(),
         };
         match self.grip {
-            HandleKind::Body => {
+            HandleKind::Body | HandleKind::Key { .. } => {
                 let (normal, axes) = self.plane(projection, options);
                 along(normal, axes)
             }
@@ -452,7 +502,7 @@ mod tests {
 
     /// Returns the handles of a line at the first frame.
     fn handles(number: usize, line: &Line, projection: &Projection, around: DVec3) -> Vec<Handle> {
-        super::handles(number, &Values::of(line, 1.0).unwrap(), projection, around)
+        super::handles(number, &Values::of(line, 1.0).unwrap(), projection, around, None)
     }
 
     fn scene() -> Scene {

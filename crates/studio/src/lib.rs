@@ -5,13 +5,15 @@
 //! server and sends requests. Parsing, writing, picking, dragging and rendering happen here, in `scene` and `tracer`.
 //! The parser's tables define the parameters of a command.
 //!
-//! Start at [`Server`] (the connection of a page) and `session` (its requests and their effects). `document` and
+//! Begin at [`Server`] (the connection of a page) and `session` (its requests and their effects). `document` and
 //! `line` are pure, and `project` does all file access. `runs` handles animations in a bucket, over any store.
 //!
 //! Invariants: the studio reads and writes only what it was opened with; it listens on loopback only; undoing
 //! everything restores the original bytes.
 
+mod arrange;
 mod document;
+mod door;
 mod edits;
 mod error;
 mod examples;
@@ -22,6 +24,7 @@ mod groups;
 mod handles;
 mod line;
 mod materials;
+mod names;
 mod output;
 mod packing;
 mod page;
@@ -37,7 +40,9 @@ mod settings;
 mod silhouette;
 mod snap_to_ground;
 mod source_map;
+mod start;
 mod tables;
+mod text_edit;
 mod tracks;
 mod values;
 mod view;
@@ -49,3 +54,4 @@ pub use page::Page;
 pub use project::{Opened, Project, Saved};
 pub use runs::Cloud;
 pub use server::Server;
+pub use start::{Choice, Recent, Start};

@@ -120,6 +120,13 @@ impl Line {
         Some(self.word(&self.words()?.subject?))
     }
 
+    /// Returns the line with another name before the parameters, or `None` if it has none.
+    #[must_use]
+    pub fn with_subject(&self, name: &str) -> Option<Self> {
+        let subject = self.words()?.subject?;
+        Some(self.with(&[(subject, name.to_owned())]))
+    }
+
     /// Returns the number of a word; `None` for a curve, a name, and anything else.
     pub fn number(&self, word: &Range<usize>) -> Option<f64> {
         self.word(word).parse().ok().filter(|number: &f64| number.is_finite())

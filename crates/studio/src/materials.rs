@@ -2,8 +2,9 @@
 //! drawn by the tracer.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
-use rayfold_scene::{Command, Limits, parse};
+use rayfold_scene::{Clause, Command, Limits, Parameter, parse};
 
 use crate::document::Splice;
 use crate::edits::set;
@@ -11,6 +12,7 @@ use crate::error::Error;
 use crate::line::Line;
 use crate::output::frame_png;
 use crate::tables::{Role, role};
+use crate::tracks::slots;
 
 /// A starter material: its name and the clauses of its `Material` line. The material that its pattern
 /// names comes before it.
@@ -105,6 +107,134 @@ fn drawn(materials: &str, name: &str, frame: u32) -> Result<Option<Vec<u8>>, Err
     }
 }
 
+/// Returns the line for a new material: before all lines that could use it.
+pub(crate) fn start(lines: &[Line]) -> usize {
+    let wears = |line: &Line| {
+        line.command().is_some_and(|command| match role(command) {
+            Role::Object | Role::Use | Role::Group | Role::Material => true,
+            Role::Light | Role::Camera | Role::Setting => line.command() == Some(Command::Trace),
+        })
+    };
+    lines.iter().position(wears).unwrap_or(lines.len())
+}
+
+/// Returns a name that no material has.
+fn free_name(lines: &[Line]) -> String {
+    let is_free = |name: &String| !lines.iter().any(|line| is_material(line) && line.subject() == Some(name));
+    (1..).map(|number| format!("material-{number}")).find(is_free).unwrap_or_default()
+}
+
+/// Makes a blank material and gives it to lines. Returns the changes, and its line.
+pub(crate) fn new(lines: &[Line], which: &[usize]) -> (Vec<Splice>, usize) {
+    let (name, at) = (free_name(lines), start(lines));
+    let mut splices: Vec<_> =
+        which.iter().filter_map(|&at| Some(set(at, dressed(lines.get(at)?, &name)?))).collect();
+    splices.push(Splice { at, removed: 0, inserted: vec![blank(&name, "0.7 0.7 0.7")] });
+    (splices, at)
+}
+
+fn blank(name: &str, diffuse: &str) -> Line {
+    Line::new(&format!("{} {name}   diffuse {diffuse}", Command::Material.name()))
+}
+
+/// Returns the clauses of a material, each with its words, from its name on.
+pub(crate) fn clauses(line: &Line) -> Vec<(Clause, Range<usize>)> {
+    let Some(words) = line.words() else { return Vec::new() };
+    let found = words.parameters.iter().enumerate();
+    let found = found.filter_map(|(at, word)| Some((at, Clause::from_name(line.word(word))?)));
+    let starts: Vec<_> = found.collect();
+    let ends = starts.iter().skip(1).map(|(at, _)| *at).chain([words.parameters.len()]);
+    starts.iter().zip(ends).map(|(&(at, clause), end)| (clause, at..end)).collect()
+}
+
+/// Returns the materials before a line that a pattern can name: those of coefficients alone.
+pub(crate) fn plain_names(lines: &[Line], at: usize) -> Vec<String> {
+    let is_plain = |line: &&Line| {
+        clauses(line)
+            .iter()
+            .all(|(clause, _)| matches!(clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror))
+    };
+    let before = lines.iter().take(at).filter(|line| is_material(line)).filter(is_plain);
+    before.filter_map(|line| line.subject().map(str::to_owned)).collect()
+}
+
+/// Adds a clause to a material, or removes it. A pattern replaces another one, and gets a second material if there is
+/// none that it could name.
+///
+/// # Errors
+/// Returns the reason why the last clause stays.
+pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Splice>, &'static str> {
+    let Some(line) = lines.get(at).filter(|line| is_material(line)) else { return Ok(Vec::new()) };
+    let all = clauses(line);
+    let has = all.iter().any(|(other, _)| *other == clause);
+    if has && all.len() == 1 {
+        return Err("A material needs one clause at least.");
+    }
+    let is_pattern = |clause: Clause| clause.form().ends_with.is_some();
+    let goes = |other: Clause| other == clause || !has && is_pattern(clause) && is_pattern(other);
+    let Some(words) = line.words() else { return Ok(Vec::new()) };
+    let kept = all
+        .iter()
+        .filter(|(other, _)| !goes(*other))
+        .flat_map(|(_, span)| words.parameters[span.clone()].iter());
+    let mut texts: Vec<_> = kept.map(|word| line.word(word).to_owned()).collect();
+    let mut splices = Vec::new();
+    if !has {
+        let mut other = plain_names(lines, at).pop();
+        if is_pattern(clause) && other.is_none() {
+            let name = free_name(lines);
+            splices.push(Splice { at, removed: 0, inserted: vec![blank(&name, "0.1 0.1 0.1")] });
+            other = Some(name);
+        }
+        texts.push(clause.name().to_owned());
+        texts.extend(clause.form().fields.iter().flat_map(|field| {
+            let value = match field.parameter {
+                Parameter::ShineExponent => "60",
+                Parameter::Ior => "1.5",
+                Parameter::GradientStart => "0",
+                Parameter::GradientEnd => "1",
+                Parameter::Glass => "0.95",
+                Parameter::Ambient => "0.1",
+                _ => "0.5",
+            };
+            vec![value.to_owned(); field.names.len()]
+        }));
+        texts.extend(other.filter(|_| is_pattern(clause)));
+    }
+    let from =
+        all.iter().find(|(other, _)| goes(*other)).map_or(words.parameters.len(), |(_, span)| span.start);
+    let words: Vec<_> = texts.into_iter().enumerate().skip(from).collect();
+    let changed = line.cut(from).and_then(|line| line.with_words(&words));
+    // The line itself first: a new line before it would move it.
+    splices.splice(0..0, changed.map(|line| set(at, line)));
+    Ok(splices)
+}
+
+/// Replaces the names of materials by coefficients, those of the materials.
+pub(crate) fn take(lines: &[Line], which: &[usize]) -> Vec<Splice> {
+    let bare = |&at: &usize| {
+        let line = lines.get(at)?;
+        let (first, words) = (line.command()?.form().surface()?, line.words()?);
+        let name = words.parameters.get(first).filter(|_| words.parameters.len() == first + 1)?;
+        let name = line.word(name);
+        let of = lines.iter().find(|line| is_material(line) && line.subject() == Some(name))?;
+        let mut numbers = [0.0; 9];
+        for slot in slots(of) {
+            let group = match slot.field.parameter {
+                Parameter::Ambient => 0,
+                Parameter::Diffuse => 3,
+                Parameter::Mirror => 6,
+                _ => continue,
+            };
+            let word = of.words()?.parameters.get(slot.number)?.clone();
+            numbers[group + slot.number - slot.first] = of.number(&word).unwrap_or(0.5);
+        }
+        let count = if numbers[6..] == [0.0; 3] { 6 } else { 9 };
+        Some(set(at, line.cut(first)?.with_numbers(first, &numbers[..count])?))
+    };
+    which.iter().filter_map(bare).collect()
+}
+
 /// Assigns a material of the script to lines after its definition.
 pub(crate) fn give(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
     let defined = lines.iter().position(|line| is_material(line) && line.subject() == Some(name));
@@ -119,13 +249,7 @@ pub(crate) fn give(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
 /// Assigns a starter material to lines. Inserts its definition before all lines that could use it, unless it exists.
 pub(crate) fn give_preset(lines: &[Line], which: &[usize], name: &str) -> Vec<Splice> {
     let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) else { return Vec::new() };
-    let wears = |line: &Line| {
-        line.command().is_some_and(|command| match role(command) {
-            Role::Object | Role::Use | Role::Group | Role::Material => true,
-            Role::Light | Role::Camera | Role::Setting => false,
-        })
-    };
-    let at = lines.iter().position(wears).unwrap_or(lines.len());
+    let at = start(lines);
     let taken: HashSet<&str> =
         lines.iter().filter(|line| is_material(line)).filter_map(Line::subject).collect();
     let missing: Vec<Line> = definitions(preset)
@@ -186,7 +310,8 @@ mod tests {
     fn every_preset_is_in_order_and_has_a_sphere_of_its_own() {
         let mut seen = HashSet::new();
         for name in presets() {
-            let text = "Screen 4 3\nSphere 1  0 0 -5  .1 .1 .1  1 1 1   # ball\nTrace\n";
+            let text =
+                "Screen 4 3\nSphere 1  0 0 -5  .1 .1 .1  1 1 1   # ball\nIlight 1 1 1  0 -1 0\nTrace\n";
             let lines = Line::split(text.as_bytes());
             let text = after(text, give_preset(&lines, &[1], name));
             let parsed = parse("a", text.as_bytes(), &Default::default());
@@ -211,5 +336,40 @@ mod tests {
         assert_ne!(sphere(&lines, 2, 1).unwrap().unwrap(), sphere(&lines, 2, 9).unwrap().unwrap());
         assert_eq!(sphere(&lines, 1, 1).unwrap(), None);
         assert_eq!(sphere(&lines, 99, 1).unwrap(), None);
+    }
+
+    #[test]
+    fn a_blank_material_gets_each_clause_and_loses_it_again() {
+        let text = "Screen 4 3\nLook 0 0 9 0 0 0 40\nIlight 1 1 1 0 -1 -1\nSphere 1  0 0 0  0 0 0  1 1 1   # ball\nTrace\n";
+        let lines = Line::split(text.as_bytes());
+        let (splices, at) = new(&lines, &[3]);
+        let blank = after(text, splices);
+        assert!(blank.contains("\nSphere 1  0 0 0  material-1   # ball\n"), "{blank}");
+        let toggled = |text: &str, at: usize, clause| {
+            toggle(&Line::split(text.as_bytes()), at, clause).map(|splices| after(text, splices))
+        };
+        for &clause in Clause::ALL {
+            let Ok(on) = toggled(&blank, at, clause) else {
+                assert_eq!(clause, Clause::Diffuse, "the only clause stays");
+                continue;
+            };
+            let parsed = parse("a", on.as_bytes(), &Default::default());
+            assert!(parsed.diagnostics.is_empty(), "{on}\n{:?}", parsed.diagnostics);
+            let at = on.lines().position(|line| line.contains(clause.name())).unwrap();
+            let off = toggled(&on, at, clause).unwrap();
+            assert!(off.contains("Material material-1   diffuse 0.7 0.7 0.7\n"), "{off}");
+            for &other in Clause::ALL.iter().filter(|&&other| other != clause && other != Clause::Diffuse) {
+                let both = toggled(&on, at, other).unwrap();
+                assert!(parse("a", both.as_bytes(), &Default::default()).script.is_some(), "{both}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_takes_the_colours_of_its_material() {
+        let text = "Material red shine 1 1 1 9 diffuse 1 0 0 ambient .1 .2 .3\nSphere 1  0 0 0  red   # a\n";
+        let lines = Line::split(text.as_bytes());
+        let taken = after(text, take(&lines, &[0, 1, 9]));
+        assert!(taken.ends_with("\nSphere 1  0 0 0 0.1 0.2 0.3 1 0 0   # a\n"), "{taken}");
     }
 }

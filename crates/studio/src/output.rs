@@ -9,8 +9,8 @@ use std::thread;
 use axum::body::Body;
 use image::{ImageFormat, RgbImage};
 use rayfold_gif::{Encoder, Settings};
-use rayfold_scene::{AnimationSettings, Script};
-use rayfold_tracer::{RenderOptions, render_frame};
+use rayfold_scene::{AnimationSettings, Camera, Scene, Screen, Script};
+use rayfold_tracer::{RenderOptions, render, render_frame};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -21,6 +21,9 @@ use crate::protocol::OutputState;
 
 /// The largest GIF in bytes that is kept in memory.
 const GIF: usize = 512 << 20;
+
+/// The longer side of a small picture, in pixels.
+const THUMBNAIL: f64 = 96.0;
 
 /// The GIF that was rendered last, and the rendering in progress.
 #[derive(Debug, Default)]
@@ -52,16 +55,20 @@ impl Job {
     }
 
     fn run(&self, cancel: &AtomicBool, report: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
-        let of = self.scripts.iter().map(|script| script.frame_count()).sum();
+        let frames: Vec<_> = self
+            .scripts
+            .iter()
+            .flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)))
+            .collect();
+        let of = self.settings.shown(&frames).count();
         let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
-        let settings = Settings::new(self.settings.fps(), self.settings.loops());
+        let durations = self.settings.shown_durations(frames.len() as u64);
+        let settings = Settings::new(self.settings.fps(), self.settings.loops()).timed(&durations);
         let mut gif = Bounded(Vec::new());
         let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
         report(OutputState::Running { done: 0, of });
-        let frames =
-            self.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
-        for (done, (script, k)) in frames.enumerate() {
+        for (done, &(script, k)) in self.settings.shown(&frames).enumerate() {
             let Some(frame) = render_frame(script, k, &options) else { break };
             let frame = frame.map_err(|error| failed(&error))?;
             encoder.push(frame).map_err(|error| failed(&error))?;
@@ -123,6 +130,23 @@ impl Outputs {
 pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
     let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
     png(&image.map_err(|error| no_picture(&error))?).map(Some)
+}
+
+/// Renders a small picture of a scene as PNG. Returns `None` if the scene has pixels of the world's units, which
+/// cannot be small.
+///
+/// # Errors
+/// Fails if the scene cannot be rendered.
+pub(crate) fn thumbnail(mut scene: Scene) -> Result<Option<Vec<u8>>, Error> {
+    if matches!(scene.camera, Camera::Orthographic) {
+        return Ok(None);
+    }
+    let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+    let scale = (THUMBNAIL / width.max(height)).min(1.0);
+    let side = |side: f64| (side * scale).round().max(1.0) as u32;
+    scene.screen = Screen::new(side(width), side(height)).map_err(|error| no_picture(&error))?;
+    let image = render(&scene, &RenderOptions::default()).map_err(|error| no_picture(&error))?;
+    png(&image).map(Some)
 }
 
 /// Encodes a picture as PNG.
@@ -191,5 +215,34 @@ impl Write for Bounded {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use rayfold_scene::{Limits, parse};
+
+    use super::*;
+
+    #[test]
+    fn a_gif_runs_back_and_shows_frames_for_times_of_their_own() {
+        let text = "Screen 16 12\nFrames 3\nSphere 2  (1:-2 3:2) 0 -9  1 .5 0  0 0 0\nTrace\n";
+        let script = Arc::new(parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap());
+        let settings = AnimationSettings::new(None, 10.0, 0).unwrap().bouncing(true);
+        let settings = settings.with_durations(BTreeMap::from([(2, 0.5)])).unwrap();
+        let job = Job { scripts: vec![Arc::clone(&script)], settings };
+        let gif = job.run(&AtomicBool::new(false), &|_| {}).unwrap();
+
+        let mut expected = Vec::new();
+        // The second frame is shown twice: there, and back.
+        let timed = Settings::new(10.0, 0).timed(&BTreeMap::from([(1, 0.5), (3, 0.5)]));
+        let mut encoder = Encoder::new(&mut expected, timed).unwrap();
+        for frame in [0, 1, 2, 1] {
+            encoder.push(render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap()).unwrap();
+        }
+        encoder.finish().unwrap();
+        assert!(gif == expected, "{} and {} bytes", gif.len(), expected.len());
     }
 }

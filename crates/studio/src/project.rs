@@ -4,6 +4,8 @@
 //! another program. In that case it is in [`Saved::Conflict`] until the user chooses a text.
 
 use std::cell::{OnceCell, RefCell};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,10 +16,11 @@ use serde::Serialize;
 
 use crate::document::{Document, Splice};
 use crate::error::{Error, words};
-use crate::files::{TEXT, read};
+use crate::files::{LINK, TEXT, leads_out, read};
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::settings::Settings;
+use crate::text_edit::{self, TextChange};
 use crate::tracks::{Tracks, tracks};
 
 /// The longest name of a new script in bytes. File systems allow 255, and a receipt in a bucket adds to it.
@@ -32,8 +35,12 @@ const REST: Duration = Duration::from_millis(400);
 /// The initial text of a script that does not exist yet.
 const STARTER: &str = include_str!("starter.txt");
 
+/// The script of a folder that has none yet.
+const FIRST: &str = "scene.txt";
+
 /// Whether a file on disk has the shown content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub enum Saved {
     /// The file has the shown content.
@@ -94,24 +101,39 @@ pub struct Place {
 }
 
 impl Project {
-    /// Opens a folder of scripts, or one script. A script that does not exist yet begins with an example.
+    /// Opens a folder of scripts, or one script. A script that does not exist yet begins with an example, and so does
+    /// a folder without scripts. A missing path without an ending is a new folder. Links that lead out of the folder are
+    /// not followed.
     ///
     /// # Errors
-    /// Fails if a file cannot be read, the folder has no script, or its `animation.json` is invalid.
+    /// Fails if a file cannot be read, the folder of the path does not exist, or its `animation.json` is invalid.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let read = |source| Error::Read { path: path.to_path_buf(), source };
+        let is_new = !path.exists() && !path.is_symlink();
+        if let Some(parent) =
+            path.parent().filter(|parent| !parent.as_os_str().is_empty() && !parent.is_dir())
+        {
+            return Err(Error::NoFolder { path: parent.to_path_buf() });
+        }
+        if is_new && path.extension().is_none() {
+            fs::create_dir(path).map_err(read)?;
+        }
         let (mut paths, mut not_read) = (Vec::new(), Vec::new());
         if path.is_dir() {
             let listed = Folder::list(path).map_err(read)?;
             not_read = listed.not_read;
-            for (_, path) in listed.scripts {
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                paths.push((name, path));
+            for (_, script) in listed.scripts {
+                if leads_out(path, &script) {
+                    not_read.push(NotRead { path: script, problem: LINK });
+                    continue;
+                }
+                let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                paths.push((name, script));
             }
             if paths.is_empty() {
-                return Err(Error::NoScripts { path: path.to_path_buf() });
+                paths.push((FIRST.to_owned(), path.join(FIRST)));
             }
         } else {
             paths.push((name.clone(), path.to_path_buf()));
@@ -271,6 +293,14 @@ impl Opened {
         Ok(file)
     }
 
+    /// Reads the file. Its path was without links when it was opened, so a link is that of another program.
+    fn read(&self) -> Result<Option<Vec<u8>>, Error> {
+        if self.path.is_symlink() {
+            return Err(Error::Read { path: self.path.clone(), source: io::Error::other(LINK) });
+        }
+        read(&self.path)
+    }
+
     /// Returns the number of frames that can be shown.
     pub fn frame_count(&self) -> usize {
         self.script.as_ref().map_or(1, |script| script.frame_count())
@@ -294,6 +324,18 @@ impl Opened {
         let done = splices.into_iter().map(|splice| self.document.apply(splice, gesture)).collect();
         self.touched();
         done
+    }
+
+    /// Makes changes of a text editor, each of the text that the one before it leaves. Returns the changes of the lines,
+    /// or `None` if one of them does not fit; those before it stay.
+    pub(crate) fn edit_text(&mut self, changes: &[TextChange], gesture: u64) -> Option<Vec<Splice>> {
+        let mut done = Vec::new();
+        for change in changes {
+            let splice = text_edit::splice(self.document.lines(), change)?;
+            done.push(self.document.apply_exactly(splice, Some(gesture)));
+        }
+        self.touched();
+        Some(done)
     }
 
     /// Replaces the text, as a step that can be undone. Returns the changes of the lines.
@@ -340,7 +382,7 @@ impl Opened {
     /// Checks whether another program has written the file. Its text is adopted as a step that can be undone, unless
     /// there are unwritten changes or the file is gone. Returns the changes of the lines.
     pub fn look(&mut self) -> Option<Vec<Splice>> {
-        let theirs = read(&self.path).ok()?;
+        let theirs = self.read().ok()?;
         if theirs == self.on_disk {
             // The file was gone and is there again.
             let is_back = self.saved == Saved::Conflict && self.changed.is_none();
@@ -359,7 +401,7 @@ impl Opened {
 
     /// Resolves a conflict, with the text of the page or with that of the file. Returns the changes of the lines.
     pub fn resolve(&mut self, keep_mine: bool) -> Vec<Splice> {
-        self.on_disk = read(&self.path).unwrap_or_default();
+        self.on_disk = self.read().unwrap_or_default();
         self.saved = Saved::Yes;
         if keep_mine {
             self.changed = Some(Instant::now());
@@ -410,7 +452,7 @@ impl Opened {
             return false;
         }
         let text = self.document.bytes();
-        self.saved = match read(&self.path) {
+        self.saved = match self.read() {
             Ok(theirs) if theirs != self.on_disk => Saved::Conflict,
             Ok(theirs) if theirs.as_ref() == Some(&text) => {
                 self.changed = None;
@@ -431,9 +473,56 @@ impl Opened {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
+
+    #[test]
+    fn a_folder_without_scripts_and_a_new_one_begin_with_a_scene() {
+        let folder = tempfile::tempdir().unwrap();
+        for path in [folder.path().to_path_buf(), folder.path().join("new")] {
+            let mut project = Project::open(&path).unwrap();
+            assert!(project.can_create() && project.files[0].is_sound());
+            assert!(!path.join(FIRST).exists(), "nothing is written before a change");
+            project.files[0].apply(set(0, "# mine"), None);
+            project.save(true);
+            assert!(fs::read_to_string(path.join(FIRST)).unwrap().starts_with("# mine\n"));
+        }
+        let error = Project::open(&folder.path().join("no/new.txt")).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!("the folder {} does not exist", folder.path().join("no").display())
+        );
+        assert!(Project::open(&folder.path().join("single.txt")).is_ok_and(|project| !project.can_create()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_out_of_the_folder_are_not_followed() {
+        use std::os::unix::fs::symlink;
+
+        let (outside, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let secret = outside.path().join("secret.txt");
+        fs::write(&secret, "Screen 4 3\nTrace\n").unwrap();
+        fs::write(folder.path().join("a.txt"), "Screen 4 3\nTrace\n").unwrap();
+        symlink("a.txt", folder.path().join("b.txt")).unwrap();
+        symlink(&secret, folder.path().join("c.txt")).unwrap();
+        symlink(outside.path().join("missing"), folder.path().join("d.txt")).unwrap();
+        let mut project = Project::open(folder.path()).unwrap();
+        let names: Vec<_> = project.files.iter().map(|file| file.name.as_str()).collect();
+        assert_eq!(names, ["a.txt", "b.txt"], "a link within the folder is a script");
+        assert_eq!(project.not_read.len(), 2);
+        // A link that comes later is neither read nor written.
+        fs::remove_file(folder.path().join("a.txt")).unwrap();
+        symlink(&secret, folder.path().join("a.txt")).unwrap();
+        assert_eq!(project.files[0].look(), None);
+        project.files[0].apply(set(0, "# mine"), None);
+        project.save(true);
+        assert_eq!(project.files[0].saved(), Saved::Failed);
+        assert_eq!(fs::read_to_string(&secret).unwrap(), "Screen 4 3\nTrace\n");
+        // Neither are the settings.
+        symlink(outside.path().join("theirs"), folder.path().join("animation.json")).unwrap();
+        assert!(project.set_fps(0, 24.0).is_err() && !outside.path().join("theirs").exists());
+        assert!(Project::open(folder.path()).is_err());
+    }
 
     fn set(at: usize, text: &str) -> Vec<Splice> {
         vec![Splice { at, removed: 1, inserted: vec![Line::new(text)] }]

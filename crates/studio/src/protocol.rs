@@ -2,15 +2,20 @@
 //!
 //! Points of the picture are in its pixels. Lines are counted from 0.
 
+use std::collections::BTreeMap;
+
+use rayfold_scene::Language;
 use serde::{Deserialize, Serialize};
 
 use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::project::Saved;
 use crate::tables::{CommandTable, FieldTable, Role};
+use crate::text_edit::TextChange;
 use crate::tracks::{KeyPlace, Tracks};
 
 /// A message of the page.
 #[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "ask")]
 pub(crate) enum ClientMessage {
     /// Set the size of the viewport, in pixels of the screen.
@@ -42,10 +47,8 @@ pub(crate) enum ClientMessage {
     KeepCamera,
     /// Set the numbers of a line from number `first` on. All changes with the same `gesture` are one step.
     Set { line: usize, first: usize, values: Vec<f64>, gesture: Option<u64> },
-    /// Replace the text of a line by one or several lines.
-    Text { line: usize, text: String },
-    /// Insert a line before line `at`.
-    Insert { at: usize, text: String },
+    /// Change the text of a file as the page's editor did, if this is the version of the text that it had.
+    Edit { file: usize, version: u32, changes: Vec<TextChange> },
     /// Remove these lines from the file.
     Remove { lines: Vec<usize> },
     /// Copy lines, each after itself.
@@ -62,19 +65,34 @@ pub(crate) enum ClientMessage {
     Ground { lines: Vec<usize> },
     /// Lock lines against dragging in the picture, or unlock them.
     Lock { lines: Vec<usize> },
+    /// Add the objects of a text of the language, with the materials and groups that they name.
+    Paste { text: String },
+    /// Align lines along an axis: 0 is x.
+    Align { lines: Vec<usize>, axis: usize, how: Alignment },
+    /// Select the objects whose middles are in a rectangle of the picture.
+    Box { from: [f64; 2], to: [f64; 2], extend: bool },
     /// Make a group of lines.
     Group { lines: Vec<usize> },
     /// Replace a `Use` by the lines of its group.
     Ungroup { line: usize },
-    /// Give objects a material of the script.
+    /// Give objects a material of the script, or coefficients of their own if its name is empty.
     Surface { lines: Vec<usize>, material: String },
     /// Give objects a starter material.
     Preset { lines: Vec<usize>, preset: String },
+    /// Give the object at a point of the picture a material of the script, or a starter material.
+    Paint { at: [f64; 2], material: String, preset: bool },
+    /// Add a clause to a material, or remove it.
+    Clause { line: usize, clause: String },
+    /// Set a word of a line, which is one of the table's words or a name.
+    Word { line: usize, number: usize, word: String },
+    /// Make the script's camera one of another kind, with the same view.
+    Camera { command: String },
     /// Edit keys and frames.
     Time { wish: TimelineEdit },
     /// Move objects by this many steps along the axes.
     Nudge { lines: Vec<usize>, by: [f64; 3] },
-    /// Add an object or a light at a point of the picture, or in the middle.
+    /// Add an object or a light at a point of the picture, or in the middle; a setting, a material, or the `Use` of a
+    /// group, whose name follows the command.
     Add { command: String, at: Option<[f64; 2]> },
     /// Undo the last step.
     Undo,
@@ -92,6 +110,7 @@ pub(crate) enum ClientMessage {
 
 /// The source of a whole text.
 #[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub(crate) enum Source {
     /// An empty text.
@@ -106,6 +125,7 @@ pub(crate) enum Source {
 
 /// An edit of the timeline.
 #[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case", tag = "do")]
 pub(crate) enum TimelineEdit {
     /// Turn an option on or off.
@@ -116,8 +136,8 @@ pub(crate) enum TimelineEdit {
     Toggle { line: usize, numbers: Vec<usize> },
     /// Start dragging these keys.
     Grab { keys: Vec<KeyPlace> },
-    /// Move the dragged keys by this many frames from their start.
-    Move { by: f64 },
+    /// Move the dragged keys by this many frames, and by this value, from their start.
+    Move { by: f64, value: f64 },
     /// Remove these keys from their curves.
     Remove { keys: Vec<KeyPlace> },
     /// Copy these keys to the clipboard.
@@ -134,6 +154,7 @@ pub(crate) enum TimelineEdit {
 
 /// An option of the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Switch {
     /// Changing a constant number makes it a curve.
@@ -146,6 +167,7 @@ pub(crate) enum Switch {
 
 /// A way to move the free camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Navigation {
     /// Rotate around the target.
@@ -156,8 +178,24 @@ pub(crate) enum Navigation {
     Zoom,
 }
 
+/// The parts of objects that are aligned along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Alignment {
+    /// The least coordinates.
+    Least,
+    /// The middles.
+    Middle,
+    /// The greatest coordinates.
+    Most,
+    /// The middles, at equal distances.
+    Distribute,
+}
+
 /// A camera to look through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum ViewPreset {
     /// The camera of the script.
@@ -176,56 +214,90 @@ pub(crate) enum ViewPreset {
 
 /// A message to the page. Omitted fields have not changed.
 #[derive(Clone, Debug, Default, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ServerMessage {
+    /// The table of the language, sent once at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    #[cfg_attr(test, ts(as = "Option<typescript::Language>"))]
+    pub(crate) language: Option<Language>,
     /// The tables of the commands, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) tables: Option<Vec<CommandTable>>,
     /// The names of the examples, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) examples: Option<Vec<&'static str>>,
     /// Whether scripts can be added, sent once at the start.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) can_create: Option<bool>,
+    /// Whether there is a bucket to submit to, sent once at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) can_submit: Option<bool>,
     /// The names of the starter materials, sent once at the start.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
     pub(crate) presets: Vec<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) files: Option<Vec<FileState>>,
     /// All lines of the shown file.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) lines: Option<Vec<LineState>>,
     /// The changes of these lines, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
     pub(crate) splices: Vec<LinesChanged>,
+    /// The version of the shown text, with every change of its lines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) text: Option<TextState>,
+    /// Whether an edit of the page's text was applied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) accepted: Option<bool>,
     /// The state of the whole page.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) state: Option<State>,
     /// The line of the object under the pointer, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) hovered: Option<Option<usize>>,
     /// The outline of the selection, as an SVG path.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) outline: Option<String>,
     /// The outline of the object under the pointer.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) hover_outline: Option<String>,
     /// The outlines of the selection at other frames.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) ghosts: Option<Vec<Ghost>>,
     /// The numbers that change.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) tracks: Option<Tracks>,
     /// The state of the GIF.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) output: Option<OutputState>,
     /// A message for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) notice: Option<String>,
 }
 
 /// The state of a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct FileState {
     pub(crate) name: String,
@@ -237,29 +309,48 @@ pub(crate) struct FileState {
 
 /// The state of a line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct LineState {
     /// The text without the line end.
     pub(crate) text: String,
     /// The name of the command, also of one that is hidden in a comment.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) command: Option<&'static str>,
     /// The role of the command.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) role: Option<Role>,
     /// The comment at the end of the line.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) name: Option<String>,
     /// The name of a group or material before the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
     pub(crate) subject: Option<String>,
     /// The command is hidden in a comment.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
     pub(crate) hidden: bool,
+}
+
+/// The version of a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(crate) struct TextState {
+    /// The index of the file.
+    pub(crate) file: usize,
+    /// A number that changes with the text, except by the edits of the page's own editor.
+    pub(crate) version: u32,
+    /// Whether the last line has a line end.
+    pub(crate) ends: bool,
 }
 
 /// A replacement of some lines by others.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct LinesChanged {
     /// The index of the first line.
@@ -272,6 +363,7 @@ pub(crate) struct LinesChanged {
 
 /// The state of the page.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct State {
     /// The number of messages that had been received.
@@ -296,6 +388,14 @@ pub(crate) struct State {
     pub(crate) selection: Vec<usize>,
     /// The parameters of the main selected line.
     pub(crate) inspected: Option<Inspected>,
+    /// The parameters of the frame's settings, of those that have a line.
+    pub(crate) settings: Vec<Inspected>,
+    /// The directions of x, y and z in the picture.
+    pub(crate) axes: [[f64; 2]; 3],
+    /// The line of the frame's camera.
+    pub(crate) camera: Option<usize>,
+    /// The script's camera as the free camera sees it, as an SVG path.
+    pub(crate) frustum: String,
     /// The errors and warnings of the file.
     pub(crate) faults: Vec<FaultState>,
     /// The handles that can be dragged.
@@ -318,6 +418,7 @@ pub(crate) struct State {
 
 /// The parameters of a line.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Inspected {
     pub(crate) line: usize,
@@ -325,6 +426,8 @@ pub(crate) struct Inspected {
     pub(crate) command: &'static str,
     /// The current numbers of the parameters; `null` for a word that is no number.
     pub(crate) values: Vec<Option<f64>>,
+    /// The words that are neither numbers nor curves, by their positions.
+    pub(crate) words: BTreeMap<usize, String>,
     /// The parameters that are curves.
     pub(crate) curves: Vec<usize>,
     /// The curves that have a key at the shown frame.
@@ -341,6 +444,7 @@ pub(crate) struct Inspected {
 
 /// The state of frames and keys.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct TimeState {
     /// The number of the shown frame, at which curves are evaluated.
@@ -363,6 +467,7 @@ pub(crate) struct TimeState {
 
 /// The outline of the selection at another frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Ghost {
     /// The outline as an SVG path.
@@ -373,6 +478,7 @@ pub(crate) struct Ghost {
 
 /// An error or a warning of a line.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct FaultState {
     /// The index of the line.
@@ -383,6 +489,8 @@ pub(crate) struct FaultState {
     pub(crate) length: usize,
     /// Whether it prevents rendering.
     pub(crate) error: bool,
+    /// Whether several rays per pixel are the remedy.
+    pub(crate) needs_samples: bool,
     /// The description of the problem.
     pub(crate) message: String,
     /// The correction that would help.
@@ -391,6 +499,7 @@ pub(crate) struct FaultState {
 
 /// The state of the GIF.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "is")]
 pub(crate) enum OutputState {
     /// The GIF is being rendered.
@@ -413,3 +522,6 @@ pub(crate) enum OutputState {
         why: String,
     },
 }
+
+#[cfg(test)]
+mod typescript;

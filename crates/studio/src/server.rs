@@ -1,11 +1,6 @@
-//! The server of the page: on loopback, for clients that know the token in its address.
-//!
-//! Every request must contain the right host and the token. If the browser sends the origin of a page, it must be
-//! this server. So other machines, programs of other users without the address, and other pages in the same browser
-//! are rejected. No path of a request reaches the file system. One page works at a time, and a new one replaces it.
+//! The server of the page, behind its [`Door`]. No path of a request reaches the file system. One page works at a time,
+//! and a new one replaces it.
 
-use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -13,18 +8,18 @@ use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Request, State};
-use axum::http::{HeaderValue, Method, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::http::{StatusCode, header};
+use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
-use tokio::net::TcpListener;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
 
+use crate::door::{Door, guard, serve};
 use crate::error::Error;
 use crate::materials;
-use crate::output::{Outputs, frame_png, frames_zip, scripts_zip};
+use crate::output::{Outputs, frame_png, frames_zip, scripts_zip, thumbnail};
 use crate::page::Page;
 use crate::pictures::Painter;
 use crate::project::Project;
@@ -44,13 +39,6 @@ const DRAWN: usize = 2;
 /// The interval at which files are checked and written.
 const TICK: Duration = Duration::from_millis(250);
 
-/// The length of the token in bytes of the system's randomness.
-const TOKEN: usize = 16;
-
-/// Allows only content of this server: no other script or style, and no frame around it.
-const POLICY: &str = "default-src 'self'; connect-src 'self'; img-src 'self' data: blob:; object-src 'none'; \
-                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-
 /// A running server.
 #[derive(Debug)]
 pub struct Server {
@@ -65,10 +53,12 @@ struct Shared {
     project: Arc<Mutex<Project>>,
     outputs: Arc<Outputs>,
     page: Page,
-    token: String,
-    host: String,
+    /// Whether there is a bucket to submit to.
+    can_submit: bool,
     /// A permit to render frames for downloads.
     drawing: Arc<Semaphore>,
+    /// The permit to render small pictures, which are rendered one after the other.
+    thumbnails: Semaphore,
     /// Ends the session of the current page.
     working: Mutex<Option<oneshot::Sender<()>>>,
 }
@@ -79,21 +69,16 @@ impl Server {
     /// # Errors
     /// Fails if the port is taken or the system has no randomness.
     pub async fn start(project: Project, page: Page, cloud: Cloud, port: u16) -> Result<Self, Error> {
-        let mut random = [0; TOKEN];
-        getrandom::fill(&mut random).map_err(|error| Error::Server(io::Error::other(error)))?;
-        let token: String = random.iter().map(|byte| format!("{byte:02x}")).collect();
-        let listener =
-            TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).await.map_err(Error::Server)?;
-        let host = listener.local_addr().map_err(Error::Server)?.to_string();
-        let address = format!("http://{host}/{token}/");
+        let (listener, door) = Door::open(port).await?;
+        let (address, door) = (door.address(), Arc::new(door));
         let project = Arc::new(Mutex::new(project));
         let shared = Arc::new(Shared {
             project: Arc::clone(&project),
             outputs: Arc::default(),
             page,
-            token,
-            host,
+            can_submit: cloud.has_bucket(),
             drawing: Arc::new(Semaphore::new(DRAWN)),
+            thumbnails: Semaphore::new(1),
             working: Mutex::default(),
         });
         let router = Router::new()
@@ -105,17 +90,17 @@ impl Server {
             .route("/{token}/scripts.zip", get(scripts))
             .route("/{token}/frame.png", get(frame))
             .route("/{token}/frames.zip", get(frames))
+            .route("/{token}/thumbnail.png", get(thumbnail_of))
             .route("/{token}/script.txt", get(one_script))
             .route("/{token}/material.png", get(material))
             .route("/{token}/preset.png", get(preset))
             .with_state(Arc::clone(&shared))
             .nest("/{token}/runs", cloud.router(project))
-            .layer(from_fn_with_state(Arc::clone(&shared), guard));
+            .layer(from_fn_with_state(door, guard));
         let (stop, stopped) = oneshot::channel();
         let task = tokio::spawn(async move {
-            let serving = axum::serve(listener, router).into_future();
             tokio::select! {
-                _ = serving => {}
+                () = serve(listener, router) => {}
                 _ = stopped => {}
             }
         });
@@ -148,41 +133,6 @@ impl Shared {
     fn may_draw(&self) -> Option<OwnedSemaphorePermit> {
         Arc::clone(&self.drawing).try_acquire_owned().ok()
     }
-
-    fn is_allowed(&self, request: &Request) -> bool {
-        let header = |name| request.headers().get(name).map(HeaderValue::as_bytes);
-        let token = request.uri().path().split('/').nth(1).unwrap_or_default();
-        let origin = format!("http://{}", self.host);
-        let must_say = header(header::UPGRADE).is_some() || request.method() != Method::GET;
-        let known_origin = match header(header::ORIGIN) {
-            Some(from) => from == origin.as_bytes(),
-            // Browsers always send the origin when a socket is opened or data is sent.
-            None => !must_say,
-        };
-        header(header::HOST) == Some(self.host.as_bytes()) && known_origin && same(token, &self.token)
-    }
-}
-
-/// Compares in constant time, which reveals nothing about the position of a difference.
-fn same(given: &str, token: &str) -> bool {
-    given.len() == token.len() && given.bytes().zip(token.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
-}
-
-async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    let mut response = if shared.is_allowed(&request) {
-        next.run(request).await
-    } else {
-        (StatusCode::FORBIDDEN, "open the address that `rayfold studio` has printed\n").into_response()
-    };
-    for (name, value) in [
-        (header::CONTENT_SECURITY_POLICY, POLICY),
-        (header::REFERRER_POLICY, "no-referrer"),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::CACHE_CONTROL, "no-store"),
-    ] {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
-    }
-    response
 }
 
 async fn html(State(shared): State<Arc<Shared>>) -> Response {
@@ -238,7 +188,20 @@ async fn frame(State(shared): State<Arc<Shared>>, request: Request) -> Response 
         (project.files[place.file].script.clone(), place.frame)
     };
     let png = tokio::task::block_in_place(|| script.map_or(Ok(None), |script| frame_png(&script, frame)));
-    picture(png, "this frame has nothing to draw\n")
+    picture(png, (StatusCode::NOT_FOUND, "this frame has nothing to draw\n"))
+}
+
+/// Returns a small picture of a script's first frame. The query is its index among the files.
+async fn thumbnail_of(State(shared): State<Arc<Shared>>, request: Request) -> Response {
+    let Ok(_permit) = shared.thumbnails.acquire().await else { return busy() };
+    let query = request.uri().query().unwrap_or_default();
+    let index = query.split(',').next().and_then(|index| index.parse::<usize>().ok());
+    let png = tokio::task::block_in_place(|| {
+        let scene = index.and_then(|index| shared.project().files.get(index)?.frame(0).scene.clone());
+        scene.map_or(Ok(None), thumbnail)
+    });
+    // A script without a picture is no error.
+    picture(png, StatusCode::NO_CONTENT)
 }
 
 /// Returns a sphere of a material. The query is the index of its file, its line and the number of the
@@ -256,20 +219,21 @@ async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Respon
         .unwrap_or_default();
         materials::sphere(&lines, line, u32::try_from(frame).unwrap_or(u32::MAX))
     });
-    picture(png, "this line defines no material\n")
+    // The script may have changed since the page wanted it.
+    picture(png, StatusCode::NO_CONTENT)
 }
 
 /// Returns a sphere of the starter material that the query names.
 async fn preset(request: Request) -> Response {
     let name = request.uri().query().unwrap_or_default();
     let png = tokio::task::block_in_place(|| materials::preset_sphere(name));
-    picture(png, "there is no such starter material\n")
+    picture(png, (StatusCode::NOT_FOUND, "there is no such starter material\n"))
 }
 
-fn picture(png: Result<Option<Vec<u8>>, Error>, missing: &'static str) -> Response {
+fn picture(png: Result<Option<Vec<u8>>, Error>, missing: impl IntoResponse) -> Response {
     match png {
         Ok(Some(png)) => file("image/png", png),
-        Ok(None) => (StatusCode::NOT_FOUND, missing).into_response(),
+        Ok(None) => missing.into_response(),
         Err(error) => failed(&error),
     }
 }
@@ -303,7 +267,8 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
     let (pictures, mut drawn) = mpsc::channel::<Vec<u8>>(WAITING);
     let (tellings, mut messages) = mpsc::channel::<ServerMessage>(WAITING);
     let Ok(painter) = Painter::start(move |picture| pictures.blocking_send(picture).is_ok()) else { return };
-    let (mut session, answer) = Session::open(&shared.project());
+    let (mut session, mut answer) = Session::open(&shared.project());
+    answer.tell.can_submit = Some(shared.can_submit);
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut next = Some(answer);
@@ -393,6 +358,7 @@ mod tests {
     use tokio::net::TcpStream;
 
     use super::*;
+    use crate::door::{CONNECTIONS, TOKEN};
 
     /// Returns the status of a request that is written literally to the socket.
     async fn status(host: &str, path: &str, headers: &[(&str, &str)]) -> u16 {
@@ -407,13 +373,36 @@ mod tests {
         std::str::from_utf8(&answer[9..]).unwrap().parse().unwrap()
     }
 
+    /// Many clients that say nothing do not keep a page out, and are cut off.
+    #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+    async fn half_open_connections_are_closed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let project = Project::open(&path).unwrap();
+        let server = Server::start(project, Page::built_in(), Cloud::none(), 0).await.unwrap();
+        let rest = server.address().strip_prefix("http://").unwrap();
+        let (host, path) = rest.split_at(rest.find('/').unwrap());
+        let mut silent = Vec::new();
+        for _ in 0..2 * CONNECTIONS {
+            let mut stream = TcpStream::connect(host).await.unwrap();
+            stream.write_all(b"GET / HTTP/1.1\r\nHost:").await.unwrap();
+            silent.push(stream);
+        }
+        assert_eq!(status(host, path, &[("Host", host)]).await, 200);
+        for mut stream in silent {
+            let mut rest = Vec::new();
+            // The end, or a reset: either way it is closed.
+            let _ = stream.read_to_end(&mut rest).await;
+        }
+        assert!(server.stop().await.is_empty());
+    }
+
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
     async fn only_who_knows_the_address_gets_in() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("a.txt"), "Screen 4 3\nTrace").unwrap();
+        std::fs::write(folder.path().join("a.txt"), "Screen 4 3\nLook 0 0 9 0 0 0 40\nTrace").unwrap();
         let project = Project::open(folder.path()).unwrap();
-        let page = Page { html: b"page".to_vec(), script: Vec::new(), style: Vec::new() };
-        let server = Server::start(project, page, Cloud::none(), 0).await.unwrap();
+        let server = Server::start(project, Page::built_in(), Cloud::none(), 0).await.unwrap();
         let rest = server.address().strip_prefix("http://").unwrap();
         let (host, path) = rest.split_at(rest.find('/').unwrap());
         assert!(host.starts_with("127.0.0.1:") && path.len() == 2 * TOKEN + 2);
@@ -430,6 +419,8 @@ mod tests {
         check(path, &[("Host", host), ("Origin", "http://evil.example")], 403).await;
         check(path, &[("Host", host), ("Origin", "null")], 403).await;
         check(&format!("{path}a.txt"), &[("Host", host)], 404).await;
+        check(&format!("{path}thumbnail.png?0,1"), &[("Host", host)], 200).await;
+        check(&format!("{path}thumbnail.png?1"), &[("Host", host)], 204).await;
         check(&format!("{path}%2e%2e/a.txt"), &[("Host", host)], 404).await;
         let socket = format!("{path}socket");
         let upgrade = [

@@ -8,26 +8,29 @@ mod held_keys;
 mod hold;
 mod loading;
 mod replies;
+mod text;
 mod time;
 mod viewport;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use rayfold_scene::{Clause, Command, language};
 
-use crate::document::Splice;
+use crate::arrange;
 use crate::edits;
 use crate::error::words;
 use crate::examples;
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::materials;
+use crate::names;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
 use crate::protocol::{ClientMessage, FileState, ServerMessage};
 use crate::snap_to_ground;
-use crate::tables::commands;
+use crate::tables::{Role, commands, role};
 use crate::tracks::{Copied, Tracks};
 use crate::values::changed;
 use crate::view::Orbit;
@@ -67,6 +70,9 @@ pub(crate) struct Session {
     tracks: Option<Tracks>,
     files: Vec<FileState>,
     shown_file: usize,
+    /// The version of each file's text, and the last version of any.
+    versions: BTreeMap<usize, u32>,
+    version: u32,
     /// The action that the server is to take on the GIF.
     output: Option<Output>,
 }
@@ -125,9 +131,12 @@ impl Session {
             tracks: None,
             files: Vec::new(),
             shown_file: 0,
+            versions: BTreeMap::new(),
+            version: 0,
             output: None,
         };
         let tell = ServerMessage {
+            language: Some(language()),
             tables: Some(commands()),
             examples: Some(examples::names()),
             can_create: Some(project.can_create()),
@@ -171,6 +180,7 @@ impl Session {
             Some(splices) if !splices.is_empty() => {
                 tell.notice = Some(format!("{} was changed on the disk", project.files[place.file].name));
                 self.send_splices(splices, &mut tell);
+                self.keep_file(project);
                 Change::Still
             }
             _ => Change::Nothing,
@@ -185,7 +195,7 @@ impl Session {
             ClientMessage::Shown
                 | ClientMessage::Size { .. }
                 | ClientMessage::Hover { .. }
-                | ClientMessage::Text { .. }
+                | ClientMessage::Edit { .. }
         ) {
             self.typing = None;
         }
@@ -220,7 +230,7 @@ impl Session {
             }
             ClientMessage::Drag { x, y, options } => self.drag(project, DVec2::new(x, y), options, tell),
             ClientMessage::Release => {
-                self.held = None;
+                self.release(project);
                 self.outline(project, tell);
                 Change::Still
             }
@@ -234,7 +244,11 @@ impl Session {
                 self.outline(project, tell);
                 Change::Still
             }
-            ClientMessage::KeepCamera => self.keep_camera(project, tell),
+            ClientMessage::KeepCamera => self.keep_camera(project, None, tell),
+            ClientMessage::Camera { command } => {
+                let kind = Command::from_name(&command).filter(|&command| role(command) == Role::Camera);
+                if kind.is_some() { self.keep_camera(project, kind, tell) } else { Change::Nothing }
+            }
             ClientMessage::Set { line, first, values, gesture } => {
                 let keying = self.keying(project);
                 let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
@@ -248,30 +262,8 @@ impl Session {
                     _ => Change::Nothing,
                 }
             }
-            ClientMessage::Text { line, text } => {
-                let old = self.line(project, line).cloned().unwrap_or_default();
-                if text.len() <= TEXT && old.text() != text {
-                    let mut inserted: Vec<_> = text.split('\n').map(Line::new).collect();
-                    if let Some(last) = inserted.pop() {
-                        inserted.push(last.with_end(old.end()));
-                    }
-                    let removed = usize::from(self.line(project, line).is_some());
-                    let gesture = match self.typing {
-                        Some((typed, gesture)) if typed == line && inserted.len() == 1 => gesture,
-                        _ => self.next_gesture(),
-                    };
-                    self.typing = (inserted.len() == 1).then_some((line, gesture));
-                    let splice = Splice { at: line, removed, inserted };
-                    self.edit(project, vec![splice], Some(gesture), tell);
-                }
-                Change::Still
-            }
-            ClientMessage::Insert { at, text } => {
-                if text.len() <= TEXT {
-                    let inserted = text.split('\n').map(Line::new).collect();
-                    self.edit(project, vec![Splice { at, removed: 0, inserted }], None, tell);
-                }
-                Change::Still
+            ClientMessage::Edit { file, version, changes } => {
+                self.edit_text(project, file, version, &changes, tell)
             }
             ClientMessage::Remove { lines } => {
                 self.edit(project, edits::remove(&lines), None, tell);
@@ -297,10 +289,11 @@ impl Session {
                 Change::Still
             }
             ClientMessage::Rename { line, name } => {
-                if let Some(to) = self.line(project, line).and_then(|line| line.named(&name)) {
-                    self.edit(project, vec![edits::set(line, to)], None, tell);
+                match names::rename(self.file_lines(project), line, &name) {
+                    Ok(splices) => self.edit(project, splices, None, tell),
+                    Err(refusal) => tell.notice = Some(refusal),
                 }
-                Change::Nothing
+                Change::Still
             }
             ClientMessage::Hide { lines } => {
                 let splices = edits::hide(self.file_lines(project), &lines);
@@ -332,6 +325,27 @@ impl Session {
                 self.lock(project, &lines);
                 Change::Nothing
             }
+            ClientMessage::Paste { text } => {
+                let shown = self.shown(project);
+                let (splices, places) = arrange::paste(self.file_lines(project), &shown.source_map, &text);
+                self.edit(project, splices, None, tell);
+                self.select(project, places);
+                self.outline(project, tell);
+                Change::Still
+            }
+            ClientMessage::Align { lines, axis, how } => {
+                let boxes = self.boxes(project, |line| lines.contains(&line));
+                let keying = self.keying(project);
+                let splices = arrange::align(self.file_lines(project), &boxes, axis.min(2), how, keying);
+                self.edit(project, splices, None, tell);
+                self.outline(project, tell);
+                Change::Still
+            }
+            ClientMessage::Box { from, to, extend } => {
+                self.select_box(project, from.into(), to.into(), extend);
+                self.outline(project, tell);
+                Change::Nothing
+            }
             ClientMessage::Group { lines } => {
                 self.group(project, &lines, tell);
                 Change::Still
@@ -341,8 +355,36 @@ impl Session {
                 Change::Still
             }
             ClientMessage::Surface { lines, material } => {
-                let splices = materials::give(self.file_lines(project), &lines, &material);
+                let of = self.file_lines(project);
+                let splices = if material.is_empty() {
+                    materials::take(of, &lines)
+                } else {
+                    materials::give(of, &lines, &material)
+                };
                 self.edit(project, splices, None, tell);
+                Change::Still
+            }
+            ClientMessage::Paint { at: [x, y], material, preset } => {
+                let under: Vec<_> = self.pick(project, x, y).into_iter().map(|(line, _)| line).collect();
+                let give = if preset { materials::give_preset } else { materials::give };
+                let splices = give(self.file_lines(project), &under, &material);
+                self.edit(project, splices, None, tell);
+                Change::Still
+            }
+            ClientMessage::Clause { line, clause } => {
+                let lines = self.file_lines(project);
+                match Clause::from_name(&clause).map(|clause| materials::toggle(lines, line, clause)) {
+                    Some(Ok(splices)) => self.edit(project, splices, None, tell),
+                    Some(Err(refusal)) => tell.notice = Some(refusal.into()),
+                    None => {}
+                }
+                Change::Still
+            }
+            ClientMessage::Word { line, number, word } => {
+                let to = self.line(project, line).filter(|_| names::is_name(&word));
+                let to = to.and_then(|line| line.with_words(&[(number, word)]));
+                let splices = to.map(|to| edits::set(line, to));
+                self.edit(project, splices.into_iter().collect(), None, tell);
                 Change::Still
             }
             ClientMessage::Preset { lines, preset } => {
@@ -374,6 +416,7 @@ impl Session {
                     Ok(splices) => self.send_splices(splices, tell),
                     Err(error) => tell.notice = Some(words(&error)),
                 }
+                self.keep_file(project);
                 self.select(project, self.selection.clone());
                 self.outline(project, tell);
                 Change::Still
@@ -421,6 +464,14 @@ impl Session {
         let last = |line: &usize| *line < count && named.insert(*line);
         self.selection = lines.into_iter().rev().filter(last).collect();
         self.selection.reverse();
+    }
+
+    /// Keeps the shown file when it has fewer frames than before.
+    fn keep_file(&mut self, project: &Project) {
+        if self.shown_file < project.files.len() && self.place(project).file != self.shown_file {
+            let frames = project.files[self.shown_file].frame_count();
+            self.frame = project.first_frame(self.shown_file) + frames - 1;
+        }
     }
 
     fn show(&mut self, project: &Project, frame: usize, tell: &mut ServerMessage) {

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::error::Error;
-use crate::files::read;
+use crate::files::{self, LINK};
 use crate::line::written;
 
 /// The settings of the animation, and their file.
@@ -22,6 +22,14 @@ pub(crate) struct Settings {
     /// The content of the file when it was last read or written; `None` if it did not exist.
     on_disk: Option<Vec<u8>>,
     now: AnimationSettings,
+}
+
+/// Reads the file of settings, unless it is a link to another place.
+fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
+    if path.parent().is_some_and(|folder| files::leads_out(folder, path)) {
+        return Err(Error::Settings(format!("{SETTINGS_FILE}: {LINK}")));
+    }
+    files::read(path)
 }
 
 impl Settings {
@@ -37,7 +45,7 @@ impl Settings {
     }
 
     pub(crate) fn now(&self) -> AnimationSettings {
-        self.now
+        self.now.clone()
     }
 
     /// Sets the frame rate. The rest of the file stays unchanged.
@@ -50,9 +58,8 @@ impl Settings {
             None => None,
         };
         let there = parsed(held.as_deref())?;
-        let of = if self.path.is_some() { there } else { self.now };
-        let next = AnimationSettings::new(of.frames(), fps, of.loops())
-            .map_err(|error| Error::Output(error.to_string()))?;
+        let of = if self.path.is_some() { there.clone() } else { self.now.clone() };
+        let next = of.with_fps(fps).map_err(|error| Error::Output(error.to_string()))?;
         if let Some(path) = &self.path
             && next != there
         {
@@ -78,7 +85,7 @@ impl Settings {
             return Ok(false);
         }
         self.on_disk = theirs;
-        let before = self.now;
+        let before = self.now.clone();
         self.now = parsed(self.on_disk.as_deref())?;
         Ok(self.now != before)
     }

@@ -10,7 +10,7 @@ use rayfold_tracer::{Precision, RenderOptions};
 
 use crate::document::Splice;
 use crate::edits::{moved, set};
-use crate::extent::{bounds, reach};
+use crate::extent::bounds;
 use crate::line::Line;
 use crate::source_map::SourceMap;
 use crate::values::{Keying, tidy};
@@ -53,7 +53,7 @@ pub(crate) fn to_ground(
     let mut splices = Vec::new();
     for &line in which {
         let own = scene.objects.iter().enumerate().filter(|(at, _)| source_map.line_of(*at) == Some(line));
-        let lowest = own.filter_map(|(_, object)| Some(-reach(object, DVec3::NEG_Y)?)).reduce(f64::min);
+        let lowest = own.filter_map(|(_, object)| Some(-object.support(DVec3::NEG_Y)?)).reduce(f64::min);
         splices.extend(lowest.map(|lowest| down(lines, &[line], lowest, keying)).unwrap_or_default());
     }
     splices

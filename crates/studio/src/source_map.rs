@@ -26,14 +26,10 @@ pub(crate) struct SourceMap {
     pub(crate) lights: Vec<usize>,
     /// The line of its camera; `None` if it has the default camera.
     pub(crate) camera: Option<usize>,
-    /// The line of its size.
-    pub(crate) screen: Option<usize>,
-    /// The line of its background.
-    pub(crate) background: Option<usize>,
+    /// The lines of its settings.
+    settings: HashMap<Command, usize>,
     /// The line of the `Clear` with which it begins.
     cleared: Option<usize>,
-    /// The line of its frame numbers.
-    pub(crate) frames: Option<usize>,
     /// The line of its `Trace`. If it is missing, new lines go to the end.
     pub(crate) trace: Option<usize>,
     /// The groups up to its `Trace`, each from `Group` to `End`.
@@ -62,7 +58,7 @@ impl SourceMap {
                     source_map.objects.clear();
                     source_map.drawn.clear();
                     source_map.lights.clear();
-                    source_map.background = None;
+                    source_map.settings.remove(&Command::Background);
                     source_map.cleared = Some(number);
                 }
                 (Command::Trace, _) => {
@@ -73,7 +69,7 @@ impl SourceMap {
                     before = before.saturating_add(count);
                 }
                 (Command::Frames, _) => {
-                    source_map.frames = Some(number);
+                    source_map.settings.insert(command, number);
                     count = frames(line).unwrap_or(1);
                 }
                 (Command::Group, _) => {
@@ -90,12 +86,13 @@ impl SourceMap {
                     let drawn = line.subject().and_then(|name| groups.drawn.get(name)).copied().unwrap_or(0);
                     source_map.draw(&mut groups, number, if hides { 0 } else { drawn });
                 }
-                (Command::Screen, _) => source_map.screen = Some(number),
-                (Command::Background, _) => source_map.background = Some(number),
                 (_, Role::Object) => source_map.draw(&mut groups, number, 1),
                 (_, Role::Light) => source_map.lights.push(number),
                 (_, Role::Camera) => source_map.camera = Some(number),
-                (_, Role::Use | Role::Material | Role::Group | Role::Setting) => {}
+                (_, Role::Setting) => {
+                    source_map.settings.insert(command, number);
+                }
+                (_, Role::Use | Role::Material | Role::Group) => {}
             }
         }
         source_map
@@ -117,6 +114,16 @@ impl SourceMap {
         self.drawn.last().copied().unwrap_or(0)
     }
 
+    /// Returns the line of a setting; `None` if it has its default.
+    pub(crate) fn setting(&self, command: Command) -> Option<usize> {
+        self.settings.get(&command).copied()
+    }
+
+    /// Returns the line for a new setting: after the size, and after what removes settings.
+    pub(crate) fn start(&self) -> usize {
+        self.setting(Command::Screen).max(self.cleared).map_or(0, |at| at + 1)
+    }
+
     /// Returns the line of one of the tracer's objects.
     pub(crate) fn line_of(&self, object: usize) -> Option<usize> {
         self.objects.get(self.drawn.partition_point(|&end| end <= object)).copied()
@@ -131,7 +138,8 @@ impl SourceMap {
     /// Returns the line for a new object or light of this frame: after its existing ones and before its `Trace`.
     pub(crate) fn end(&self, lines: &[Line]) -> usize {
         let groups = self.groups.last().map(|group| group.end());
-        let set = self.camera.iter().chain(&self.screen).chain(&self.background).chain(&self.cleared);
+        let [screen, background] = [Command::Screen, Command::Background].map(|of| self.settings.get(&of));
+        let set = self.camera.iter().chain(screen).chain(background).chain(&self.cleared);
         let last = self.objects.iter().chain(&self.lights).chain(set).chain(groups).max();
         match (last, self.trace) {
             (Some(last), _) => last + 1,
@@ -172,7 +180,7 @@ mod tests {
         }
         let last = SourceMap::of(&lines, 3, 1.0);
         assert_eq!(
-            (last.camera, last.screen, last.lights.len(), last.trace),
+            (last.camera, last.setting(Command::Screen), last.lights.len(), last.trace),
             (Some(8), Some(0), 0, Some(11))
         );
         assert_eq!(last.end(&lines), 10);
@@ -199,7 +207,7 @@ mod tests {
             let source_map = SourceMap::of(&lines, frame, time);
             assert_eq!(source_map.object_count(), script.frame(frame).unwrap().objects.len(), "{frame}");
             assert_eq!(source_map.trace, Some(if frame < 3 { 14 } else { 17 }));
-            assert_eq!(source_map.frames, Some(if frame < 3 { 13 } else { 15 }));
+            assert_eq!(source_map.setting(Command::Frames), Some(if frame < 3 { 13 } else { 15 }));
         }
         let source_map = SourceMap::of(&lines, 0, 1.0);
         let seen: Vec<_> =

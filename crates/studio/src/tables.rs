@@ -1,11 +1,12 @@
 //! The commands of the language for the page, from the parser's tables. A new command appears in the palette and in
 //! the inspector without further code.
 
-use rayfold_scene::{Command, Field, Kind, Parameter, Presence};
+use rayfold_scene::{Command, Field, Kind, Parameter, Presence, Values};
 use serde::Serialize;
 
 /// The role of a command on the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Role {
     /// The command adds a visible object.
@@ -26,6 +27,7 @@ pub(crate) enum Role {
 
 /// The table of a command.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct CommandTable {
     /// The name in scripts.
     pub(crate) name: &'static str,
@@ -36,7 +38,8 @@ pub(crate) struct CommandTable {
 }
 
 /// The table of a parameter.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct FieldTable {
     /// The name of the parameter, such as `radius`.
     pub(crate) label: String,
@@ -48,6 +51,23 @@ pub(crate) struct FieldTable {
     pub(crate) unit: String,
     /// The allowed values, such as `greater than 0`.
     pub(crate) values: String,
+    /// The least value, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) minimum: Option<f64>,
+    /// Whether the least value itself is excluded.
+    #[serde(rename = "aboveMinimum")]
+    pub(crate) above_minimum: bool,
+    /// The greatest value, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) maximum: Option<f64>,
+    /// Whether only whole numbers are allowed.
+    pub(crate) whole: bool,
+    /// The words that it can be, if it is no number.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
+    pub(crate) words: Vec<String>,
     /// Whether the parameter is optional.
     pub(crate) optional: bool,
     /// The position of its first number among those of the command.
@@ -104,13 +124,49 @@ impl FieldTable {
     /// Makes the table of a parameter whose first number is `first`.
     pub(crate) fn new(first: usize, field: &Field) -> Self {
         let label = field.parameter.to_string();
+        let (minimum, above_minimum, maximum, whole) = match field.values {
+            Values::Any | Values::Clamped | Values::NotZero | Values::OneOf(_) => (None, false, None, false),
+            Values::Positive => (Some(0.0), true, None, false),
+            Values::NotNegative => (Some(0.0), false, None, false),
+            Values::AtLeastOne => (Some(1.0), false, None, false),
+            Values::Share => (Some(0.0), false, Some(1.0), false),
+            Values::HalfTurn => (Some(0.0), false, Some(180.0), false),
+            Values::FieldOfView => (Some(0.0), true, Some(180.0), false),
+            Values::Whole(least, most) => (Some(least.into()), false, Some(most.into()), true),
+        };
         Self {
             label: label.strip_prefix("the ").or(label.strip_prefix("a ")).unwrap_or(&label).to_owned(),
             names: field.names,
             kind: field.kind.to_string(),
             unit: field.kind.unit().to_string(),
             values: field.values.to_string(),
+            minimum,
+            above_minimum,
+            maximum,
+            whole,
+            words: match field.values {
+                Values::OneOf(words) => words.iter().map(|&word| word.to_owned()).collect(),
+                _ => Vec::new(),
+            },
             optional: field.presence != Presence::Required,
+            first,
+        }
+    }
+
+    /// Makes the table of the name of a material, which is one of these.
+    pub(crate) fn of_material(first: usize, names: Vec<String>) -> Self {
+        Self {
+            label: "other material".to_owned(),
+            names: &["name"],
+            kind: "name".to_owned(),
+            unit: String::new(),
+            values: "a material of coefficients alone".to_owned(),
+            minimum: None,
+            above_minimum: false,
+            maximum: None,
+            whole: false,
+            words: names,
+            optional: false,
             first,
         }
     }

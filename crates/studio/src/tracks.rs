@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::line::{Line, written};
 use crate::tables::{Role, fields, role};
-use crate::values::curve;
+use crate::values::{curve, tidy};
 
 /// The largest number of tracks that are sent to the page.
 const TRACKS: usize = 300;
@@ -21,6 +21,7 @@ const KEYS: usize = 20_000;
 
 /// A number that changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct Track {
     /// The index of its line, from 0.
     pub(crate) line: usize,
@@ -34,10 +35,13 @@ pub(crate) struct Track {
     pub(crate) cycle: bool,
     /// Frames and values of the keys.
     pub(crate) keys: Vec<(f64, f64)>,
+    /// The slopes of a smooth curve at its keys.
+    pub(crate) slopes: Vec<f64>,
 }
 
 /// All tracks of a script, up to the limit of the page.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Tracks {
     /// The tracks in the order of the text.
@@ -48,6 +52,7 @@ pub(crate) struct Tracks {
 
 /// The position of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub(crate) struct KeyPlace {
     /// The index of its line, from 0.
     pub(crate) line: usize,
@@ -126,10 +131,25 @@ pub(crate) fn tracks(lines: &[Line]) -> Tracks {
                 mode: curve.mode().name(),
                 cycle: curve.is_cycle(),
                 keys: curve.keys().iter().map(|key| (key.frame, key.value)).collect(),
+                slopes: slopes(&curve),
             });
         }
     }
     found
+}
+
+/// Returns the slopes of a smooth curve at its keys; nothing for others.
+fn slopes(curve: &Curve) -> Vec<f64> {
+    let keys = curve.keys();
+    if curve.mode() != Mode::Smooth || keys.len() < 2 {
+        return Vec::new();
+    }
+    let slope = |at: usize| {
+        let beside = if at + 1 < keys.len() { keys[at + 1] } else { keys[at - 1] };
+        let step = 1e-4 * (beside.frame - keys[at].frame);
+        (curve.at(keys[at].frame + step) - keys[at].value) / step
+    };
+    (0..keys.len()).map(slope).collect()
 }
 
 fn label(slot: &Slot) -> String {
@@ -200,14 +220,20 @@ pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line
 }
 
 /// Returns the lines that change if some keys move by `by` frames. Keys at their new positions are replaced.
-pub(crate) fn moved(lines: &[Line], keys: &[KeyPlace], by: f64) -> Vec<(usize, Line)> {
+pub(crate) fn moved(lines: &[Line], keys: &[KeyPlace], by: f64, value: f64) -> Vec<(usize, Line)> {
     each(lines, keys, |curve, frames| {
-        if by == 0.0 {
+        if by == 0.0 && value == 0.0 {
             return None;
         }
         let is_held = |key: &&Key| frames.contains(&key.frame);
         let held: Vec<_> = curve.keys().iter().filter(is_held).collect();
-        let gone: Vec<_> = held.iter().map(|key| Key { frame: key.frame + by, ..**key }).collect();
+        let gone: Vec<_> = held
+            .iter()
+            .map(|key| Key {
+                frame: key.frame + by,
+                value: if value == 0.0 { key.value } else { tidy(key.value + value) },
+            })
+            .collect();
         let stay = curve.keys().iter().filter(|key| !is_held(key));
         let stay = stay.filter(|key| gone.iter().all(|moved| moved.frame != key.frame));
         let mut all: Vec<_> = stay.copied().chain(gone.iter().copied()).collect();
@@ -373,7 +399,7 @@ mod tests {
     #[test]
     fn keys_move_and_go_and_one_that_is_left_is_a_number() {
         let lines = lines(TEXT);
-        let x = |keys: &[KeyPlace], by| one(moved(&lines, keys, by));
+        let x = |keys: &[KeyPlace], by| one(moved(&lines, keys, by, 0.0));
         assert_eq!(x(&[key(0, 1, 9.0)], 3.0), TEXT.lines().next().unwrap().replace("9:2", "12:2"));
         assert_eq!(
             x(&[key(0, 1, 9.0), key(0, 3, 5.0)], -1.0),
@@ -381,8 +407,8 @@ mod tests {
         );
         assert_eq!(x(&[key(0, 3, 5.0)], 4.0), "Sphere 1  (1:0 9:2) 0 (smooth cycle 1:0 9:1)  red # ball");
         assert_eq!(x(&[key(0, 1, 9.0)], -8.0), "Sphere 1  2 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
-        assert!(moved(&lines, &[key(0, 1, 9.0)], 0.0).is_empty());
-        assert!(moved(&lines, &[key(0, 2, 9.0), key(9, 1, 1.0), key(2, 9, 1.0)], 1.0).is_empty());
+        assert!(moved(&lines, &[key(0, 1, 9.0)], 0.0, 0.0).is_empty());
+        assert!(moved(&lines, &[key(0, 2, 9.0), key(9, 1, 1.0), key(2, 9, 1.0)], 1.0, 0.0).is_empty());
         let gone = one(removed(&lines, &[key(0, 1, 1.0)]));
         assert_eq!(gone, "Sphere 1  2 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
         let gone = one(removed(&lines, &[key(0, 1, 1.0), key(0, 1, 9.0)]));

@@ -77,17 +77,24 @@ impl Orbit {
 
     /// Starts at the view of a script's camera. `bounds` are those of the scene.
     pub(crate) fn from_camera(camera: &Camera, bounds: Bounds) -> Self {
-        let Camera::Pinhole(pinhole) = camera else { return Self::at(bounds, 0.0, 0.0) };
-        let (_, _, w) = pinhole.basis();
-        let along = (bounds.center() - pinhole.eye()).dot(-w);
+        let (eye, w, half_fov, target) = match camera {
+            Camera::Orthographic => return Self::at(bounds, 0.0, 0.0),
+            Camera::Pinhole(pinhole) => {
+                let half = pinhole.lower_left().y.abs().max(pinhole.upper_right().y.abs());
+                (pinhole.eye(), pinhole.basis().2, (half / pinhole.distance()).atan(), bounds.center())
+            }
+            Camera::Look(look) => {
+                (look.eye(), look.basis().2, 0.5 * look.field_of_view().to_radians(), look.target())
+            }
+        };
+        let along = (target - eye).dot(-w);
         let distance = if along > 0.0 { along } else { bounds.radius() };
-        let half = pinhole.lower_left().y.abs().max(pinhole.upper_right().y.abs());
         Self {
-            target: pinhole.eye() - w * distance,
+            target: eye - w * distance,
             distance,
             yaw: w.x.atan2(w.z),
             pitch: w.y.clamp(-1.0, 1.0).asin(),
-            half_fov: (half / pinhole.distance()).atan(),
+            half_fov,
         }
     }
 

@@ -1,5 +1,5 @@
-//! Draws the first frame of a script a number of times on one thread, and prints the instructions that it was drawn
-//! with and a digest of the picture: what `rayfold-bench needs` counts.
+//! Draws the first frame of a script a given number of times on one thread. Prints the instruction set that was used
+//! and a digest of the picture. `rayfold-bench needs` counts the instructions of this program.
 //!
 //! usage: frames SCRIPT TIMES auto|f32|f64
 
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{Level, Precision, RenderError, RenderOptions, render_frame};
 
-/// The exit code for a scene that needs what this build leaves out.
+/// The exit code for a scene that needs a feature which this build leaves out.
 const LEFT_OUT: u8 = 3;
 
 fn main() -> ExitCode {

@@ -1,8 +1,9 @@
-//! From pixel to ray.
+//! The ray of each pixel.
 //!
-//! How the language numbers its pixels (i from the left, j from the bottom, samples on the window's corners) is written
-//! here, once: for the plain tracer, for the packets and for whoever asks where the ray of a pixel goes. Between two
-//! pixels lies a fraction: column `i + dx` and row `j + dy` have a ray like any other.
+//! This is the only place that knows how the language numbers its pixels: i from the left, j from the bottom, the
+//! outermost samples on the window's corners. The reference tracer, the packets, and callers who ask for the ray of a
+//! pixel all use it. A position between two pixels is a fraction: column `i + dx` and row `j + dy` have a ray like any
+//! other.
 
 use glam::{DVec2, DVec3};
 use rayfold_scene::model::unit;
@@ -10,38 +11,38 @@ use rayfold_scene::{Camera, Look, Scene, Screen};
 
 use crate::scale::below_inverse;
 
-/// A half-line; its direction is a unit vector.
+/// A ray: a half-line whose direction is a unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ray {
     pub(crate) origin: DVec3,
     pub(crate) direction: DVec3,
 }
 
-/// Where the samples of an image lie along one of its axes.
+/// The positions of an image's samples along one of its axes.
 ///
-/// They are counted from the one, or the middle between two, that is nearest to zero: what lies straight ahead is met
-/// straight ahead, and what is rounded is as small as what comes of it.
+/// They are computed relative to the sample nearest to zero, or to the midpoint between two. So a ray straight ahead is
+/// exact, and rounding errors are proportional to the coordinate itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
-    /// The sample that the others are counted from, a whole number or one and a half.
+    /// The index that the others are counted from: a whole number, or halfway between two.
     pub(crate) anchor: f64,
-    /// Where that lies.
+    /// The coordinate of the anchor.
     pub(crate) at_anchor: f64,
-    /// From one sample to the next; 0 if there is only one, and its pixel is a point.
+    /// The distance from one sample to the next; 0 if there is only one and its pixel is a point.
     pub(crate) step: f64,
-    /// What rounding takes from the step.
+    /// The rounding error of the step: the exact step is `step + rest`.
     pub(crate) rest: f64,
 }
 
 impl Axis {
-    /// Samples that lie at `start + index · step`.
+    /// Returns the axis whose samples are at `start + index · step`.
     pub(crate) fn along(start: f64, step: f64) -> Self {
         Self { anchor: 0.0, at_anchor: start, step, rest: 0.0 }
     }
 
-    /// From the first of so many pixels to the last; a single one lies in the middle.
+    /// Returns the axis that runs from the first of `pixels` pixels to the last. A single one is in the middle.
     fn between(from: f64, to: f64, pixels: u32, single: Single) -> Self {
-        // For its distance a window may be so small that nothing is left of it.
+        // A window may be so small, for its distance, that it underflows to nothing.
         if pixels == 1 || from == to {
             let step = match single {
                 Single::IsAPoint => 0.0,
@@ -50,58 +51,58 @@ impl Axis {
             return Self::along(0.5 * from + 0.5 * to, step);
         }
         let last = f64::from(pixels - 1);
-        // Half a sample is near enough; the middle of a window that is symmetric is one.
+        // Half a sample is near enough. The middle of a symmetric window is itself a multiple of half a sample.
         let twice = (2.0 * last * (-from / (to - from))).round().clamp(0.0, 2.0 * last);
         let (step, rest) = quotient(sum(to, -from), last);
         let (high, low) = quotient(add(product(from, 2.0 * last - twice), product(to, twice)), 2.0 * last);
         Self { anchor: 0.5 * twice, at_anchor: high + low, step, rest }
     }
 
-    /// Where a sample lies; `index` counts from the first and may be a fraction.
+    /// Returns the coordinate of a sample. `index` counts from the first and may be a fraction.
     pub(crate) fn at(self, index: f64) -> f64 {
         let index = index - self.anchor;
         index.mul_add(self.step, index.mul_add(self.rest, self.at_anchor))
     }
 
-    /// The sample that lies there, nearly.
+    /// Returns the index at a coordinate, approximately.
     pub(crate) fn index(self, at: f64) -> f64 {
         (at - self.at_anchor) / self.step + self.anchor
     }
 
-    /// The same counted from the other end of so many samples.
+    /// Returns the axis counted from its other end; it has `samples` samples.
     pub(crate) fn reversed(self, samples: u32) -> Self {
         let anchor = f64::from(samples - 1) - self.anchor;
         Self { anchor, step: -self.step, rest: -self.rest, ..self }
     }
 }
 
-/// A number and what rounding has taken from it.
-type Twofold = (f64, f64);
+/// A double-double number: a value and its rounding error.
+type DoubleDouble = (f64, f64);
 
-/// Knuth's sum.
-fn sum(a: f64, b: f64) -> Twofold {
+/// Returns the exact sum of two numbers (Knuth's two-sum).
+fn sum(a: f64, b: f64) -> DoubleDouble {
     let sum = a + b;
     let of_b = sum - a;
     (sum, (a - (sum - of_b)) + (b - of_b))
 }
 
-fn product(a: f64, b: f64) -> Twofold {
+fn product(a: f64, b: f64) -> DoubleDouble {
     let product = a * b;
     (product, a.mul_add(b, -product))
 }
 
-fn add(a: Twofold, b: Twofold) -> Twofold {
+fn add(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble {
     let (high, low) = sum(a.0, b.0);
     (high, low + a.1 + b.1)
 }
 
-fn quotient((high, low): Twofold, by: f64) -> Twofold {
+fn quotient((high, low): DoubleDouble, by: f64) -> DoubleDouble {
     let quotient = high / by;
     (quotient, ((-quotient).mul_add(by, high) + low) / by)
 }
 
-/// What a pixel is that is the only one of its row or column: where pixels are points, the middle; where they have an
-/// extent, all of the window.
+/// The extent of a pixel that is the only one of its row or column. Where pixels are points, it is the middle of the
+/// window; where they have an extent, it is all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Single {
     IsAPoint,
@@ -109,14 +110,14 @@ pub(crate) enum Single {
 }
 
 impl Single {
-    /// As the scene is drawn.
+    /// Returns the extent that the scene is drawn with.
     pub(crate) fn of(scene: &Scene) -> Self {
         if scene.samples.most() > 1 { Self::IsAll } else { Self::IsAPoint }
     }
 }
 
-/// The samples of an image in a window from its lower left to its upper right corner: the columns from the left, the rows
-/// from the bottom.
+/// Returns the samples of an image in a window from its lower left to its upper right corner: the columns from the
+/// left, the rows from the bottom.
 pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen, single: Single) -> (Axis, Axis) {
     (
         Axis::between(lower_left.x, upper_right.x, screen.width(), single),
@@ -124,8 +125,8 @@ pub(crate) fn grid(lower_left: DVec2, upper_right: DVec2, screen: Screen, single
     )
 }
 
-/// The samples of a camera that looks at a target, in its window at distance 1: U = tan(fov/2)·(2i + 1 - nx)/ny, V =
-/// tan(fov/2)·(2j + 1 - ny)/ny.
+/// Returns the samples of a camera that looks at a target, in its window at distance 1:
+/// `U = tan(fov/2)·(2i + 1 - nx)/ny`, `V = tan(fov/2)·(2j + 1 - ny)/ny`.
 pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
     let slope = half_angle_slope(look.field_of_view());
     let (step, rest) = quotient((2.0 * slope, 0.0), f64::from(screen.height()));
@@ -133,14 +134,15 @@ pub(crate) fn look_grid(look: &Look, screen: Screen) -> (Axis, Axis) {
     (axis(screen.width()), axis(screen.height()))
 }
 
-/// tan(angle/2) of an angle in degrees above 0 and below 180. The complement of a wide angle is known better than the angle.
+/// Returns tan(angle/2) of an angle in degrees above 0 and below 180. For a wide angle the complement is more accurate
+/// than the angle.
 fn half_angle_slope(degrees: f64) -> f64 {
     let tangent = |degrees: f64| libm::tan(degrees.to_radians() / 2.0);
     if degrees <= 90.0 { tangent(degrees) } else { 1.0 / tangent(180.0 - degrees) }
 }
 
-/// The ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its direction
-/// of length 1.
+/// Returns the ray of column `i` from the left and row `j` from the bottom, which may be fractions: its origin, and its
+/// direction of length 1.
 pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
     let Ray { origin, direction } = Rays::new(&scene.camera, scene.screen, Single::of(scene)).ray(i, j);
     (origin, direction)
@@ -150,7 +152,7 @@ pub fn pixel_ray(scene: &Scene, i: f64, j: f64) -> (DVec3, DVec3) {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Rays {
     Parallel,
-    /// `direction = x.at(i)·right + y.at(j)·up - back`, not of unit length.
+    /// A perspective camera: `direction = x.at(i)·right + y.at(j)·up - back`, not of unit length.
     Pinhole {
         eye: DVec3,
         right: DVec3,
@@ -173,7 +175,7 @@ impl Rays {
             Camera::Pinhole(pinhole) => pinhole,
         };
         let (right, up, back) = pinhole.basis();
-        // Only the window's shape matters, so it is scaled until no product can overflow.
+        // Only the window's proportions matter, so it is scaled until no product can overflow.
         let (a, b, distance) = (pinhole.lower_left(), pinhole.upper_right(), pinhole.distance());
         let scale = below_inverse(a.abs().max(b.abs()).max_element().max(distance));
         let (a, b, distance) = (a * scale, b * scale, (distance * scale).max(f64::MIN_POSITIVE));
@@ -181,7 +183,7 @@ impl Rays {
         Self::Pinhole { eye: pinhole.eye(), right, up, back: distance * back, x, y }
     }
 
-    /// The same in coordinates whose origin is the eye.
+    /// Returns these rays in coordinates whose origin is the eye.
     pub(crate) fn with_eye_at_origin(mut self) -> Self {
         match &mut self {
             Self::Parallel => {}
@@ -190,7 +192,7 @@ impl Rays {
         self
     }
 
-    /// The ray of column `i` from the left and row `j` from the bottom, which may be fractions.
+    /// Returns the ray of column `i` from the left and row `j` from the bottom, which may be fractions.
     pub(crate) fn ray(&self, i: f64, j: f64) -> Ray {
         match *self {
             Self::Parallel => Ray { origin: DVec3::new(i, j, 0.0), direction: DVec3::NEG_Z },
@@ -283,12 +285,13 @@ mod tests {
         assert!(rays.ray(0.0, 0.0).direction.x > 0.0 && rays.ray(1.0, 0.0).direction.x < 0.0);
     }
 
-    /// au + (bu - au)·i/(nx - 1) to 100 bits and more, from whole numbers: the window's corners are `a` and `b` parts of 2^40.
+    /// Returns au + (bu - au)·i/(nx - 1) to 100 bits and more, from whole numbers. The window's corners are `a` and `b`
+    /// multiples of 2^-40.
     fn formula(a: i64, b: i64, i: u32, pixels: u32) -> f64 {
         let (a, b, i, last) = (i128::from(a), i128::from(b), i128::from(i), i128::from(pixels - 1));
         let numerator = (a * (last - i) + b * i) << 40;
         let (whole, rest) = (numerator / last, numerator % last);
-        // Below 2^100, cut off at 2^-40: the rest decides nothing but ties, which it breaks.
+        // Below 2^100, cut off at 2^-40. The remainder only breaks ties.
         let sticky = i128::from(rest != 0);
         ((whole << 1) + whole.signum() * sticky) as f64 / 2f64.powi(81)
     }
@@ -307,7 +310,8 @@ mod tests {
             let axis = Axis::between(a as f64 * unit, b as f64 * unit, pixels, Single::IsAPoint);
             for i in [0, pixels - 1, pixels / 2, rng.u32(0..pixels)] {
                 let (ours, right) = (axis.at(f64::from(i)), formula(a, b, i, pixels));
-                // Where the middle of the view is no sample, or far off, two roundings may not be one.
+                // If the middle of the view is not a sample, or is far away, two roundings need not give the result of
+                // one.
                 let slack = match () {
                     () if a == -b => 0.0,
                     () if a.signum() == b.signum() => 2.0 * f64::EPSILON,
@@ -344,7 +348,7 @@ mod tests {
 
     #[test]
     fn a_window_s_corner_as_high_as_it_is_far_is_met_at_half_a_right_angle() {
-        // The gaze goes down by 45 degrees: the rays of the top row are horizontal.
+        // The camera looks 45 degrees downwards, so the rays of the top row are horizontal.
         for pixels in 2..300 {
             let camera = Pinhole::new(
                 DVec3::ZERO,

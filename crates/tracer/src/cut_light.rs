@@ -1,31 +1,32 @@
-//! Estimates the light that the depth of a scene cuts off: rays beyond the last bounce are black.
+//! An estimate of the light that the depth of a scene cuts off, because rays after the last bounce are black.
 
 use rayfold_scene::{Depth, Samples, Scene};
 
 use crate::{Drawing, RenderError, RenderOptions};
 
-/// The largest share of a frame's light that may be cut off without a remark.
+/// The largest share of a frame's light that may be cut off without a warning.
 const NEGLIGIBLE: f64 = 0.001;
 
-/// Rows that are drawn for an estimate, evenly spaced; all rows of a smaller frame.
+/// The number of rows that are drawn for an estimate, evenly spaced. A frame with fewer rows is drawn whole.
 const ROWS: u32 = 24;
 
-/// Light that is missing from a frame because rays are followed for too few bounces.
+/// The light that is missing from a frame because rays are followed for too few bounces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutLight {
-    /// The missing share of the frame's light, above .001 and at most 1: the sum of its levels at [`Depth::MOST`] is the whole.
+    /// The missing share of the frame's light, above .001 and at most 1. The whole is the sum of the frame's levels at
+    /// [`Depth::MOST`].
     pub share: f64,
     /// The smallest depth at which the missing share is at most .001; `None` if there is none up to [`Depth::MOST`].
     pub enough: Option<u32>,
 }
 
-/// Estimates the light that the depth of a scene cuts off; `None` if it is at most a thousandth.
+/// Estimates the light that the depth of a scene cuts off. Returns `None` if it is at most a thousandth.
 ///
-/// Compares 24 rows of the frame, drawn with one ray per pixel, at the scene's depth and at the greatest one. A scene
+/// Compares 24 rows of the frame, drawn with one ray per pixel, at the scene's depth and at the greatest depth. A scene
 /// without mirrors and glass is not drawn.
 ///
 /// # Errors
-/// Those of [`crate::render`].
+/// The errors of [`crate::render`].
 pub fn cut_light(scene: &Scene, options: &RenderOptions) -> Result<Option<CutLight>, RenderError> {
     let sends_rays_on = scene.objects.iter().any(|object| {
         let material = object.material();
@@ -55,7 +56,7 @@ pub fn cut_light(scene: &Scene, options: &RenderOptions) -> Result<Option<CutLig
     if missing(Depth::MOST - 1)? > NEGLIGIBLE {
         return Ok(Some(CutLight { share, enough: None }));
     }
-    // The missing share falls with the depth: `enough` is enough, `short` is not.
+    // The missing share falls with the depth. Invariant: the depth `enough` is sufficient, `short` is not.
     let (mut short, mut enough) = (depth, Depth::MOST - 1);
     while enough - short > 1 {
         let middle = short.midpoint(enough);
@@ -64,7 +65,7 @@ pub fn cut_light(scene: &Scene, options: &RenderOptions) -> Result<Option<CutLig
     Ok(Some(CutLight { share, enough: Some(enough) }))
 }
 
-/// The levels of the rows, channel by channel.
+/// Returns the levels of the rows, channel by channel.
 fn levels(scene: &Scene, options: &RenderOptions) -> Result<Vec<u8>, RenderError> {
     let drawing = Drawing::new(scene, options)?;
     let height = scene.screen.height();
@@ -106,7 +107,7 @@ mod tests {
     fn what_no_depth_shows_has_none_that_would() {
         let CutLight { share, enough } =
             cut(&panes(80, 3)).unwrap_or(CutLight { share: 0.0, enough: Some(0) });
-        // All is black at each depth: nothing can be missed that can be seen.
+        // The picture is black at each depth, so no visible light can be missing.
         assert_eq!((share, enough), (0.0, Some(0)));
         let hall =
             "Screen 32 24\nLook 0 0 0 0 0 1 60\nBox -1 -1 -9 1 1 9 .01 .01 .01 0 0 0 .99 .99 .99\nTrace\n";

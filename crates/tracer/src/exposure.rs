@@ -1,20 +1,21 @@
-//! A frame: a scene, and what becomes of it while the shutter is open.
+//! A frame: a scene and its changes while the shutter is open.
 
 use rayfold_scene::Scene;
 
-/// The moments at which a scene that moves is drawn, for each sample that all pixels have.
+/// The number of moments at which a moving scene is drawn, per sample that each pixel has.
 const MOMENTS_FOR_A_SAMPLE: u32 = 2;
 
-/// The same where few pixels have as many as they may.
+/// The number of moments per sample with adaptive sampling, where few pixels take as many samples as they may.
 const MOMENTS_IF_ADAPTIVE: u32 = 1;
 
-/// How many there are at least and at most.
+/// The smallest and the largest number of moments.
 const MOMENTS: (u32, u32) = (16, 256);
 
-/// Objects at all moments together, beyond which there are fewer moments: each is prepared and kept.
+/// The largest number of objects at all moments together. Scenes with more objects have fewer moments, because each
+/// moment is prepared and kept in memory.
 const OBJECTS: usize = 1 << 22;
 
-/// A scene in the middle of its exposure, and how to ask for it at other moments.
+/// A scene in the middle of its exposure, and a function that returns it at other moments.
 #[derive(Clone, Copy)]
 pub struct Exposure<'a> {
     scene: &'a Scene,
@@ -22,33 +23,34 @@ pub struct Exposure<'a> {
 }
 
 impl<'a> Exposure<'a> {
-    /// A scene that does not move, whatever its shutter.
+    /// Makes the exposure of a scene that does not move, whatever its shutter.
     pub fn still(scene: &'a Scene) -> Self {
         Self { scene, at: None }
     }
 
-    /// A scene that moves: `at` says what it is so many frames after the middle of its exposure, from minus a half of its
-    /// shutter's share to a half. How many samples a pixel has is said by the scene alone.
+    /// Makes the exposure of a moving scene. `at` returns the scene at a time in frames after the middle of its
+    /// exposure, from minus half of the shutter's share to plus half. The number of samples per pixel is taken from
+    /// `scene` alone.
     pub fn moving(scene: &'a Scene, at: &'a (dyn Fn(f64) -> Scene + Sync)) -> Self {
         Self { scene, at: Some(at) }
     }
 
-    /// In the middle of the exposure.
+    /// Returns the scene in the middle of the exposure.
     pub(crate) fn scene(&self) -> &'a Scene {
         self.scene
     }
 
-    /// What it is at other moments, if they count.
+    /// Returns the function that gives the scene at other moments, if they matter.
     pub(crate) fn motion(&self) -> Option<&'a (dyn Fn(f64) -> Scene + Sync)> {
         self.at.filter(|_| cfg!(feature = "shutters") && self.is_moving())
     }
 
-    /// Whether it may be something else at other moments that count.
+    /// Returns whether the scene may differ at other moments that matter.
     pub(crate) fn is_moving(&self) -> bool {
         self.at.is_some() && self.scene.samples.most() > 1 && self.scene.shutter.open() > 0.0
     }
 
-    /// What the scene is at a share of its exposure, from 0 (the shutter opens) to 1 (it closes).
+    /// Returns the scene at a share of its exposure, from 0 (the shutter opens) to 1 (it closes).
     pub(crate) fn at(&self, share: f64) -> Scene {
         match self.motion() {
             Some(at) => {
@@ -58,7 +60,7 @@ impl<'a> Exposure<'a> {
         }
     }
 
-    /// The scene at moments that stand for equal parts of the exposure; it alone where nothing moves.
+    /// Returns the scene at moments that stand for equal parts of the exposure, or the scene alone if nothing moves.
     pub(crate) fn moments(&self) -> Vec<Scene> {
         if self.motion().is_none() {
             return vec![self.scene.clone()];

@@ -1,11 +1,15 @@
-//! Scenes to images, deterministically.
+//! Renders scenes to images, deterministically.
 //!
-//! What a pixel shows is decided by the scene language's rules of seeing and shading alone: the same scene gives the
-//! same image for any number of threads. The crate knows the typed scene and nothing of text, files or clocks.
+//! The scene language's rules of visibility and shading alone decide each pixel: the same scene gives the same image
+//! for any number of threads. The crate takes the typed scene, and uses no text, files or clocks.
 //!
-//! Invariants: no length is compared with an absolute epsilon, what keeps a ray off the surface that it leaves is a
-//! bound on the rounding error there; a hit is a function of ray and object alone; of hits within that bound of each other
-//! the object that comes first wins; a direction in here is a unit vector.
+//! Invariants:
+//!
+//! - No length is compared with an absolute epsilon. A ray is kept off the surface that it starts on by a bound on the
+//!   rounding error there.
+//! - A hit is a function of the ray and the object alone.
+//! - If two hits are within the bound on rounding errors of each other, the object that comes first wins.
+//! - A direction in this crate is a unit vector.
 //!
 //! ```
 //! use rayfold_scene::{Camera, Scene, Screen};
@@ -23,6 +27,8 @@ mod fast;
 #[cfg(feature = "accuracy")]
 mod nans;
 mod parallel;
+pub mod parts;
+mod progress;
 pub mod reference;
 mod sampling;
 mod scale;
@@ -40,46 +46,50 @@ use std::sync::atomic::AtomicBool;
 
 pub use fearless_simd::Level;
 use image::RgbImage;
+pub use progress::Progress;
 use rayfold_scene::{Scene, Script};
 pub use sampling::Sampler;
 
-/// Raised whenever any scene's pixels change, so that a picture can be known to be out of date.
-pub const PIXEL_VERSION: u32 = 3;
+/// The version of the pixels. It is raised whenever any scene's pixels change, so that outdated pictures can be
+/// detected.
+pub const PIXEL_VERSION: u32 = 4;
 
-/// How often light is mirrored before the mirror term is dropped, where a script does not say it.
+/// The number of reflections after which the mirror term is dropped, unless a script sets it.
 pub const MAX_BOUNCES: u32 = 5;
 
-/// The numbers that a picture is computed with.
+/// The precision that a picture is computed with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
-    /// `f32` where bounds on its rounding errors say that they cannot be seen, otherwise `f64`.
+    /// `f32` if bounds on its rounding errors prove them invisible, otherwise `f64`.
     #[default]
     Auto,
-    /// Single precision, about twice as fast; double where it cannot hold the scene's numbers at all, and for what has no
-    /// kernels in single precision: lamps, finishes, and shapes with axes of their own.
+    /// Single precision, about twice as fast. Double precision is used for scenes whose numbers it cannot represent,
+    /// and for features without kernels in single precision: lamps, finishes, and shapes with axes of their own.
     F32,
-    /// Double precision.
+    /// Double precision, `f64`, about half as fast.
     F64,
 }
 
-/// How to render; the default renders to the end, as fast as the scene and the machine allow.
+/// The options of rendering. By default, renders to the end, as fast as the scene and the machine allow.
 ///
-/// `level`, `tile` and `tree` change nothing that can be seen; they are there to prove it and to measure what they cost.
+/// `level`, `tile` and `tree` do not change the picture. They exist for tests of that, and to measure their cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RenderOptions<'a> {
-    /// Stops the rendering soon after it turns true.
+    /// Stops the rendering soon after it becomes true.
     pub cancel: Option<&'a AtomicBool>,
-    /// The numbers to compute with.
+    /// Counts the work as it is done.
+    pub progress: Option<&'a Progress>,
+    /// The precision to compute with.
     pub precision: Precision,
-    /// The instructions to use; the best that the machine has when not set.
+    /// The instruction set. Default: the best of the machine.
     pub level: Option<Level>,
-    /// Columns and rows of the tiles that are drawn at once, multiples of 4 with a product of at most 256.
+    /// The columns and rows of the tiles that are drawn at once, multiples of 4 with a product of at most 256.
     pub tile: Option<(u32, u32)>,
-    /// Whether to look for objects down a tree; always done for more than 64 objects.
+    /// Whether objects are found by a tree. It is always used for more than 64 objects.
     pub tree: Option<bool>,
-    /// How many mirrorings and refractions are followed: the scene's own depth when not set.
+    /// The largest number of reflections and refractions that a ray follows. Default: the scene's own depth.
     pub bounces: Option<u32>,
-    /// How samples are arranged.
+    /// The arrangement of samples.
     pub sampler: Sampler,
 }
 
@@ -89,32 +99,32 @@ impl RenderOptions<'_> {
     }
 }
 
-/// Why there is no image.
+/// The reason why there is no image.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The flag of [`RenderOptions::cancel`] was raised.
+    /// The flag of [`RenderOptions::cancel`] was set.
     #[error("rendering was cancelled")]
     Cancelled,
-    /// Of single rays alone: the coordinates are so large that their differences are not finite.
+    /// The coordinates are so large that their differences are not finite. Only functions for single rays return it.
     #[error("the scene is too vast: distances in it are not finite numbers")]
     TooVast,
     /// The image does not fit into this machine's address space.
     #[error("an image of {width} x {height} pixels does not fit into memory")]
     TooLarge {
-        /// Columns.
+        /// The width of the image in pixels.
         width: u32,
-        /// Rows.
+        /// The height of the image in pixels.
         height: u32,
     },
-    /// The scene needs a part of the tracer that this build was told to leave out.
+    /// The scene needs a part of the tracer that this build leaves out.
     #[error("the scene needs {feature}, and this build of the tracer is without (a cargo feature)")]
     LeftOut {
-        /// The cargo feature.
+        /// The cargo feature of the part.
         feature: &'static str,
     },
 }
 
-/// The numbers that [`Precision::Auto`] chooses for a scene.
+/// Returns the precision that [`Precision::Auto`] selects for a scene.
 pub fn precision(scene: &Scene) -> Precision {
     fast::precision(scene)
 }
@@ -122,7 +132,7 @@ pub fn precision(scene: &Scene) -> Precision {
 /// Draws a scene, its first row at the top, on the current rayon pool.
 ///
 /// # Errors
-/// When the rendering was cancelled or the image cannot be held in memory.
+/// If the rendering was cancelled or the image does not fit into memory.
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     Drawing::new(scene, options)?.draw()
 }
@@ -130,15 +140,15 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 /// Draws a scene that may move while the shutter is open, on the current rayon pool.
 ///
 /// # Errors
-/// Those of [`render`].
+/// The errors of [`render`].
 pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     Drawing::exposed(exposure, options)?.draw()
 }
 
-/// Draws frame `k` of a script, counted from 0, on the current rayon pool; `None` beyond the last.
+/// Draws frame `k` of a script, counted from 0, on the current rayon pool. Returns `None` after the last frame.
 ///
 /// # Errors
-/// Those of [`render`].
+/// The errors of [`render`].
 pub fn render_frame(
     script: &Script,
     k: usize,
@@ -149,12 +159,17 @@ pub fn render_frame(
     Some(render_exposed(Exposure::moving(&scene, &after), options))
 }
 
-/// As [`render`] in single precision, by textbook formulas without any regard for rounding: what robustness is measured
-/// against. The machinery around them is the same.
+/// Draws a scene like [`render`] in single precision, by textbook formulas that ignore rounding errors. It is the
+/// baseline for measuring the cost of robustness. All other code is the same.
 ///
 /// # Errors
-/// Those of [`render`].
+/// The errors of [`render`].
 #[cfg(feature = "accuracy")]
 pub fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     fast::render_naive(scene, options)
 }
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

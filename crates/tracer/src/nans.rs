@@ -1,4 +1,5 @@
-//! How many channels were not a number before they became a level: for measurements alone, which are one at a time.
+//! A counter of channels that were NaN before their conversion to a level. It is for measurements, which run one at a
+//! time.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -10,7 +11,7 @@ pub(crate) fn add(count: u32) {
     }
 }
 
-/// Those of all pictures since the last call.
+/// Returns the count of all pictures since the last call.
 pub fn take() -> u64 {
     FOUND.swap(0, Ordering::Relaxed)
 }

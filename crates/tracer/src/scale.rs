@@ -1,14 +1,14 @@
-//! Powers of two that bring numbers of any size near 1, where products of them neither overflow nor vanish.
+//! Powers of two that bring numbers of any size near 1, where their products neither overflow nor underflow.
 //!
-//! Scaling by them is exact, so that what is computed does not depend on the unit of length.
+//! Scaling by them is exact, so results do not depend on the unit of length.
 
-/// The largest power of two whose product with `x` is below 1, or as near to it as one gets whose inverse is finite
-/// too; 1 for zero.
+/// Returns the largest power of two whose product with `x` is below 1, or the nearest to it whose inverse is also
+/// finite; 1 for zero.
 pub(crate) fn below_inverse(x: f64) -> f64 {
     if x == 0.0 {
         return 1.0;
     }
-    // From the bits, not by a logarithm: it must double exactly when x halves.
+    // From the exponent bits, not by a logarithm: the result must double exactly when x halves.
     let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
     2f64.powi(-exponent.clamp(-1000, 1000))
 }

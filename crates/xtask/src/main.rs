@@ -1,16 +1,18 @@
 //! `cargo xtask`: chores that need more than Cargo, without a shell.
 //!
-//! Packages the function binaries for Lambda without knowing what they do, and draws the pictures of the language
-//! page from the scripts in it.
+//! Packages the function binaries for Lambda and the programs of a release without knowing what they do, and draws the
+//! pictures of the language page from the scripts in it.
 
 use clap::{Parser, Subcommand};
 
 mod archive;
+mod dist;
 mod glibc;
 mod manual;
 mod package;
 mod pictures;
 mod plot;
+mod sources;
 mod toolchain;
 
 /// Chores of the project.
@@ -25,6 +27,8 @@ struct Xtask {
 enum Chore {
     /// Build the zip files that Lambda runs: target/packages/ARCHITECTURE/rayfold-render.zip and rayfold-assemble.zip
     Package(package::Args),
+    /// Build the archive of a release for this machine: target/dist/rayfold-VERSION-TARGET.zip
+    Dist(dist::Args),
     /// Draw the pictures of docs/language.md from the scripts in it, into docs/images/language
     Pictures(pictures::Args),
 }
@@ -32,6 +36,7 @@ enum Chore {
 fn main() -> anyhow::Result<()> {
     match Xtask::parse().chore {
         Chore::Package(args) => package::run(&args),
+        Chore::Dist(args) => dist::run(&args),
         Chore::Pictures(args) => pictures::run(&args),
     }
 }

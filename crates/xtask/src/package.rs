@@ -4,19 +4,22 @@
 //! of Cargo and of the user are. `--verify` builds a second time, from a copy elsewhere, and compares.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
-use crate::archive;
+use crate::archive::{self, Entry};
 use crate::glibc::{AMAZON_LINUX_2023, Needs};
+use crate::sources::{copy_sources, remapped, root};
 use crate::toolchain::{self, Toolchain, say};
 
 /// The package, and its binaries that are functions.
 const PACKAGE: &str = "rayfold-lambda";
 const FUNCTIONS: [&str; 2] = ["rayfold-render", "rayfold-assemble"];
+
+/// The file that the `provided` runtimes start.
+const BOOTSTRAP: &str = "bootstrap";
 
 /// The largest size of a zip file. It is read at each cold start, before the program runs.
 const LARGEST_ZIP_MB: f64 = 8.0;
@@ -101,7 +104,7 @@ fn build(
             let program = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
             let newest =
                 Needs::of(&program).and_then(|needs| needs.newest()).with_context(|| function.to_owned())?;
-            let zip = archive::zip(&program)?;
+            let zip = archive::zip(vec![Entry::program(BOOTSTRAP, program)])?;
             ensure!(
                 megabytes(&zip) <= LARGEST_ZIP_MB,
                 "{function} is {:.2} MB zipped, more than {LARGEST_ZIP_MB} MB",
@@ -114,17 +117,6 @@ fn build(
             Ok((function, zip))
         })
         .collect()
-}
-
-/// Returns the compiler flags that remove folder names from panic messages.
-fn remapped(root: &Path) -> anyhow::Result<Vec<String>> {
-    let home = std::env::home_dir().context("no home folder")?;
-    let cargo = std::env::var_os("CARGO_HOME").map_or_else(|| home.join(".cargo"), PathBuf::from);
-    let rustup = std::env::var_os("RUSTUP_HOME").map_or_else(|| home.join(".rustup"), PathBuf::from);
-    // If several match, the last one applies.
-    Ok([(rustup.as_path(), "/rustup"), (cargo.as_path(), "/cargo"), (root, "/rayfold")]
-        .map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display()))
-        .to_vec())
 }
 
 /// Builds the files that Git tracks in `root` again in another folder, and compares the results.
@@ -145,34 +137,21 @@ fn verify(
     Ok(())
 }
 
-fn copy_sources(root: &Path, copy: &Path) -> anyhow::Result<()> {
-    let listing = Command::new("git")
-        .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
-        .current_dir(root)
-        .output()
-        .context("cannot run git")?;
-    ensure!(listing.status.success(), "git ls-files: {}", listing.status);
-    for name in String::from_utf8(listing.stdout)?.split_terminator('\0') {
-        let (from, to) = (root.join(name), copy.join(name));
-        // The file is deleted, but the deletion is not committed yet.
-        if !from.exists() {
-            continue;
-        }
-        fs::create_dir_all(to.parent().context("a file without a folder")?)?;
-        fs::copy(&from, &to).with_context(|| format!("cannot copy {name}"))?;
-    }
-    Ok(())
-}
-
-/// Returns the checkout, two folders above this crate.
-fn root() -> anyhow::Result<PathBuf> {
-    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
-    match own.ancestors().nth(2) {
-        Some(root) => Ok(root.to_owned()),
-        None => bail!("{} lies in no checkout", own.display()),
-    }
-}
-
 fn megabytes(bytes: &[u8]) -> f64 {
     bytes.len() as f64 / 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lambda_finds_one_executable_named_bootstrap() {
+        let bytes = archive::zip(vec![Entry::program(BOOTSTRAP, b"program".to_vec())]).unwrap();
+        let mut archive = zip::ZipArchive::new(std::io::Cursor::new(&bytes)).unwrap();
+        assert_eq!(archive.len(), 1);
+        let entry = archive.by_index(0).unwrap();
+        assert_eq!(entry.name().unwrap(), "bootstrap");
+        assert_eq!(entry.unix_mode().unwrap() & 0o777, 0o755);
+    }
 }

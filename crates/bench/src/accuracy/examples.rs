@@ -1,4 +1,4 @@
-//! Frames of all example scenes as users get them, samples, shutter and all, against the plain tracer.
+//! Compares frames of all example scenes, drawn as users get them (with samples and shutter), with the plain tracer.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,13 +11,13 @@ use rayfold_tracer::{Exposure, RenderOptions, precision, reference, render_frame
 
 use crate::scenes::{EXAMPLES, MOVING_EXAMPLES, script};
 
-/// Frames of an animation that are compared, spread evenly.
+/// The number of frames compared per animation, spread evenly.
 const FRAMES: usize = 8;
 
-/// What is asked for: the share of pixels off by more than 2 levels, in percent.
+/// The goal: at most this share of pixels is off by more than 2 levels, in percent.
 const MOST: f64 = 0.01;
 
-/// What was found in an animation.
+/// The result for an animation.
 struct Row {
     name: &'static str,
     frames: usize,
@@ -38,7 +38,7 @@ impl Row {
 /// Compares and writes accuracy-examples.md.
 ///
 /// # Errors
-/// When a scene cannot be drawn or the report cannot be written.
+/// Fails if a scene cannot be drawn or the report cannot be written.
 pub(super) fn run(folder: &Path, quick: bool) -> Result<()> {
     let names = EXAMPLES.into_iter().chain(MOVING_EXAMPLES);
     let rows: Vec<Row> = names
@@ -66,7 +66,7 @@ fn compared(name: &'static str, script: &Script, most: usize) -> Result<Row> {
         largest: 0,
     };
     for k in 0..frames {
-        // The middles of equal stretches.
+        // The middles of equal ranges of frames.
         let (ours, plain) = both(script, (2 * k + 1) * count / (2 * frames))?;
         for (a, b) in ours.pixels().zip(plain.pixels()) {
             let apart = (0..3).map(|c| a.0[c].abs_diff(b.0[c])).max().unwrap_or(0);
@@ -79,7 +79,7 @@ fn compared(name: &'static str, script: &Script, most: usize) -> Result<Row> {
     Ok(row)
 }
 
-/// A frame as users get it, and by the plain tracer.
+/// Returns a frame as users get it, and as the plain tracer draws it.
 fn both(script: &Script, k: usize) -> Result<(RgbImage, RgbImage)> {
     let options = RenderOptions::default();
     let scene = script.frame(k).context("a frame")?;
@@ -92,18 +92,19 @@ fn report(rows: &[Row], quick: bool) -> Result<String> {
     let command = if quick { " --quick" } else { "" };
     let mut text = format!(
         "# Accuracy of the example scenes\n\n\
-         Written by `cargo run --release -p rayfold-bench -- accuracy --examples{command}`. Frames of each animation in `scenes/`, \
-         at its size and with its samples, shutter and lights, as `auto` draws them and as the plain `f64` tracer does. Of the first \
-         five the script in the middle, of the others up to {FRAMES} frames. *Off*: pixels off by more than 2 levels; at most \
-         {MOST} % are asked for.\n\n"
+         Written by `cargo run --release -p rayfold-bench -- accuracy --examples{command}`. Frames of each animation \
+         in `scenes/`, in its own size and with its samples, shutter and lights, drawn by `auto` and by the plain \
+         `f64` tracer. For the first five it is the middle script, for the others up to {FRAMES} frames. *Off*: pixels \
+         off by more than 2 levels; the goal is at most {MOST} %.\n\n"
     );
     let beyond: Vec<_> = rows.iter().filter(|row| row.share() > MOST).map(|row| row.name).collect();
     if beyond.is_empty() {
-        writeln!(text, "All {} scenes keep that.\n", rows.len())?;
+        writeln!(text, "All {} scenes meet the goal.\n", rows.len())?;
     } else {
-        writeln!(text, "**Beyond that**: {}.\n", beyond.join(", "))?;
+        writeln!(text, "**Above the goal**: {}.\n", beyond.join(", "))?;
     }
-    text += "| scene | frames | precision | rays a pixel, at most | pixels | different | off | off, % | largest, levels |\n\
+    text += "| scene | frames | precision | rays per pixel, at most | pixels | different | off | off, % | largest, \
+             levels |\n\
              | --- | --: | --- | --: | --: | --: | --: | --: | --: |\n";
     for row in rows {
         let Row { name, frames, precision, samples, pixels, different, off, largest } = row;

@@ -1,8 +1,8 @@
-//! LDR-FLIP: how different two images look to someone who flips between them.
+//! LDR-FLIP: the perceived difference between two images that are shown alternately.
 //!
 //! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A difference evaluator for alternating
-//! images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020; names of constants as there. The figure is the mean
-//! over the pixels, 0 (no difference) to 1, at 67 pixels a degree of the field of view.
+//! images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020. The constants have the names of the paper. The result
+//! is the mean over the pixels, from 0 (no difference) to 1, at 67 pixels per degree of the field of view.
 
 use image::RgbImage;
 
@@ -13,7 +13,7 @@ const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
 
 type Plane = Vec<f64>;
 
-/// The mean difference of two images of the same size.
+/// Returns the mean difference of two images of the same size.
 pub(crate) fn flip(a: &RgbImage, b: &RgbImage) -> f64 {
     let size = (a.width() as usize, a.height() as usize);
     let (a, b) = (opponents(a), opponents(b));
@@ -23,7 +23,7 @@ pub(crate) fn flip(a: &RgbImage, b: &RgbImage) -> f64 {
     sum / (size.0 * size.1) as f64
 }
 
-/// sRGB to the three planes of YCxCz.
+/// Converts sRGB to the three planes of YCxCz.
 fn opponents(image: &RgbImage) -> [Plane; 3] {
     let mut planes = [const { Vec::new() }; 3];
     for pixel in image.pixels() {
@@ -59,7 +59,8 @@ fn over_white(xyz: [f64; 3]) -> [f64; 3] {
     [xyz[0] / WHITE[0], xyz[1] / WHITE[1], xyz[2] / WHITE[2]]
 }
 
-/// YCxCz, clamped to what a display shows, to CIELAB with Hunt's adjustment: colour fades in the dark.
+/// Converts YCxCz, clamped to the range of a display, to CIELAB with Hunt's adjustment: dark colours are less
+/// saturated.
 fn perceived([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     let y = (y + 16.0) / 116.0;
     let (x, z) = (y + cx / 500.0, y - cz / 200.0);
@@ -75,7 +76,7 @@ fn hunt(rgb: [f64; 3]) -> [f64; 3] {
     [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
 }
 
-/// HyAB: city block for lightness, Euclid for colour.
+/// Returns the HyAB distance: the absolute difference in lightness plus the Euclidean distance in chroma.
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
@@ -97,7 +98,7 @@ fn color_difference(a: &[Plane; 3], b: &[Plane; 3], size: (usize, usize)) -> Pla
         .collect()
 }
 
-/// What the eye's contrast sensitivity leaves of each plane.
+/// Filters each plane by the contrast sensitivity of the eye.
 fn filtered(planes: &[Plane; 3], size: (usize, usize)) -> [Plane; 3] {
     // Pairs (a, b) of sums of Gaussians a·sqrt(pi/b)·exp(-pi²x²/b), x in degrees: luminance, red-green, blue-yellow.
     let sums: [&[(f64, f64)]; 3] = [&[(1.0, 0.0047)], &[(1.0, 0.0053)], &[(34.1, 0.04), (13.5, 0.025)]];
@@ -123,7 +124,7 @@ fn filtered(planes: &[Plane; 3], size: (usize, usize)) -> [Plane; 3] {
     })
 }
 
-/// The larger of how edges and how points differ.
+/// Returns the larger of the differences in edges and in points.
 fn feature_difference(a: &Plane, b: &Plane, size: (usize, usize)) -> Plane {
     let width = 0.5 * 0.082 * PIXELS_A_DEGREE;
     let radius = (3.0 * width).ceil() as i32;
@@ -149,14 +150,15 @@ fn feature_difference(a: &Plane, b: &Plane, size: (usize, usize)) -> Plane {
         .collect()
 }
 
-/// Positive weights with sum 1 and negative ones with sum -1, once multiplied by a kernel of mass `other`.
+/// Scales the positive weights to the sum 1 and the negative ones to -1, for a kernel that is then multiplied by one
+/// with the sum `other`.
 fn balanced(kernel: &[f64], other: f64) -> Vec<f64> {
     let mass = |sign: f64| kernel.iter().map(|k| (sign * k).max(0.0)).sum::<f64>() * other;
     let (up, down) = (mass(1.0), mass(-1.0));
     kernel.iter().map(|&k| if k > 0.0 { k / up } else { k / down }).collect()
 }
 
-/// Rows with one kernel, then columns with the other; the border's pixels go on for ever.
+/// Convolves the rows with one kernel, then the columns with the other. Pixels outside the image repeat its border.
 fn convolved(plane: &Plane, (width, height): (usize, usize), rows: &[f64], columns: &[f64]) -> Plane {
     let at = |k: usize, offset: usize, kernel: &[f64], last: usize| {
         (k + offset).saturating_sub(kernel.len() / 2).min(last)

@@ -1,4 +1,4 @@
-//! Whole images: cost and error of each backend on each scene.
+//! Cost and error of each backend for whole images of each scene.
 
 use anyhow::{Context, Result};
 use glam::DVec3;
@@ -14,59 +14,61 @@ use crate::cpu_time;
 use crate::oracle;
 use crate::outlines::dots;
 
-/// The deepest recursion that is measured: what the error of stopping early is taken against.
+/// The greatest depth that is measured. Errors of lower depths are relative to it.
 pub(crate) const DEEPEST: u32 = 16;
 
-/// A scene, and how to measure it.
+/// A scene, and the options for measuring it.
 pub(crate) struct Subject {
     pub(crate) name: String,
     pub(crate) scene: Scene,
-    /// How often each image is drawn.
+    /// The number of times that each image is drawn.
     pub(crate) rounds: usize,
-    /// Pixels that the oracle draws as well.
+    /// The number of pixels that the oracle draws as well.
     pub(crate) samples: usize,
-    /// Whether every object is looked at for every ray of the truth; the f64 packets draw it where that takes too long.
+    /// Whether the plain tracer draws the true image, testing every object for every ray. If that takes too long, the
+    /// f64 packets draw it.
     pub(crate) plain: bool,
-    /// Whether it is drawn at other depths than the language's as well.
+    /// Whether the scene is also drawn at other depths than the language's.
     pub(crate) deep: bool,
 }
 
-/// A backend on a scene, at a depth.
+/// A measurement of a backend on a scene, at a depth.
 pub(crate) struct Measurement {
     pub(crate) backend: String,
     pub(crate) bounces: u32,
     pub(crate) rays: u64,
-    /// Of one image, on one thread: the median of the rounds.
+    /// The time of one image on one thread: the median of the rounds.
     pub(crate) seconds: f64,
-    /// Against the truth of the same depth.
+    /// The error relative to the true image of the same depth.
     pub(crate) error: Error,
-    /// Root mean square against the truth of the greatest depth, in levels.
+    /// The root mean square error relative to the true image of the greatest depth, in levels.
     pub(crate) unfinished: f64,
-    /// Whether no other backend and depth is both as fast and as close to the truth of the greatest depth.
+    /// Whether the measurement is on the Pareto front: no other backend and depth is both at least as fast and as
+    /// accurate, relative to the true image of the greatest depth.
     pub(crate) on_front: bool,
 }
 
 /// The difference of two images.
 pub(crate) struct Error {
-    /// In levels, over all channels.
+    /// The root mean square over all channels, in levels.
     pub(crate) rmse: f64,
-    /// In levels.
+    /// The largest difference in levels.
     pub(crate) largest: u8,
-    /// Pixels off by more than 2 levels in a channel.
+    /// The number of pixels off by more than 2 levels in a channel.
     pub(crate) off: usize,
-    /// Pixels unlike all those around them in the truth.
+    /// The number of pixels that differ from all pixels around them in the true image.
     pub(crate) dots: usize,
     pub(crate) flip: f64,
-    /// Channels that were not a number before they became a level.
+    /// The number of channels that were NaN before they were converted to a level.
     pub(crate) nans: u64,
 }
 
-/// All backends on a scene.
+/// The measurements of all backends on a scene.
 pub(crate) struct Comparison {
     pub(crate) scene: String,
     pub(crate) objects: usize,
     pub(crate) size: (u32, u32),
-    /// Backend by backend, each from the least depth to the greatest; depths that add no ray are left out.
+    /// By backend, and for each from the least depth to the greatest. A depth that adds no ray is omitted.
     pub(crate) measurements: Vec<Measurement>,
     pub(crate) truth: Truth,
 }
@@ -76,7 +78,7 @@ impl Comparison {
         self.size.0 as usize * self.size.1 as usize
     }
 
-    /// The measurements of the language's depth.
+    /// Returns the measurements at the language's depth.
     pub(crate) fn pictures(&self) -> impl Iterator<Item = &Measurement> {
         self.measurements.iter().filter(|m| m.bounces == MAX_BOUNCES)
     }
@@ -85,16 +87,16 @@ impl Comparison {
 /// The error of the image that the others are compared with.
 pub(crate) struct Truth {
     pub(crate) backend: String,
-    /// Pixels that the oracle drew as well.
+    /// The number of pixels that the oracle drew as well.
     pub(crate) samples: usize,
-    /// Largest difference from the oracle in a channel, in levels; pixels that see another object apart.
+    /// The largest difference from the oracle in a channel, in levels, without the pixels counted in `off`.
     pub(crate) largest: f64,
-    /// Pixels that see or shade another object than the oracle: off by more than half a level (two, where the truth is an
-    /// image of whole levels).
+    /// The number of pixels that show or shade another object than the oracle: off by more than half a level, or two if
+    /// the true image has whole levels.
     pub(crate) off: usize,
 }
 
-/// An image that waits to be judged.
+/// An image that is not yet compared.
 struct Drawn {
     backend: String,
     depth: usize,
@@ -133,7 +135,7 @@ pub(crate) fn compare(subject: &Subject) -> Result<Comparison> {
     }
     for _ in 1..subject.rounds {
         for one in &mut drawn {
-            // The plain tracer takes long, and its time is no figure of interest.
+            // The plain tracer is drawn once only: it is slow, and its time is not reported.
             let backend = backends[one.depth].iter().skip(1).find(|backend| backend.name == one.backend);
             if let Some(backend) = backend {
                 let (seconds, image) = cpu_time::of(|| backend.render(scene))?;
@@ -193,7 +195,7 @@ fn rmse(image: &RgbImage, truth: &RgbImage) -> f64 {
     (sum / (3 * image.pixels().len()) as f64).sqrt()
 }
 
-/// The truth's colours against the oracle's, at pixels spread evenly over the image.
+/// Compares the true image with the oracle, at pixels spread evenly over the image.
 fn against_oracle(subject: &Subject, backend: &Backend, image: &RgbImage) -> Truth {
     let scene = &subject.scene;
     let (width, height) = image.dimensions();

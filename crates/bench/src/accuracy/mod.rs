@@ -1,4 +1,4 @@
-//! `rayfold-bench accuracy`: how far each backend is from the truth, and what it costs.
+//! `rayfold-bench accuracy`: the error of each backend and its cost.
 
 mod examples;
 mod flip;
@@ -23,25 +23,25 @@ pub(crate) use naive::NAME as NAIVE;
 
 use images::{Comparison, DEEPEST, Measurement, Subject, compare};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives accuracy.md and plots, or hard-cases.md and the figures of its cases
+    /// Write accuracy.md and plots, or hard-cases.md and the figures of its cases, into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// Small images, each drawn once; hard cases at the sizes of the tests
+    /// Use small images, each drawn once, and hard cases at the sizes of the tests
     #[arg(long)]
     quick: bool,
-    /// The hard cases at full size instead of the images
+    /// Measure the hard cases at full size instead of the images
     #[arg(long)]
     hard_cases: bool,
-    /// The frames of all example scenes, as users get them, instead: accuracy-examples.md
+    /// Compare the frames of all example scenes, as users get them, and write accuracy-examples.md
     #[arg(long, conflicts_with = "hard_cases")]
     examples: bool,
-    /// Of the hard cases only this one
+    /// Measure only this hard case
     #[arg(long, requires = "hard_cases")]
     case: Option<String>,
-    /// Measure nothing: write the page on the hard cases anew from the figures beside it
+    /// Measure nothing: write the page on the hard cases from the figures beside it
     #[arg(long, requires = "hard_cases", conflicts_with = "case")]
     page: bool,
 }
@@ -49,7 +49,7 @@ pub struct Args {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be rendered or the report cannot be written.
+/// Fails if a scene cannot be rendered or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     if args.hard_cases {
@@ -80,25 +80,27 @@ fn introduction(quick: bool) -> String {
     let load = load.trim();
     format!(
         "# Accuracy\n\n\
-         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are of one run, with a load \
-         of {load} (`/proc/loadavg`) when it ended. `... accuracy --hard-cases` measures the hard cases at full size and \
-         writes `hard-cases.md`; `... accuracy --examples` compares frames of all example scenes as users get them: \
-         [accuracy-examples.md](accuracy-examples.md).\n\n\
-         Every backend draws the same scenes on one thread, in turn, and its processor time is taken (the machine \
-         may be busy with other work; the median of the rounds is shown). `f32 naive` is the same packet machinery, tiles \
-         and trees with textbook formulas: quadratic roots, edges and slabs without error bounds, rays that start 1e-4 off \
-         their surface. `auto` is what users get: `f32 robust`, or `f64` where bounds on the errors of `f32` say so.\n\n\
-         The truth is the plain `f64` tracer (`reference`) at the same depth, whose own error is measured against an oracle \
-         that computes with 640 bits. *Depth* is how often light is followed through mirrors; {MAX_BOUNCES} is the \
-         language's; up to {DEEPEST} are drawn, those that add rays. *Unfinished* is the root mean square of the difference \
-         from the truth at the greatest depth, rounding and stopping early together. *Front*: no other backend and depth is both as fast and as close to that truth.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- accuracy{command}`; all figures are from one run. The \
+         load at its end was {load} (`/proc/loadavg`). `... accuracy --hard-cases` measures the hard cases at full \
+         size and writes `hard-cases.md`; `... accuracy --examples` compares frames of all example scenes as users get \
+         them and writes [accuracy-examples.md](accuracy-examples.md).\n\n\
+         Every backend draws the same scenes on one thread, in turn. The times are processor times, because the \
+         machine may be busy with other work, and medians of the rounds. `f32 naive` uses the same packets, tiles and \
+         trees with textbook formulas: quadratic roots, edges and slabs without error bounds, and rays that start 1e-4 \
+         off their surface. `auto` is the default: `f32 robust`, or `f64` if the bounds on the errors of `f32` require \
+         it.\n\n\
+         The true image is that of the plain `f64` tracer (`reference`) at the same depth. Its own error is measured \
+         against an oracle that computes with 640 bits. *Depth* is the number of reflections that are traced. The \
+         language's depth is {MAX_BOUNCES}; depths up to {DEEPEST} are drawn if they add rays. *Unfinished* is the \
+         root mean square difference from the true image of the greatest depth, caused by rounding and by stopping \
+         early. *Front*: no other backend and depth is both as fast and as accurate.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
-         (Andersson et al. 2020) at 67 pixels a degree; *dots* are pixels more than 16 levels from each of the nine pixels around \
-         them in the truth, which is what is seen of an error at an outline ([outlines.md](outlines.md) looks for them at \
-         length); NaN counts channels that were not a number before they became \
-         a level. Rays are those that the language asks for: from the camera, to each light that a surface faces, from \
-         mirrors. One sample a pixel; of several \
-         samples, [sampling.md](sampling.md).\n\n"
+         (Andersson et al. 2020) at 67 pixels per degree; *dots* are pixels that differ by more than 16 levels from \
+         each of the nine pixels around them in the true image. This is the visible part of an error at an outline \
+         ([outlines.md](outlines.md) searches for them thoroughly). NaN counts channels that were not a number before \
+         they were converted to a level. Rays are those that the language prescribes: from the camera, to each light \
+         that a surface faces, and from mirrors. Pictures have one sample per pixel; for several see \
+         [sampling.md](sampling.md).\n\n"
     )
 }
 
@@ -120,14 +122,16 @@ fn subjects(quick: bool) -> Result<Vec<Subject>> {
     Ok(all)
 }
 
-/// Robust formulas against naive ones, in pairs.
+/// Compares the time of robust formulas with that of naive ones, in pairs.
 fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
     let pairs = if quick { 3 } else { 31 };
     let mut text = format!(
-        "## What robustness costs\n\nCPU time of `f32 robust` over that of `f32 naive`, both by packets, drawn in turn {pairs} \
-         times: the ratio of the fastest, and the median of the ratios. The naive backend has three kernels, the robust one for \
-         each kind of scene its own, which favours it.\n\n\
-         | scene | naive, ms | robust, ms | fastest | median |\n| --- | --- | --- | --- | --- |\n"
+        "## What robustness costs\n\n\
+         CPU time of `f32 robust` divided by that of `f32 naive`, both with packets, drawn in turn {pairs} times. \
+         *Fastest* is the ratio of the fastest runs, *median* the median of the ratios. The naive backend has three \
+         kernels. The robust one has a kernel for each kind of scene, which is an advantage.\n\n\
+         | scene | naive, ms | robust, ms | fastest | median |\n\
+         | --- | --- | --- | --- | --- |\n"
     );
     let all = backends::for_pictures(MAX_BOUNCES);
     let find = |name: &str| all.iter().find(|backend| backend.name == name).context("a backend");
@@ -137,7 +141,7 @@ fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
     for subject in subjects.iter().filter(|subject| named(subject) || others(subject)) {
         let mut times = [Vec::new(), Vec::new()];
         for round in 0..pairs {
-            // Each goes first every other time.
+            // Each goes first in every other round.
             for which in [round % 2, 1 - round % 2] {
                 let (seconds, image) = cpu_time::of(|| [naive, robust][which].render(&subject.scene))?;
                 image?;
@@ -166,9 +170,12 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
         let truth = &c.truth;
         write!(
             text,
-            "\n### {}\n\n{} objects, {} x {} pixels. The truth is drawn by `{}`; its own error at {} pixels: largest \
-             {:.1e} levels, {} see something else than the oracle.\n\n\
-             | backend | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | dots | FLIP | NaN | unfinished | front |\n\
+            "\n\
+             ### {}\n\n\
+             {} objects, {} x {} pixels. `{}` draws the true image. Its own error at {} pixels: at most {:.1e} levels; \
+             {} pixels show another object than the oracle's.\n\n\
+             | backend | depth | CPU ms | rays | Mrays/s | RMSE | largest | off by > 2 | dots | FLIP | NaN | \
+             unfinished | front |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
             c.scene, c.objects, c.size.0, c.size.1, truth.backend, truth.samples, truth.largest, truth.off
         )?;
@@ -197,10 +204,10 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
     Ok(text)
 }
 
-/// Images without any error are drawn at the bottom.
+/// An image without any error is plotted at the bottom, at this value.
 const NONE: f64 = 1e-4;
 
-/// Error over time: all scenes at the language's depth, and each scene of mirrors over all depths.
+/// Plots the error over time: all scenes at the language's depth, and each scene with mirrors at all depths.
 fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
     let mut text = String::from("## Error over time\n\n![Error over time](accuracy-images.svg)\n\n");
     let count = comparisons.first().map_or(0, |c| c.pictures().count());
@@ -217,7 +224,7 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
         })
         .collect();
     let labels = Labels {
-        title: "Error over time at the language's depth, a point a scene",
+        title: "Error over time at the language's depth, one point per scene",
         x: "CPU seconds an image",
         y: "RMSE in levels (1e-4: none)",
     };
@@ -232,11 +239,11 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
             }
         }
         let file = format!("accuracy-{}.svg", c.scene.replace(' ', "-"));
-        let title = format!("{}: error over time, a point a depth", c.scene);
+        let title = format!("{}: error over time, one point per depth", c.scene);
         let labels = Labels {
             title: &title,
             x: "CPU seconds an image",
-            y: "RMSE in levels against the greatest depth (1e-4: none)",
+            y: "RMSE in levels relative to the greatest depth (1e-4: none)",
         };
         log_log(&folder.join(&file), &labels, &series)?;
         writeln!(text, "![{title}]({file})\n")?;
@@ -244,7 +251,7 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
     Ok(text)
 }
 
-/// Measures the hard cases, or one of them, and writes their report: the page and the files beside it.
+/// Measures the hard cases, or one of them, and writes their page and the files beside it.
 fn hard_cases(args: &Args) -> Result<()> {
     let size = if args.quick { Size::Quick } else { Size::Full };
     let folder = args.output.join("hard-cases");

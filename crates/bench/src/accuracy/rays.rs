@@ -1,4 +1,4 @@
-//! How many rays a scene takes.
+//! Counts the rays of a scene.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -7,8 +7,8 @@ use rayfold_scene::{Light, Scene, model::unit};
 use crate::backends::{Backend, Ray};
 use crate::scenes::pixel_ray;
 
-/// Rays from the camera, to lights and from mirrors, followed through 0, 1, 2 and so on up to `bounces` mirrors: what
-/// the language asks for, whatever a tracer saves.
+/// Returns the number of rays from the camera, to lights and from mirrors, up to the depths 0, 1, 2 and so on to
+/// `bounces`. These are the rays that the language prescribes, including those that a tracer avoids.
 pub(crate) fn count(scene: &Scene, backend: &Backend, bounces: u32) -> Result<Vec<u64>> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let mut rays: Vec<Ray> = (0..width * height).map(|k| pixel_ray(scene, k % width, k / width)).collect();

@@ -1,10 +1,12 @@
-//! `rayfold-bench coincident`: surfaces that two objects share show the first of them in the script.
+//! `rayfold-bench coincident`: checks that a surface shared by two objects shows the object that comes first in the
+//! script.
 //!
-//! Random scripts have two solids that share a surface: faces, caps, discs, planes, triangles, the sides of cylinders and
-//! cones, balls and rings. They stand along the axes or turned, near and far away, written by their numbers or in groups, opaque
-//! or of glass, and are seen directly, in mirrors and through panes, with light and shadows. The judge needs no tracer that
-//! knows of coincidence: the picture must be that of a script in which the solid that counts is thicker by a millionth, so that
-//! nothing coincides. Only pixels are judged whose neighbours have its colour there, that is, away from all outlines.
+//! Each random script has two solids that share a surface: faces, caps, discs, planes, triangles, the sides of
+//! cylinders and cones, spheres and tori. They are axis-aligned or rotated, near and far, given by their numbers or in
+//! groups, opaque or of glass. They are seen directly, in mirrors and through panes, with light and shadows. The
+//! comparison needs no tracer that handles coincidence: the picture must equal that of a script in which the winning
+//! solid is thicker by a millionth, so that nothing coincides. Only pixels away from all outlines are compared, that
+//! is, those whose neighbours have the same colour in the second picture.
 
 mod scene;
 mod solid;
@@ -17,27 +19,27 @@ use rayon::prelude::*;
 
 use crate::backends::{self, Arithmetic, Backend};
 
-/// What to draw.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// How many scripts to draw at random
+    /// Draw this many random scripts
     #[arg(long, default_value_t = 10_000)]
     scenes: u64,
-    /// Seed of the first of them; the others have those that follow
+    /// Seed of the first script; the others have the seeds that follow
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-/// Channels of neighbours that differ by more are those of an outline.
+/// Neighbours that differ by more levels in a channel are at an outline.
 const OUTLINE: u8 = 24;
 
-/// A pixel that is off by more shows another surface.
+/// A pixel that is off by more levels shows another surface.
 const OTHER: u8 = 12;
 
-/// Draws all and counts what is wrong.
+/// Draws all scripts and counts wrong pixels.
 ///
 /// # Errors
-/// When a pixel shows another surface than the one that counts, or a script cannot be drawn.
+/// Fails if a pixel shows another surface than the one that wins, or if a script cannot be drawn.
 pub fn run(args: &Args) -> Result<()> {
     let mut sum = Found::default();
     for from in (0..args.scenes).step_by(500) {
@@ -49,14 +51,14 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// What was found.
+/// The result of the comparison.
 #[derive(Clone, Debug, Default)]
 struct Found {
-    /// Pixels away from outlines, of all backends.
+    /// The number of pixels away from outlines, of all backends.
     judged: usize,
-    /// Those that show another surface.
+    /// The number of those pixels that show another surface.
     wrong: usize,
-    /// Where.
+    /// The seeds of the scripts with wrong pixels.
     seeds: Vec<u64>,
 }
 
@@ -74,7 +76,7 @@ fn judge_all(seeds: std::ops::Range<u64>) -> Result<Found> {
         .into_par_iter()
         .map(|seed| {
             let scene::Pair { script, expected, is_fine, is_sampled } = scene::of_seed(seed);
-            // The plain tracer, which comes first, takes one ray a pixel.
+            // The plain tracer, which comes first, takes one ray per pixel.
             let judges = backends.iter().skip(usize::from(is_sampled));
             let judges = judges.filter(|of| !is_fine || of.arithmetic != Arithmetic::Single);
             let found = judge(&script, &expected, judges).with_context(|| format!("seed {seed}"))?;
@@ -86,7 +88,7 @@ fn judge_all(seeds: std::ops::Range<u64>) -> Result<Found> {
     Ok(sum)
 }
 
-/// The pixels of a script, drawn by each backend, that another script shows otherwise.
+/// Counts the pixels of a script, drawn by each backend, that differ from the picture of the script `expected`.
 fn judge<'a>(script: &str, expected: &str, backends: impl Iterator<Item = &'a Backend>) -> Result<Found> {
     let options = RenderOptions { precision: Precision::F64, ..Default::default() };
     let expected = render(&parsed(expected)?, &options)?;
@@ -110,7 +112,7 @@ fn parsed(script: &str) -> Result<Scene> {
     whole.frame(0).context("a script without a frame")
 }
 
-/// How many pixels away from outlines there are, and how many of them differ.
+/// Returns the number of pixels away from outlines, and how many of them differ.
 fn compared(image: &RgbImage, expected: &RgbImage) -> (usize, usize) {
     let (width, height) = expected.dimensions();
     let apart = |a: [u8; 3], b: [u8; 3]| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);

@@ -8,33 +8,33 @@ use glam::{DMat3, DVec3};
 
 use super::solid::Solid;
 
-/// A script, and one without the coincidence that must show the same.
+/// A script, and one without the coincidence that must give the same picture.
 #[derive(Clone, Debug)]
 pub(super) struct Pair {
     pub(super) script: String,
-    /// Has the solid that counts a little thicker, or the other one left out.
+    /// The script in which the winning solid is slightly thicker, or the other one is omitted.
     pub(super) expected: String,
-    /// Whether single precision cannot tell which is in front.
+    /// Whether single precision cannot decide which solid is in front.
     pub(super) is_fine: bool,
     /// Whether a pixel has several samples.
     pub(super) is_sampled: bool,
 }
 
-/// How much thicker: far more than rounding, far less than a pixel.
+/// The added thickness: far more than rounding, far less than a pixel.
 const THICKER: f64 = 1e-6;
 
-/// How far apart surfaces lie that do not coincide, for the largest number of the scene: some thousand roundoffs.
+/// The distance of surfaces that do not coincide, relative to the largest number of the scene: some thousand roundoffs.
 const APART: f64 = 1e-12;
 
-/// How far from the origin scenes stand at most.
+/// The largest distance of a scene from the origin.
 const FARTHEST: f64 = 1e7;
 
-/// How the place of the solids is written.
+/// The way in which the position of the solids is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Written {
-    /// By the numbers of the lines, along the axes.
+    /// By the numbers of the lines, axis-aligned.
     Straight,
-    /// By the numbers of the lines, turned.
+    /// By the numbers of the lines, rotated.
     Turned,
     OneGroup,
     TwoGroups,
@@ -45,21 +45,21 @@ enum Written {
 const WRITTEN: [Written; 5] =
     [Written::Straight, Written::Turned, Written::OneGroup, Written::TwoGroups, Written::Mixed];
 
-/// What the solids are made of, and how near to each other: of equal hits that of the first counts, but one of glass after one
-/// without.
+/// The materials of the solids and their distance. If two hits are at the same distance, the first object in the script
+/// wins, but a glass one loses to one without glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Matter {
     Opaque,
     FirstOfGlass,
     BothOfGlass,
-    /// Opaque ones of which the second lies in front by more than rounding.
+    /// Opaque solids, of which the second is in front by more than rounding.
     SecondInFront,
 }
 
 /// A solid and the name of its material.
 type Named = (Solid, &'static str);
 
-/// The scene of a seed.
+/// Returns the scene of a seed.
 pub(super) fn of_seed(seed: u64) -> Pair {
     let rng = &mut Rng::with_seed(seed);
     let matter = match rng.u32(0..10) {
@@ -71,13 +71,13 @@ pub(super) fn of_seed(seed: u64) -> Pair {
     let [first, second] = if matter == Matter::BothOfGlass { twins(rng) } else { two(rng) };
     let second = if rng.u32(0..3) == 0 { second.jittered(rng) } else { second };
     let shift = match shift(rng) {
-        // So far away what is thicker would not be told from what is in front.
+        // At this distance the added thickness could not be distinguished from the gap in front.
         far if matter == Matter::SecondInFront && far.length() > 1e4 => far * 1e-4,
         shift => shift,
     };
     let place = Place { angles: angles(rng), shift };
     let written = WRITTEN[rng.usize(0..WRITTEN.len())];
-    // A box that is turned can only be had of a group.
+    // Only a group can rotate a box.
     let is_written = |solid: &Solid| solid.placed(place.turn(), place.shift).is_some();
     let written = match written {
         Written::Turned if !is_written(&first) || !is_written(&second) => Written::OneGroup,
@@ -106,10 +106,10 @@ pub(super) fn of_seed(seed: u64) -> Pair {
     }
 }
 
-/// Where the solids are drawn.
+/// The position and rotation of the solids.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// In degrees, as `Use` takes them.
+    /// The angles in degrees, as `Use` takes them.
     angles: DVec3,
     shift: DVec3,
 }
@@ -151,13 +151,13 @@ fn direction(rng: &mut Rng) -> DVec3 {
     DVec3::new(aside * turn.cos(), height, aside * turn.sin())
 }
 
-/// A length that people write, or any.
+/// Returns a random length, half of the time a multiple of 0.1.
 fn length(rng: &mut Rng, from: f64, to: f64) -> f64 {
     let length = from + (to - from) * rng.f64();
     if rng.bool() { (10.0 * length).round().max(1.0) / 10.0 } else { length }
 }
 
-/// The same surface twice.
+/// Returns the same solid twice.
 fn twins(rng: &mut Rng) -> [Solid; 2] {
     let solid = match rng.u32(0..6) {
         0 => return [ball(rng), ball(rng)].map(|_| Solid::Sphere { radius: 0.9, center: DVec3::Y * 0.1 }),
@@ -170,7 +170,7 @@ fn twins(rng: &mut Rng) -> [Solid; 2] {
     [solid.clone(), solid]
 }
 
-/// Two solids that share a part of their surfaces.
+/// Returns two solids that share a part of their surfaces.
 fn two(rng: &mut Rng) -> [Solid; 2] {
     match rng.u32(0..8) {
         0 => cylinders(rng),
@@ -200,7 +200,7 @@ fn rings(rng: &mut Rng) -> [Solid; 2] {
     [ring(normal), ring(scale * normal)]
 }
 
-/// From one height to another along an axis, which need not be the y axis.
+/// Returns a range of heights along an axis, which need not be the y axis, and its end points.
 fn span(rng: &mut Rng, axis: DVec3) -> ([f64; 2], [DVec3; 2]) {
     let low = length(rng, 0.1, 0.6) - 0.7;
     let high = low + length(rng, 0.3, 1.0);
@@ -242,7 +242,7 @@ fn boxes(rng: &mut Rng) -> [Solid; 2] {
     [Solid::Box([low, high]), Solid::Box([other, low])]
 }
 
-/// Something with a face at a height.
+/// Returns a solid with a face at this height.
 fn flat(rng: &mut Rng, height: f64) -> Solid {
     let middle = DVec3::new(rng.f64() * 0.8 - 0.4, height, rng.f64() * 0.8 - 0.4);
     let size = length(rng, 0.4, 1.2);
@@ -267,10 +267,10 @@ fn flat(rng: &mut Rng, height: f64) -> Solid {
     }
 }
 
-/// All of a script but the two solids.
+/// The parts of a script other than the two solids.
 struct Surroundings {
     place: Place,
-    /// The largest number of the scene, about.
+    /// The largest number of the scene, approximately.
     largest: f64,
     is_sampled: bool,
     before: String,
@@ -285,7 +285,7 @@ impl Surroundings {
             if rng.u32(0..4) == 0 { 10f64.powf(1.0 + 3.0 * rng.f64()) } else { 3.0 + 3.0 * rng.f64() };
         let eye = target + distance * towards_eye;
         let field = 2.0 * (1.5 / distance).atan().to_degrees();
-        // Without what brings double precision in any case.
+        // A plain scene has no feature that forces double precision.
         let is_plain = rng.u32(0..3) == 0 && matches!(matter, Matter::Opaque | Matter::SecondInFront);
         let mut before = String::from("Screen 40 32\nBackground .1 .1 .3\n");
         let vector = |v: DVec3| format!("{} {} {}", v.x, v.y, v.z);
@@ -326,7 +326,8 @@ impl Surroundings {
             after += &text;
             after.push('\n');
         };
-        // A mirror that shows the back, a pane in front, a floor for shadows, and crowds that take other ways to be found.
+        // A mirror that shows the back, a pane in front, a floor for shadows, and many objects, for which the tracer
+        // uses other search structures.
         if is_plain && rng.bool() {
             let (x, y) = towards_eye.any_orthonormal_pair();
             let corner = |turn: f64| target - 3.0 * towards_eye + 9.0 * (turn.cos() * x + turn.sin() * y);
@@ -362,7 +363,7 @@ impl Surroundings {
         let by_hand = |solids: &[Named]| {
             let mut lines = String::new();
             for (solid, material) in solids {
-                // Boxes are turned by groups alone.
+                // Only groups rotate boxes.
                 let Some(placed) = solid.placed(self.place.turn(), shift) else { continue };
                 let _ = writeln!(lines, "{} {material}", placed.line());
             }

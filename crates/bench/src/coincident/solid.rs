@@ -1,11 +1,11 @@
-//! Solids as the lines of a script have them, and the same a little thicker.
+//! Solids in the form of script lines, and the same solids made slightly thicker.
 
 use std::fmt::Write as _;
 
 use fastrand::Rng;
 use glam::{DMat3, DVec3};
 
-/// A solid by the numbers of its line.
+/// A solid with the numbers of its line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Solid {
     Sphere { radius: f64, center: DVec3 },
@@ -19,7 +19,7 @@ pub(super) enum Solid {
 }
 
 impl Solid {
-    /// Writes its line without a material.
+    /// Writes the line without a material.
     pub(super) fn line(&self) -> String {
         let mut line = String::new();
         let (name, lengths, vectors): (&str, &[f64], &[DVec3]) = match self {
@@ -37,13 +37,14 @@ impl Solid {
         line += name;
         let numbers = lengths.iter().copied().chain(vectors.iter().flat_map(|v| v.to_array()));
         for number in numbers {
-            // Without the sign of a zero, which nobody writes.
+            // `+ 0.0` removes the sign of a zero.
             let _ = write!(line, " {}", number + 0.0);
         }
         line
     }
 
-    /// The solid turned and then moved; none for a box, which stands along the axes, unless nothing is turned.
+    /// Returns the solid rotated and then moved. Returns `None` for a box, which is axis-aligned, unless the rotation
+    /// is the identity.
     pub(super) fn placed(&self, turn: DMat3, shift: DVec3) -> Option<Self> {
         let place = |point: &DVec3| shift + turn * *point;
         Some(match self {
@@ -68,7 +69,7 @@ impl Solid {
         })
     }
 
-    /// The solid with each of its numbers as it is, or the next one up or down: as programs write what they compute.
+    /// Returns the solid with each number unchanged or replaced by the next `f64` up or down, like computed numbers.
     pub(super) fn jittered(&self, rng: &mut Rng) -> Self {
         let mut number = |x: f64| match rng.u32(0..3) {
             0 if x != 0.0 => x.next_up(),
@@ -80,7 +81,7 @@ impl Solid {
             Self::Sphere { radius, center } => {
                 Self::Sphere { radius: number(*radius), center: vector(*center, &mut number) }
             }
-            // What is flat stays flat.
+            // A flat box stays flat.
             Self::Box([u, v]) => {
                 let other = vector(*v, &mut number);
                 Self::Box([*u, DVec3::select(u.cmpeq(*v), *v, other)])
@@ -109,7 +110,8 @@ impl Solid {
         }
     }
 
-    /// Solids whose surface lies outside this one's, by `depth`; for what is flat, one on either side.
+    /// Returns solids whose surface lies outside this one's by `depth`. For a flat solid these are two, one on each
+    /// side.
     pub(super) fn thicker(&self, depth: f64) -> Vec<Self> {
         let both = |normal: DVec3, moved: &dyn Fn(DVec3) -> Self| {
             let apart = depth * normal.normalize();

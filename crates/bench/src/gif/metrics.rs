@@ -1,41 +1,41 @@
-//! How far a shown animation is from the one meant, judged frame by frame.
+//! The difference between a shown animation and the intended one, frame by frame.
 
 use std::sync::LazyLock;
 
 use image::RgbImage;
 
-/// Of how many pixels one is compared by CIE 2000, which costs as much as all else together. No side of a picture or
-/// of a pattern of dots is a multiple of it.
+/// One of this many pixels is compared by CIE 2000, which costs as much as all other measures together. No side of a
+/// picture or of a dither pattern is a multiple of it.
 const SPARSE: usize = 7;
 
-/// Means over frames, but for the worst frame's PSNR.
+/// Means over frames, except for the worst frame's PSNR.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Quality {
-    /// Decibels over all three channels of sRGB, the mean of the frames' (99 for an exact frame).
+    /// PSNR in decibels over all three channels of sRGB, the mean over the frames (99 for an exact frame).
     pub(super) psnr: f64,
-    /// Of the worst frame.
+    /// The PSNR of the worst frame.
     pub(super) psnr_worst: f64,
     /// CIE 1976 colour difference.
     pub(super) de76: f64,
     /// CIE 2000 colour difference.
     pub(super) de2000: f64,
-    /// CIE 1976 after a mean over 5 x 5 pixels of both pictures.
+    /// CIE 1976 colour difference after a mean over 5 x 5 pixels of both pictures.
     pub(super) blurred: f64,
-    /// Of pixels whose colour stays from one frame to the next: CIE 1976 difference of what is shown.
+    /// The CIE 1976 difference from one shown frame to the next, over the pixels whose colour should stay.
     pub(super) flicker: f64,
-    /// The part of those pixels that change.
+    /// The share of those pixels that change.
     pub(super) flicker_share: f64,
 }
 
-/// A frame as it should be seen.
+/// An intended frame.
 pub(super) struct Meant<'a> {
     pub(super) image: &'a RgbImage,
     pub(super) before: Option<&'a RgbImage>,
-    /// `None`: the frame is not judged by colour differences.
+    /// `None` if the frame is not compared by colour differences.
     pub(super) colours: Option<Colours>,
 }
 
-/// A frame's L\*a\*b\*, pixel by pixel.
+/// The L\*a\*b\* values of a frame, pixel by pixel.
 pub(super) struct Colours {
     sharp: Vec<[f32; 3]>,
     blurred: Vec<[f32; 3]>,
@@ -47,7 +47,7 @@ impl Colours {
     }
 }
 
-/// Compares what is shown with what is meant.
+/// Compares the shown frames with the intended ones.
 #[derive(Default)]
 pub(super) struct Judge {
     before: Option<RgbImage>,
@@ -72,7 +72,7 @@ impl Mean {
         self.count += 1.0;
     }
 
-    /// Of nothing: 0.
+    /// Returns the mean, 0 without values.
     fn value(&self) -> f64 {
         self.sum / self.count.max(1.0)
     }
@@ -98,7 +98,7 @@ impl Judge {
         self.before = Some(shown.clone());
     }
 
-    /// Of all frames so far.
+    /// Returns the quality of all frames so far.
     pub(super) fn quality(&self) -> Quality {
         Quality {
             psnr: self.psnr.value(),
@@ -117,7 +117,7 @@ fn psnr(a: &RgbImage, b: &RgbImage) -> f64 {
     if sum == 0 { 99.0 } else { 10.0 * (65_025.0 * a.as_raw().len() as f64 / sum as f64).log10() }
 }
 
-/// Over every `step`th pixel.
+/// Returns the mean difference over every `step`th pixel.
 fn mean_difference(
     a: &[[f32; 3]],
     b: &[[f32; 3]],
@@ -150,7 +150,7 @@ fn linear(level: f32) -> f32 {
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Linear light of the levels and, for means over 25 pixels, of twenty-fifths of them.
+/// The linear light of the levels and, for means over 25 pixels, of multiples of a twenty-fifth of a level.
 static LINEAR: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=255 * 25).map(|sum| linear(sum as f32 / 25.0)).collect());
 
@@ -158,7 +158,7 @@ pub(super) fn lab_of(rgb: [u8; 3]) -> [f32; 3] {
     lab_of_linear(rgb.map(|level| LINEAR[usize::from(level) * 25]))
 }
 
-/// CIE L\*a\*b\* under D65 of linear sRGB.
+/// Converts linear sRGB to CIE L\*a\*b\* under D65.
 fn lab_of_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
     let f = |t: f32| if t > 216.0 / 24_389.0 { t.cbrt() } else { (24_389.0 / 27.0 * t + 16.0) / 116.0 };
     let x = f((0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.950_47);
@@ -171,7 +171,7 @@ fn lab(image: &RgbImage) -> Vec<[f32; 3]> {
     image.as_raw().as_chunks::<3>().0.iter().map(|&rgb| lab_of(rgb)).collect()
 }
 
-/// L\*a\*b\* of the mean levels over 5 x 5 pixels, fewer at the edges.
+/// Returns L\*a\*b\* of the mean levels over 5 x 5 pixels, fewer at the edges.
 fn blurred_lab(image: &RgbImage) -> Vec<[f32; 3]> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = image.as_raw().as_chunks::<3>().0;
@@ -209,7 +209,7 @@ pub(super) fn difference_1976(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>().sqrt()
 }
 
-/// CIE 142-2001, in the form of Sharma, Wu and Dalal (2005).
+/// Returns the difference by CIE 142-2001, in the form of Sharma, Wu and Dalal (2005).
 fn difference_2000(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [l1, a1, b1] = a.map(f64::from);
     let [l2, a2, b2] = b.map(f64::from);

@@ -1,7 +1,7 @@
-//! Encoders of GIF side by side: time, memory, size, and how near the picture is.
+//! `rayfold-bench gif`: compares GIF encoders in time, memory, size and picture quality.
 //!
-//! rayfold and the peers found on this machine encode the same PNG files, one after the other; FFmpeg decodes all
-//! results; what it shows is compared with the frames.
+//! rayfold and the peers found on this machine encode the same PNG files, one after the other. FFmpeg decodes all
+//! results, and its pictures are compared with the frames.
 
 use std::path::{Path, PathBuf};
 
@@ -23,38 +23,39 @@ use programs::{Job, Program};
 use sets::Set;
 use viewer::Viewer;
 
-/// Frames a second of every set.
+/// The frame rate of every set.
 const FPS: u32 = 20;
 /// The time of a frame in hundredths of a second.
 const DELAY: u32 = 100 / FPS;
-/// At most so many frames of a set, evenly spread, are judged by colour differences; by PSNR and flicker are all.
+/// At most this many frames of a set, evenly spread, are compared by colour differences. All are compared by PSNR and
+/// flicker.
 const JUDGED: usize = 12;
-/// Repetitions of the large set's frames of which memory is measured.
+/// The numbers of repetitions of the large set's frames for which memory is measured.
 const REPEATED: [usize; 2] = [1, 10];
-/// Side of a crop, in pixels.
+/// The side of a crop, in pixels.
 const CROP: u32 = 64;
 
-/// The command line.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Only these sets; a report is written only where --reports says then
+    /// Measure only these sets; no report is written unless --reports is given
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     sets: Vec<String>,
-    /// How often rayfold and gifski at quality 100 are run; the best counts. The others run once
+    /// Run rayfold and gifski at quality 100 this often; the best run counts. The others run once
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
-    /// Where frames and GIFs are kept
+    /// Keep frames and GIFs in this folder
     #[arg(long, value_name = "DIR", default_value = "target/gif-bench")]
     work: PathBuf,
-    /// The rayfold to measure; built when it is not given
+    /// The rayfold to measure [default: it is built]
     #[arg(long, value_name = "FILE")]
     rayfold: Option<PathBuf>,
-    /// Where the report goes [default: docs/reports]
+    /// Write the report into this folder [default: docs/reports]
     #[arg(long, value_name = "DIR")]
     reports: Option<PathBuf>,
 }
 
-/// What was found out about a set.
+/// The measurements of a set.
 struct Measured {
     name: &'static str,
     about: &'static str,
@@ -62,11 +63,11 @@ struct Measured {
     count: usize,
     outcomes: Vec<Outcome>,
     palettes: Option<Palettes>,
-    /// The middle frame's crop as it is meant, where one is shown.
+    /// The crop of the middle frame as intended, if the report shows one.
     crop: Option<RgbImage>,
 }
 
-/// One program on one set.
+/// The result of one program on one set.
 struct Outcome {
     program: &'static str,
     cost: Cost,
@@ -74,16 +75,16 @@ struct Outcome {
     seen: Seen,
 }
 
-/// What a viewer sees of a GIF.
+/// The result of decoding a GIF.
 struct Seen {
     quality: Quality,
     frames: usize,
-    /// Whether every frame is there and each is shown for its time.
+    /// Whether every frame is present and each is shown for its time.
     on_time: bool,
     crop: Option<RgbImage>,
 }
 
-/// Memory for a number of frames.
+/// The peak memory for a number of frames.
 struct Held {
     frames: usize,
     memory: f64,
@@ -92,7 +93,7 @@ struct Held {
 /// Measures and writes `gif.md`.
 ///
 /// # Errors
-/// When a program fails, or its result cannot be decoded.
+/// Fails if a program fails or its result cannot be decoded.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let rayfold = match &args.rayfold {
         Some(path) => path.clone(),
@@ -183,8 +184,8 @@ fn measure(
     })
 }
 
-/// Shows all GIFs side by side. A program that leaves frames out is judged by what is on the screen at each frame's
-/// time.
+/// Decodes all GIFs in parallel and compares them with the frames. If a program drops frames, the picture on the screen
+/// at each frame's time counts.
 fn judge(gifs: &[PathBuf], frames: &[RgbImage], crop: Option<(u32, u32)>) -> anyhow::Result<Vec<Seen>> {
     let size = frames[0].dimensions();
     let open = |gif: &PathBuf| Ok((Viewer::open(gif, size)?, Judge::default(), None));
@@ -215,7 +216,7 @@ fn cropped(image: &RgbImage, left: u32, top: u32) -> RgbImage {
     image.view(left, top, CROP, CROP).to_image()
 }
 
-/// What `rayfold encode` holds at once with two threads, for few and for many frames.
+/// Measures the peak memory of `rayfold encode` with two threads, for few and for many frames.
 fn memory(rayfold: &Path, paths: &[PathBuf], size: (u32, u32), folder: &Path) -> anyhow::Result<Vec<Held>> {
     REPEATED
         .iter()

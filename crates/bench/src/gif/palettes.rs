@@ -1,6 +1,6 @@
-//! A frame's 256 colours: those of `rayfold-gif` beside those of `quantette`, a crate that is known for them.
+//! Compares the 256 colours that `rayfold-gif` chooses for a frame with those of `quantette`, a well-known crate.
 //!
-//! Both see the same pixels. Judged is the palette alone: every pixel in the nearest of its colours.
+//! Both get the same pixels. Only the palette is compared: every pixel is shown in the nearest of its colours.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -16,18 +16,18 @@ use super::metrics::{difference_1976, lab_of};
 use super::viewer::Viewer;
 use crate::cpu_time;
 
-/// Runs of which the fastest counts.
+/// The number of runs, of which the fastest counts.
 const ROUNDS: usize = 3;
 
-/// Ours, then theirs.
+/// The results of both.
 pub(super) struct Palettes {
     pub(super) ours: Judged,
     pub(super) theirs: Judged,
 }
 
-/// What a palette takes and gives.
+/// The cost and the quality of a palette.
 pub(super) struct Judged {
-    /// Seconds of processor time from pixels to a GIF of one frame.
+    /// Processor time in seconds from pixels to a GIF of one frame.
     pub(super) cpu: f64,
     pub(super) bytes: usize,
     pub(super) psnr: f64,
@@ -35,10 +35,10 @@ pub(super) struct Judged {
     pub(super) de76: f64,
 }
 
-/// `None` for a frame of so few colours that there is nothing to choose.
+/// Compares both palettes. Returns `None` for a frame of at most 256 colours, which needs no choice.
 ///
 /// # Errors
-/// When the frame cannot be encoded or decoded.
+/// Fails if the frame cannot be encoded or decoded.
 pub(super) fn compare(frame: &RgbImage, folder: &Path) -> Result<Option<Palettes>> {
     let mut counts = HashMap::<[u8; 3], u64>::new();
     for &rgb in frame.as_raw().as_chunks::<3>().0 {
@@ -69,7 +69,7 @@ pub(super) fn compare(frame: &RgbImage, folder: &Path) -> Result<Option<Palettes
         let drawn = pipeline.input_image(image.as_ref()).output_srgb8_image().into_inner();
         let drawn = drawn.into_iter().flat_map(|c| [c.red, c.green, c.blue]).collect();
         let drawn = RgbImage::from_raw(frame.width(), frame.height(), drawn);
-        // Few colours, so the encoder keeps them as they are.
+        // There are few colours, so the encoder keeps them unchanged.
         encode(drawn.unwrap_or_default())
     })?;
     Ok(Some(Palettes { ours, theirs }))
@@ -83,7 +83,8 @@ fn encode(frame: RgbImage) -> Result<Vec<u8>> {
     Ok(gif)
 }
 
-/// PSNR and mean difference of colours, so many pixels of each, drawn in the nearest colour of another picture.
+/// Returns the PSNR and the mean colour difference of pixels that are shown in the nearest colour of `drawn`. `counts`
+/// holds the number of pixels of each colour.
 fn in_nearest(counts: &[([u8; 3], u64)], drawn: &RgbImage) -> (f64, f64) {
     let mut palette = drawn.as_raw().as_chunks::<3>().0.to_vec();
     palette.sort_unstable();

@@ -1,4 +1,4 @@
-//! The programs that are measured: rayfold and its peers, as far as this machine has them.
+//! The programs that are measured: rayfold and those of its peers that this machine has.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -7,20 +7,20 @@ use anyhow::{Context, ensure};
 
 use crate::measure::Cost;
 
-/// The one to beat.
+/// The program that the goals compare with.
 pub(super) const RIVAL: &str = "gifski 100";
 
 /// A way to turn PNG files into a GIF.
 pub(super) struct Program {
     pub(super) name: &'static str,
-    /// What it calls itself; `None`: it is not on this machine.
+    /// The version that the program prints; `None` if it is not on this machine.
     pub(super) version: Option<String>,
-    /// How it is told to work, for people.
+    /// Its options, for the report.
     pub(super) how: &'static str,
     command: Box<Build>,
 }
 
-/// The command that does a job.
+/// A function that returns the command for a job.
 type Build = dyn Fn(&Job<'_>) -> Command;
 
 /// Frames to encode.
@@ -32,7 +32,7 @@ pub(super) struct Job<'a> {
 }
 
 impl Program {
-    /// What its GIFs are called.
+    /// Returns the file name of its GIFs.
     pub(super) fn file_name(&self) -> String {
         format!("{}.gif", self.name.replace([' ', ','], ""))
     }
@@ -40,17 +40,17 @@ impl Program {
     /// Encodes and measures.
     ///
     /// # Errors
-    /// When the program cannot be started or fails.
+    /// Fails if the program cannot be started or fails.
     pub(super) fn run(&self, job: &Job<'_>) -> anyhow::Result<Cost> {
         cost_of(&(self.command)(job))
     }
 }
 
-/// Runs a command and measures it, through a small process of its own: the memory of whoever starts a program counts
-/// as the program's, else.
+/// Runs a command and measures it. A small process of its own starts the command, because the system counts the memory
+/// of the starting process as the program's.
 ///
 /// # Errors
-/// When the program cannot be started or fails.
+/// Fails if the program cannot be started or fails.
 pub(super) fn cost_of(command: &Command) -> anyhow::Result<Cost> {
     let output = Command::new(std::env::current_exe()?)
         .args(["measure", "--"])
@@ -66,7 +66,7 @@ pub(super) fn cost_of(command: &Command) -> anyhow::Result<Cost> {
 /// Builds the rayfold to measure.
 ///
 /// # Errors
-/// When it cannot be built.
+/// Fails if the build fails.
 pub(super) fn build() -> anyhow::Result<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -77,14 +77,15 @@ pub(super) fn build() -> anyhow::Result<PathBuf> {
     Ok(target.join("release/rayfold"))
 }
 
-/// `rayfold encode` of these frames.
+/// Returns the command of `rayfold encode` for these frames.
 pub(super) fn rayfold(program: &Path, &Job { frames, fps, out, .. }: &Job<'_>) -> Command {
     let mut command = Command::new(program);
     command.arg("encode").args(frames).arg("-o").arg(out).args(["--quiet", "--fps", &fps.to_string()]);
     command
 }
 
-/// rayfold, then the one to beat, then the other peers, whether they are here or not.
+/// Returns rayfold, then the program that the goals compare with, then the other peers, including those that are not on
+/// this machine.
 pub(super) fn all(path: &Path) -> Vec<Program> {
     let path = path.to_path_buf();
     let ours = version(&path.to_string_lossy(), "--version");

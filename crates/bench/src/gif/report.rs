@@ -13,16 +13,16 @@ use super::{CROP, FPS, Held, JUDGED, Measured, Outcome};
 use crate::plot::{Labels, Series, columns, log_log};
 use rayfold_files::OutputFile;
 
-/// Sets and places of which crops are shown: left, top.
+/// The sets of which crops are shown, and their positions: left, top.
 pub(super) const CROPS: [(&str, u32, u32); 3] =
     [("artisticsss", 200, 190), ("spheres", 380, 180), ("texture", 215, 180)];
-/// Whose crops, after the frame's own.
+/// The programs whose crops are shown, after the intended one.
 const SHOWN: [&str; 4] = ["rayfold", RIVAL, "ffmpeg", "Pillow"];
 const ENLARGED: u32 = 3;
-/// The most memory at 1080p with two threads, in MB.
-const MOST_MEMORY: f64 = 64.0;
+/// The goal: at most this memory at 1080p with two threads, in MB.
+const MAX_MEMORY: f64 = 64.0;
 
-/// What is asked for, against the rival.
+/// A goal relative to the rival.
 struct Goal {
     name: &'static str,
     asked: &'static str,
@@ -79,7 +79,7 @@ const GOALS: [Goal; 9] = [
     },
 ];
 
-/// Of errors and times, where nothing beside nothing is as much.
+/// Returns the ratio of errors or times. Two zeros have the ratio 1.
 fn ratio(ours: f64, theirs: f64) -> f64 {
     if ours == 0.0 && theirs == 0.0 { 1.0 } else { ours / theirs }
 }
@@ -97,7 +97,7 @@ const HEAD: &str = "\
 | --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --- |
 ";
 
-/// A row of a set's table.
+/// Returns a row of a set's table.
 pub(super) fn line(o: &Outcome) -> String {
     let q = &o.seen.quality;
     format!(
@@ -128,17 +128,18 @@ pub(super) fn write(
     let beside = folder.join("gif");
     std::fs::create_dir_all(&beside)?;
     let mut text = format!(
-        "# GIFs: rayfold beside other encoders\n\n\
+        "# GIFs: rayfold compared with other encoders\n\n\
         Written by `cargo run --release -p rayfold-bench -- gif`. All programs encode the same PNG files at {FPS} \
-        frames a second, one after the other on the same machine ({} processors); rayfold and {RIVAL} by turns, the \
-        best of several runs, the others once. Wall times are only as good as the machine was idle. FFmpeg decodes \
-        every result.\n\n\
-        PSNR is over the three channels of sRGB, the mean of the frames' and the worst frame's (99: exact). dE is the \
-        CIE 1976 colour difference, dE 2000 that of CIE 142-2001 (every seventh pixel); blurred: CIE 1976 of pictures \
-        averaged over 5 x 5 pixels; all three of at most {JUDGED} frames of a set, evenly spread. Flicker: of pixels \
-        that stay from one frame to the next, the mean CIE 1976 difference of what is shown, and the share of them \
-        that changes. Where a program leaves frames out, what it shows at the frame's time is judged. On time: every \
-        frame is there, for its time.\n\n",
+        frames per second, one after the other on the same machine ({} processors). rayfold and {RIVAL} run in turns, \
+        several times, and the best run counts; the others run once. Wall times depend on the other load of the \
+        machine. FFmpeg decodes every result.\n\n\
+        PSNR is over the three channels of sRGB: the mean of all frames, and that of the worst frame (99: exact). dE \
+        is the CIE 1976 colour difference, dE 2000 that of CIE 142-2001 (every seventh pixel), blurred the CIE 1976 \
+        difference of pictures averaged over 5 x 5 pixels. These three are means over at most {JUDGED} frames of a \
+        set, evenly spread. Flicker is measured on pixels that should stay from one frame to the next: the mean CIE \
+        1976 difference between the shown frames, and the share of these pixels that changes. If a program drops \
+        frames, the picture that it shows at the frame's time counts. On time: every frame is present, for its \
+        time.\n\n",
         std::thread::available_parallelism().map_or(1, usize::from),
     );
     goals(&mut text, results, held)?;
@@ -160,7 +161,10 @@ pub(super) fn write(
             let file = format!("{}.png", set.name);
             save(&sheet, &beside.join(&file))?;
             let names = names.join(", ");
-            writeln!(text, "\nEnlarged, of the middle frame: {names}.\n\n![Crops: {names}](gif/{file})")?;
+            writeln!(
+                text,
+                "\nEnlarged parts of the middle frame: {names}.\n\n![Crops: {names}](gif/{file})"
+            )?;
         }
     }
     plots(&beside, results)?;
@@ -168,7 +172,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// The two that the goals compare, if both are there.
+/// Returns the two programs that the goals compare, if both are present.
 fn rivals(set: &Measured) -> Option<(&Outcome, &Outcome)> {
     let of = |name| set.outcomes.iter().find(|o| o.program == name);
     of("rayfold").zip(of(RIVAL))
@@ -177,14 +181,14 @@ fn rivals(set: &Measured) -> Option<(&Outcome, &Outcome)> {
 fn goals(text: &mut String, results: &[Measured], held: &[Held]) -> anyhow::Result<()> {
     text.push_str("## rayfold against gifski at quality 100\n\n");
     if results.iter().all(|set| rivals(set).is_none()) {
-        text.push_str("gifski is not on this machine, so there is nothing to compare with.\n");
+        text.push_str("gifski is not on this machine, so there is no comparison.\n");
         return Ok(());
     }
-    text.push_str("Ratios of rayfold's figure to gifski's; bold misses what is asked for.\n\n| set |");
+    text.push_str("Ratios of rayfold's figure to gifski's. A bold ratio misses its goal.\n\n| set |");
     GOALS.iter().for_each(|goal| text.push_str(&format!(" {} |", goal.name)));
     text.push_str("\n| --- |");
     GOALS.iter().for_each(|_| text.push_str(" --: |"));
-    text.push_str("\n| *asked for* |");
+    text.push_str("\n| *goal* |");
     GOALS.iter().for_each(|goal| text.push_str(&format!(" *{}* |", goal.asked)));
     text.push('\n');
     let (mut figures, mut missed) = (0, Vec::new());
@@ -198,21 +202,18 @@ fn goals(text: &mut String, results: &[Measured], held: &[Held]) -> anyhow::Resu
                 write!(text, " {figure:.3} |")?;
             } else {
                 write!(text, " **{figure:.3}** |")?;
-                missed
-                    .push(format!("{} of {} ({figure:.3}, asked for: {})", goal.name, set.name, goal.asked));
+                missed.push(format!("{} of {} ({figure:.3}, goal: {})", goal.name, set.name, goal.asked));
             }
         }
         text.push('\n');
     }
     for Held { frames, memory } in held {
         figures += 1;
-        if *memory > MOST_MEMORY {
-            missed.push(format!(
-                "memory for {frames} frames ({memory:.0} MB, asked for: at most {MOST_MEMORY})"
-            ));
+        if *memory > MAX_MEMORY {
+            missed.push(format!("memory for {frames} frames ({memory:.0} MB, goal: at most {MAX_MEMORY})"));
         }
     }
-    writeln!(text, "\n{} of {figures} figures are as asked for.", figures - missed.len())?;
+    writeln!(text, "\n{} of {figures} figures meet their goals.", figures - missed.len())?;
     if !missed.is_empty() {
         text.push_str("Missed:\n\n");
         missed.iter().for_each(|miss| text.push_str(&format!("- {miss}\n")));
@@ -223,19 +224,17 @@ fn goals(text: &mut String, results: &[Measured], held: &[Held]) -> anyhow::Resu
     }
     let memory = held.iter().map(|h| format!("{:.0} MB for {} frames", h.memory, h.frames));
     let memory = memory.collect::<Vec<_>>().join(", ");
-    writeln!(
-        text,
-        "\nMost memory held at 1920 x 1080 with two threads (asked for: at most 64 MB): {memory}."
-    )?;
+    writeln!(text, "\nPeak memory at 1920 x 1080 with two threads (goal: at most 64 MB): {memory}.")?;
     Ok(())
 }
 
 fn palettes(text: &mut String, results: &[Measured]) -> anyhow::Result<()> {
     text.push_str(
-        "\n## The palette beside quantette's\n\n\
-        The middle frame alone, by `rayfold-gif` and by the crate `quantette` (k-means in Oklab, no dithering; what \
-        it draws is then written by `rayfold-gif`, without further loss). PSNR and dE: of each pixel in the palette's \
-        nearest colour. CPU: milliseconds from pixels to GIF.\n\n\
+        "\n\
+        ## The palette compared with quantette's\n\n\
+        The middle frame alone, by `rayfold-gif` and by the crate `quantette` (k-means in Oklab, no dithering; \
+        `rayfold-gif` writes its result without further loss). PSNR and dE: each pixel in the palette's nearest \
+        colour. CPU: milliseconds from pixels to GIF.\n\n\
         | set | PSNR | quantette | dE | quantette | CPU ms | quantette | kB | quantette |\n\
         | --- | --: | --: | --: | --: | --: | --: | --: | --: |\n",
     );
@@ -257,7 +256,7 @@ fn palettes(text: &mut String, results: &[Measured]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The crop as it is meant, then as some programs show it, side by side; and what is where.
+/// Returns the intended crop and those of some programs side by side, and their names.
 fn crops(set: &Measured) -> anyhow::Result<Option<(RgbImage, Vec<&str>)>> {
     let Some(meant) = &set.crop else { return Ok(None) };
     let of = |name| set.outcomes.iter().find(|o| o.program == name).and_then(|o| o.seen.crop.as_ref());
@@ -271,7 +270,7 @@ fn crops(set: &Measured) -> anyhow::Result<Option<(RgbImage, Vec<&str>)>> {
     Ok(Some((sheet, panels.into_iter().map(|(name, _)| name).collect())))
 }
 
-/// As small as it gets: the repository keeps it.
+/// Saves with the best compression, because the repository keeps the file.
 fn save(image: &RgbImage, path: &Path) -> anyhow::Result<()> {
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Best, FilterType::Up).write_image(

@@ -1,4 +1,4 @@
-//! Frames to encode: the project's scenes, traced, and drawn sets of what an encoder has to fear.
+//! Frames to encode: the project's rendered scenes, and drawn sets that are difficult for an encoder.
 
 use anyhow::Result;
 use image::{Rgb, RgbImage};
@@ -16,7 +16,7 @@ pub(super) struct Set {
 }
 
 enum Source {
-    /// The first frames of a folder in `scenes/`, as large as they say or at a size of ours.
+    /// The first frames of a folder in `scenes/`, in their own size or in the given one.
     Traced {
         folder: &'static str,
         size: Option<(u32, u32)>,
@@ -29,7 +29,7 @@ enum Source {
     },
 }
 
-/// Which frame of what size to draw.
+/// The number and the size of a frame to draw.
 #[derive(Clone, Copy)]
 struct Canvas {
     width: u32,
@@ -38,10 +38,10 @@ struct Canvas {
 }
 
 impl Set {
-    /// All frames, in order.
+    /// Returns all frames in order.
     ///
     /// # Errors
-    /// When a script cannot be read or traced.
+    /// Fails if a script cannot be read or traced.
     pub(super) fn frames(&self) -> Result<Vec<RgbImage>> {
         match self.source {
             Source::Traced { folder, size, most } => {
@@ -62,7 +62,7 @@ impl Set {
     }
 }
 
-/// All sets: what the project makes, then what is common, then what is unkind.
+/// Returns all sets: the project's scenes, then common pictures, then difficult ones.
 pub(super) fn all() -> Vec<Set> {
     let traced =
         |name, about, size, most| Set { name, about, source: Source::Traced { folder: name, size, most } };
@@ -101,10 +101,10 @@ pub(super) fn all() -> Vec<Set> {
     ]
 }
 
-/// The set that memory is measured on.
+/// The set on which memory is measured.
 pub(super) const LARGE: &str = "spheres-1080p";
 
-/// The set that may be larger than the rival's.
+/// The set whose GIF may be larger than the rival's.
 pub(super) const NOISE: &str = "noise";
 
 fn paint(canvas: Canvas, colour: impl Fn(f32, f32) -> [f32; 3] + Sync) -> RgbImage {
@@ -138,7 +138,7 @@ struct Ball {
     colour: [f32; 3],
 }
 
-/// The nearest ball along a parallel ray, lit by Lambert and Phong.
+/// Returns the nearest sphere along a parallel ray, lit by Lambert and Phong.
 fn shade(balls: &[Ball], light: [f32; 3], u: f32, v: f32) -> Option<[f32; 3]> {
     let hit = |ball: &Ball| {
         let (dx, dy) = ((u - ball.at[0]) / ball.radius, (v - ball.at[1]) / ball.radius);
@@ -230,7 +230,7 @@ fn lattice(x: i32, y: i32, seed: u32) -> f32 {
     (scatter(x as u32 ^ scatter(y as u32 ^ scatter(seed))) & 0xffff) as f32 / 65_535.0
 }
 
-/// Value noise of several octaves.
+/// Returns value noise of several octaves.
 fn cloud(x: f32, y: f32, octaves: u32) -> f32 {
     let mut sum = 0.0;
     let mut size = 0.5;

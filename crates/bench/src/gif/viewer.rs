@@ -1,4 +1,4 @@
-//! What a viewer sees of a GIF, by FFmpeg's decoder.
+//! Shows a GIF as a viewer would, by FFmpeg's decoder.
 
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -12,9 +12,9 @@ pub(super) struct Viewer {
     decoder: Child,
     pixels: ChildStdout,
     shown: RgbImage,
-    /// How long each frame is shown, in hundredths of a second.
+    /// The time for which each frame is shown, in hundredths of a second.
     pub(super) delays: Vec<u32>,
-    /// The frame that is shown, from 0, and when it ends.
+    /// The frame that is shown, from 0, and the time at which it ends.
     number: usize,
     end: u32,
 }
@@ -23,7 +23,7 @@ impl Viewer {
     /// Shows the first frame.
     ///
     /// # Errors
-    /// When FFmpeg is not here or cannot decode the file.
+    /// Fails if FFmpeg is missing or cannot decode the file.
     pub(super) fn open(gif: &Path, size: (u32, u32)) -> anyhow::Result<Self> {
         let probe = Command::new("ffprobe")
             .args([
@@ -60,10 +60,11 @@ impl Viewer {
         Ok(viewer)
     }
 
-    /// What is on the screen at a time in hundredths of a second, which must not be before the last one asked for.
+    /// Returns the picture on the screen at a time in hundredths of a second, which must not be before the last
+    /// requested one.
     ///
     /// # Errors
-    /// When FFmpeg ends within a frame.
+    /// Fails if FFmpeg ends within a frame.
     pub(super) fn at(&mut self, time: u32) -> anyhow::Result<&RgbImage> {
         while time >= self.end && self.number + 1 < self.delays.len() && self.advance()? {
             self.number += 1;
@@ -72,10 +73,10 @@ impl Viewer {
         Ok(&self.shown)
     }
 
-    /// Reads to the end and counts the frames.
+    /// Reads to the end and returns the number of frames.
     ///
     /// # Errors
-    /// When FFmpeg fails, or there are not as many frames as delays.
+    /// Fails if FFmpeg fails, or if the numbers of frames and delays differ.
     pub(super) fn close(mut self) -> anyhow::Result<usize> {
         let mut frames = self.number + 1;
         while self.advance()? {
@@ -86,7 +87,7 @@ impl Viewer {
         Ok(frames)
     }
 
-    /// Whether there was another frame.
+    /// Advances to the next frame. Returns whether there was one.
     fn advance(&mut self) -> anyhow::Result<bool> {
         let buffer: &mut [u8] = &mut self.shown;
         match self.pixels.read_exact(&mut buffer[..1]) {
@@ -100,7 +101,7 @@ impl Viewer {
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        // It has ended already, unless something failed; then it must not wait for a reader for ever.
+        // The decoder has ended already, unless an error occurred. Then it must not wait for a reader for ever.
         let _ = self.decoder.kill();
         let _ = self.decoder.wait();
     }

@@ -1,4 +1,4 @@
-//! Errors that grow from mirror to mirror.
+//! Errors that grow with each reflection.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -10,10 +10,10 @@ use crate::backends::{Backend, Ray};
 use crate::oracle::{self, Real, Vector};
 use crate::scenes::single;
 
-/// Mirrorings that are followed.
+/// The number of reflections that are traced.
 const BOUNCES: usize = 5;
 
-/// The direction after the last bounce, in numbers without rounding.
+/// Returns the direction after the last bounce, without rounding errors.
 fn exact(objects: &[Object], origin: &Vector, direction: &Vector) -> Option<Vector> {
     let (mut origin, mut direction) = (origin.clone(), direction.unit());
     for _ in 0..BOUNCES {
@@ -24,8 +24,8 @@ fn exact(objects: &[Object], origin: &Vector, direction: &Vector) -> Option<Vect
     Some(direction)
 }
 
-/// Rays about along the axis between a sphere and one a hundred times larger; the error of the last direction over
-/// what a small change of the first direction or position becomes by then.
+/// Measures rays nearly along the axis between a sphere and one a hundred times larger. The error of the last direction
+/// is divided by the growth of a small change of the first direction or position.
 pub(super) fn face_to_face(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::new(DVec3::ZERO, DVec3::ZERO, DVec3::ONE)?;
     let objects = [
@@ -67,7 +67,7 @@ pub(super) fn face_to_face(backends: &[Backend], size: Size, figures: &mut Figur
                 };
                 let point = ray.origin + hit.t * ray.direction;
                 let mirrored = ray.direction - 2.0 * ray.direction.dot(hit.normal) * hit.normal;
-                // Off the surface by what the distance is uncertain.
+                // Starts away from the surface by the uncertainty of the hit.
                 let origin = point + 4.0 * backend.ulp(100.0) * hit.normal;
                 ray = Ray { origin, direction: mirrored.normalize() };
             }

@@ -1,4 +1,5 @@
-//! Rays along the faces of boxes, and boxes without thickness: decided without rounding, so the answer must be exact.
+//! Rays along the faces of boxes, and boxes without thickness. These are decided without rounding, so the answer must
+//! be exact.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -12,8 +13,8 @@ fn cuboid(corners: [DVec3; 2]) -> Result<Object> {
     Ok(Object::Cuboid(Cuboid::new(corners, Material::default())?))
 }
 
-/// For each axis a coordinate that is outside, on a face, inside, with the sign of a component that is zero; each pair
-/// of axes has its ray along the third, and each axis its rays askew in the plane of the others.
+/// Returns rays along each axis and rays askew in the plane of two axes. Their coordinates on the other axes are
+/// outside the box, on a face, and inside; zero components have both signs.
 fn along_faces(corners: [DVec3; 2]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for axis in 0..3 {
@@ -63,7 +64,7 @@ fn wrong(backends: &[Backend], boxes: &[[DVec3; 2]], figures: &mut Figures) -> R
                     (Some(truth), Some(hit)) => {
                         let ulps = (hit.t - truth.t).abs() / backend.ulp(truth.t);
                         distance = distance.max(ulps);
-                        // On an edge either face will do.
+                        // On an edge the normal of either face is right.
                         let faces = hit.normal.abs().max_element() == 1.0 && hit.normal.length() == 1.0;
                         let point = ray.origin + truth.t * ray.direction;
                         let on = |p: DVec3| (p - corners[0]).abs().min((p - corners[1]).abs());
@@ -83,14 +84,14 @@ fn wrong(backends: &[Backend], boxes: &[[DVec3; 2]], figures: &mut Figures) -> R
     Ok(())
 }
 
-/// Rays parallel to one or two pairs of faces, outside, on and between them.
+/// Measures rays parallel to one or two pairs of faces: outside, on and between them.
 pub(super) fn parallel(backends: &[Backend], _: Size, figures: &mut Figures) -> Result<()> {
     let boxes =
         [[DVec3::splat(-1.0), DVec3::splat(1.0)], [DVec3::new(0.0, 1.0, -8.0), DVec3::new(2.0, 1.5, -0.5)]];
     wrong(backends, &boxes, figures)
 }
 
-/// The same rays on boxes that are a rectangle, a segment, a point.
+/// Measures rays along the faces of boxes that are a rectangle, a segment or a point.
 pub(super) fn flat(backends: &[Backend], _: Size, figures: &mut Figures) -> Result<()> {
     let mut boxes = Vec::new();
     for axis in 0..3 {

@@ -1,5 +1,5 @@
-//! Scenes in which single precision was chosen and its errors were seen, or in which `f64` erred too: each backend judged
-//! pixel by pixel by the oracle, as in [`super::nasty`].
+//! Scenes in which single precision was chosen and its errors were visible, or in which `f64` had errors too. The
+//! oracle checks each backend pixel by pixel, as in [`super::nasty`].
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -16,20 +16,20 @@ use crate::scenes::light;
 /// The share of pixels that may be wrong.
 const FEW: f64 = 1e-4;
 
-/// Whole numbers meet edges and corners exactly, where the last bit of any arithmetic decides.
+/// The share for whole numbers, which hit edges and corners exactly. There the last bit of any arithmetic decides.
 const FEW_OF_WHOLE_NUMBERS: f64 = 5e-4;
 
-/// The shadow of what is up to 1e9 times as far away as what it falls on.
+/// Measures shadows whose occluder is up to 1e9 times as far away as the receiver.
 pub(super) fn far_shadows(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(&[("shadows of what is far away", far_shadow)], FEW, backends, size, figures)
 }
 
-/// Triangles as wide as the last bits of their corners.
+/// Measures triangles as wide as the last bits of their corners.
 pub(super) fn slivers(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(&[("slivers", sliver)], FEW, backends, size, figures)
 }
 
-/// Balls that are large beside what lies on them.
+/// Measures spheres that are large compared with the objects on them.
 pub(super) fn big_balls(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let kinds: &[Kind] = &[
         ("things on a planet", planet),
@@ -39,18 +39,19 @@ pub(super) fn big_balls(backends: &[Backend], size: Size, figures: &mut Figures)
     judge_kinds(kinds, FEW, backends, size, figures)
 }
 
-/// Triangles in one slanted plane.
+/// Measures triangles in one slanted plane.
 pub(super) fn one_plane(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let kinds: &[Kind] = &[("triangles in one slanted plane", coplanar)];
     judge_kinds(kinds, FEW_OF_WHOLE_NUMBERS, backends, size, figures)
 }
 
-/// Needles that fill a telescope's view.
+/// Measures needles that fill a telescope's view.
 pub(super) fn telescopes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(&[("needles through a telescope", telescope)], FEW, backends, size, figures)
 }
 
-/// Rays through the edges of rectangles, parallel rays that go far, and floors that reach far beyond what stands on them.
+/// Measures rays through the edges of rectangles, parallel rays over large distances, and floors much larger than the
+/// objects on them.
 pub(super) fn edges(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let kinds: &[Kind] = &[
         ("edges of rectangles", rectangles),
@@ -61,7 +62,7 @@ pub(super) fn edges(backends: &[Backend], size: Size, figures: &mut Figures) -> 
     judge_kinds(kinds, FEW, backends, size, figures)
 }
 
-/// Whichever objects come first, the same numbers are chosen.
+/// Checks that the chosen precision does not depend on the order of the objects.
 pub(super) fn orders(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let makes = [planet, mirror_planet, mirror_room, far_shadow, bubbles];
     let count = size.pick(300, 20_000);
@@ -95,7 +96,7 @@ fn mirror(rng: &mut Rng) -> Result<Material> {
     Ok(Material::new(0.1 * color(), 0.3 * color(), 0.3 + 0.6 * color())?)
 }
 
-/// Towards the light, not near the horizon.
+/// Returns a direction towards the light, not near the horizon.
 fn upwards(rng: &mut Rng) -> DVec3 {
     loop {
         let towards = direction(rng);
@@ -105,7 +106,7 @@ fn upwards(rng: &mut Rng) -> DVec3 {
     }
 }
 
-/// What a camera sees from the side that stands some 3 above the ground.
+/// Returns a picture from a camera at the side, about 3 above the ground.
 fn picture(rng: &mut Rng, objects: Vec<Object>, towards: DVec3) -> Result<Scene> {
     let eye = DVec3::new(within(rng, -1.0, 1.0), within(rng, 1.5, 3.5), 6.0);
     let screen = Screen::new(48, 36)?;
@@ -124,7 +125,7 @@ fn floor(rng: &mut Rng) -> Result<Object> {
     Ok(Cuboid::new([DVec3::new(-3.0, -0.2, -3.0), DVec3::new(3.0, 0.0, 3.0)], matte(rng)?)?.into())
 }
 
-/// The edge of the shadow falls among what is seen.
+/// Makes a scene in which the edge of a shadow is among the visible objects.
 fn far_shadow(rng: &mut Rng) -> Result<Scene> {
     let towards = upwards(rng);
     let mut objects = vec![floor(rng)?];
@@ -137,7 +138,7 @@ fn far_shadow(rng: &mut Rng) -> Result<Scene> {
         objects.push(match rng.u32(0..3) {
             0 => Sphere::new(size, place + aside * size, surface)?.into(),
             1 => {
-                // An upright edge through the place.
+                // A vertical edge passes through the point.
                 let far = place + DVec3::new(size, size * within(rng, 0.0, 1.0), size);
                 Cuboid::new([place, far], surface)?.into()
             }
@@ -152,7 +153,7 @@ fn far_shadow(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, towards)
 }
 
-/// A number some roundoffs on, or the same.
+/// Returns a number a few roundoffs away from `x`, or `x`.
 fn shaken(rng: &mut Rng, x: f64) -> f64 {
     let most = [0, 0, 1, 2, 8][rng.usize(0..5)];
     if x == 0.0 { x } else { f64::from_bits((x.to_bits() as i64 + rng.i64(-most..=most)) as u64) }
@@ -174,7 +175,7 @@ fn sliver(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, towards)
 }
 
-/// Things of about the size 1 on the top of a ball, which is the origin, or just above it.
+/// Returns objects of about the size 1 on the top of a ball, at the origin or just above it.
 fn things_on(rng: &mut Rng, ball: Sphere) -> Result<Vec<Object>> {
     let mut objects: Vec<Object> = Vec::new();
     for _ in 0..rng.usize(1..5) {
@@ -224,7 +225,7 @@ fn mirror_planet(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, towards)
 }
 
-/// Balls for walls, which all but stand in planes.
+/// Makes a room whose walls are spheres that are almost planes.
 fn mirror_room(rng: &mut Rng) -> Result<Scene> {
     let mut objects = Vec::new();
     for wall in [DVec3::NEG_Y, DVec3::X, DVec3::NEG_X, DVec3::NEG_Z] {
@@ -243,7 +244,7 @@ fn mirror_room(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, towards)
 }
 
-/// Balls of all sizes that all but touch each other from within.
+/// Makes spheres of all sizes that almost touch each other from within.
 fn bubbles(rng: &mut Rng) -> Result<Scene> {
     let mut objects = Vec::new();
     let top = DVec3::new(within(rng, -0.5, 0.5), 0.0, within(rng, -0.5, 0.5));
@@ -257,7 +258,7 @@ fn bubbles(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, towards)
 }
 
-/// Triangles between whole numbers in one plane, seen from a place of tenths.
+/// Makes triangles with whole coordinates in one plane, seen from a position in multiples of 0.1.
 fn coplanar(rng: &mut Rng) -> Result<Scene> {
     let whole =
         |rng: &mut Rng, most: i32| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-most..=most))));
@@ -308,7 +309,8 @@ fn telescope(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Upright and level rectangles whose edges the rays of whole columns and rows meet, lit so that another normal shows.
+/// Makes vertical and horizontal rectangles whose edges are hit by the rays of entire columns and rows, lit so that a
+/// wrong normal is visible.
 fn rectangles(rng: &mut Rng) -> Result<Scene> {
     let mut objects: Vec<Object> = Vec::new();
     for _ in 0..rng.usize(1..5) {
@@ -344,7 +346,7 @@ fn far_parallel(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Triangles that lean away from parallel rays, over any distance; some of their planes meet the rows that rays run in.
+/// Makes triangles that are steep to parallel rays, over any distance. The planes of some contain the rays of a row.
 fn steep_parallel(rng: &mut Rng) -> Result<Scene> {
     let away = power(rng, 0.0, 13.0);
     let mut objects: Vec<Object> = Vec::new();
@@ -366,7 +368,7 @@ fn steep_parallel(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Rectangles and triangles at height 0 that reach up to 1e20 far, and small things on them.
+/// Makes rectangles and triangles at height 0 of sizes up to 1e20, and small objects on them.
 fn endless_floor(rng: &mut Rng) -> Result<Scene> {
     let far = power(rng, 1.0, 20.0);
     let mut objects: Vec<Object> = Vec::new();

@@ -1,4 +1,4 @@
-//! Thousands of objects in one place: prepared in `n log n`, and drawn as one after another would be.
+//! Thousands of objects in one place: prepared in `n log n`, and drawn like the plain tracer draws them.
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -13,10 +13,11 @@ use crate::backends::{Arithmetic, Backend, reference};
 use crate::cpu_time;
 use crate::scenes::light;
 
-/// `n log n` from a quarter of the most to the most is an exponent of 1.06; what is faster than the memory is the rest.
+/// From a quarter of the largest number to all, `n log n` grows with the exponent 1.06. The rest allows for caches,
+/// which favour the smaller number.
 const EXPONENT: f64 = 1.4;
 
-/// The `k`th object of so many.
+/// A function that makes an object; its number is the position among all, from 0 to 1.
 type Kind = (&'static str, fn(&mut Rng, f64) -> Result<Object>);
 
 const KINDS: &[Kind] = &[
@@ -64,7 +65,7 @@ fn crowd(kind: &Kind, count: usize) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Every backend draws what the plain tracer draws; how the time of preparation grows.
+/// Compares every backend with the plain tracer, and measures the growth of the time of preparation.
 pub(super) fn crowds(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for kind in KINDS {
         let scene = crowd(kind, 5000)?;
@@ -89,7 +90,7 @@ pub(super) fn crowds(backends: &[Backend], size: Size, figures: &mut Figures) ->
             let (quarter, all) = (seconds(most / 4)?, seconds(most)?);
             let exponent = (all / quarter).log(4.0);
             let bound = match size {
-                // Times of a busy machine: only what is quadratic would show.
+                // On a busy machine these times show quadratic growth at best.
                 Size::Quick => None,
                 Size::Full => Some(EXPONENT),
             };

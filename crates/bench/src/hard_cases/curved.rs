@@ -1,4 +1,4 @@
-//! Rays that hardly meet discs, cylinders, cones, tori and planes: tangents, rims, tips, edges on, from the surface.
+//! Rays that barely hit discs, cylinders, cones, tori and planes: tangents, rims, tips, edge-on, from the surface.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -10,10 +10,10 @@ use crate::backends::{Backend, Ray};
 use crate::oracle;
 use crate::scenes::single;
 
-/// What must be told apart, in roundoffs of the largest number of body and ray.
+/// The smallest distance that a backend must resolve, in roundoffs of the largest number of body and ray.
 const APART: f64 = 16.0;
 
-/// A body, grown by a small part of its size.
+/// A function that makes a body grown by a small part of its size.
 type Grown = fn(f64) -> Result<Object>;
 
 const CENTER: DVec3 = DVec3::new(0.25, -0.5, 0.125);
@@ -46,14 +46,14 @@ const BODIES: &[(&str, Grown)] = &[
     ("torus aslant", |grown| Ok(Torus::new(1.0, 0.625 + grown, CENTER, ASLANT, surface())?.into())),
 ];
 
-/// Rays past a body at all distances from its outline, and from all of its surface.
+/// Returns rays that pass a body at all distances from its outline, on all sides of it.
 fn rays(rng: &mut fastrand::Rng, body: &Object, count: usize) -> Vec<Ray> {
     let mut rays = Vec::new();
     while rays.len() < count {
         let eye = single(CENTER + 4.0 * direction(rng));
         let target = CENTER + 1.5 * direction(rng) * rng.f64();
         let aside = 3.0 * direction(rng);
-        // Where the ray to the target turns into one that misses, by halving.
+        // Bisects to the point where the ray begins to miss.
         let hits = |part: f64| {
             let towards = target + part * aside - eye;
             oracle::nearest(std::slice::from_ref(body), eye, towards).is_some()
@@ -73,7 +73,8 @@ fn rays(rng: &mut fastrand::Rng, body: &Object, count: usize) -> Vec<Ray> {
     rays
 }
 
-/// Each backend finds what the oracle finds, but for rays that the body grown or shrunk by some roundoffs would answer so.
+/// Checks that each backend agrees with the oracle, except for rays whose answer changes if the body grows or shrinks
+/// by some roundoffs.
 pub(super) fn outlines(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(29);
     for (name, grown) in BODIES {
@@ -93,7 +94,7 @@ pub(super) fn outlines(backends: &[Backend], size: Size, figures: &mut Figures) 
                     }
                     continue;
                 };
-                // Square to the surface; a tangent's place along itself is open.
+                // The distance perpendicular to the surface. The position of a tangent along itself is not determined.
                 let apart = (hit.t - truth.t).abs() * truth.normal.dot(ray.direction).abs();
                 let near = (hit.t - truth.t).abs() * ray.direction.length() < 1e-3;
                 if near {
@@ -122,10 +123,11 @@ pub(super) fn outlines(backends: &[Backend], size: Size, figures: &mut Figures) 
     Ok(())
 }
 
-/// What it is about, a body, where a ray starts and goes, and where it meets the body, in lengths of its direction.
+/// A description, a body, the origin and direction of a ray, and the distance of the hit, in units of the length of the
+/// direction.
 type Exact<'a> = (&'a str, &'a Object, [f64; 3], [f64; 3], Option<f64>);
 
-/// Decided without rounding: what each of these rays meets, and where.
+/// Compares hits that are decided without rounding, and their distances.
 pub(super) fn exact(backends: &[Backend], _: Size, figures: &mut Figures) -> Result<()> {
     let up = DVec3::Y;
     let can: Object = Cylinder::new(2.0, [DVec3::ZERO, 4.0 * up], surface())?.into();

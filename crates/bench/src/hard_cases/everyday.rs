@@ -1,5 +1,5 @@
-//! Scenes as people write them, drawn at random: things that stand on a floor and touch, lights straight from above or
-//! along the floor, crowds, meshes among mirrors; all numbers with one decimal place.
+//! Random scenes like those that users write: objects that stand on a floor and touch, lights vertical or parallel to
+//! the floor, many objects, meshes among mirrors. All numbers have one decimal place.
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -26,12 +26,12 @@ pub(super) const KINDS: &[Kind] = &[
 /// The share of pixels that may be wrong.
 const FEW: f64 = 1e-4;
 
-/// Every backend on every kind of scene.
+/// Checks every backend on every kind of scene.
 pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(KINDS, FEW, backends, size, figures)
 }
 
-/// A number with one decimal place.
+/// Returns a number with one decimal place.
 fn tenths(rng: &mut Rng, from: i32, to: i32) -> f64 {
     f64::from(rng.i32(from..=to)) / 10.0
 }
@@ -59,7 +59,7 @@ fn tile(rng: &mut Rng, vertices: [DVec3; 3]) -> Result<Object> {
     Ok(Object::Triangle(Triangle::new(vertices, surface(rng, false)?)?))
 }
 
-/// A box's top or two triangles, at height 0.
+/// Returns a floor: a box's top or two triangles, at height 0.
 fn floor(rng: &mut Rng) -> Result<Vec<Object>> {
     let corner = |x: f64, z: f64| DVec3::new(x, 0.0, z);
     let (low, high) = (corner(-5.0, -5.0), corner(5.0, 5.0));
@@ -93,7 +93,7 @@ fn seen(rng: &mut Rng, objects: Vec<Object>) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Something that stands on the height of `at`.
+/// Returns objects that stand at the height of `at`.
 fn standing(rng: &mut Rng, at: DVec3) -> Result<Vec<Object>> {
     let size = tenths(rng, 2, 12);
     Ok(match rng.u32(0..3) {
@@ -122,7 +122,7 @@ fn at_rest(rng: &mut Rng) -> Result<Scene> {
     seen(rng, objects)
 }
 
-/// Boxes side by side and on top of each other, walls of triangles.
+/// Makes boxes side by side and on top of each other, walls of triangles.
 fn room(rng: &mut Rng) -> Result<Scene> {
     let mut objects = floor(rng)?;
     let wall = |x: f64, y: f64| DVec3::new(x, y, -3.0);
@@ -184,7 +184,7 @@ fn mesh(rng: &mut Rng) -> Result<Scene> {
     seen(rng, objects)
 }
 
-/// Rectangles, lines and points as boxes, and triangles without area.
+/// Makes rectangles, lines and points as boxes, and triangles without area.
 fn flat(rng: &mut Rng) -> Result<Scene> {
     let mut objects = floor(rng)?;
     for _ in 0..rng.usize(3..20) {
@@ -213,7 +213,7 @@ fn telescope(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// In parallel projection rays have whole coordinates, and so have corners, edges and outlines here.
+/// Makes a scene in parallel projection whose corners, edges and outlines have whole coordinates, like the rays.
 fn in_pixels(rng: &mut Rng) -> Result<Scene> {
     let whole = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(0..40))));
     let objects: Result<Vec<_>> = (0..rng.usize(2..20))

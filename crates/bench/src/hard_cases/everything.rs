@@ -1,5 +1,5 @@
-//! Scenes drawn at random from all that the language has: every shape, material, pattern, light and camera, each backend
-//! judged pixel by pixel by the oracle, as in [`super::nasty`].
+//! Random scenes with all features of the language: every shape, material, pattern, light and camera. The oracle checks
+//! each backend pixel by pixel, as in [`super::nasty`].
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use super::setup::direction;
 use crate::backends::Backend;
 use crate::scenes::{light, moved};
 
-/// The share of pixels that may be wrong: rays that meet rims, tips and walls between cells exactly.
+/// The share of pixels that may be wrong: rays that hit rims, tips and walls between cells exactly.
 const FEW: f64 = 5e-4;
 
 pub(super) const KINDS: &[Kind] = &[
@@ -41,16 +41,16 @@ pub(super) const KINDS: &[Kind] = &[
     ("needles and flat cones", slender),
 ];
 
-/// Every backend on every kind of scene.
+/// Checks every backend on every kind of scene.
 pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(KINDS, FEW, backends, size, figures)
 }
 
-/// The same pictures, bit for bit, in any unit that is a power of two.
+/// Checks that pictures are the same bit for bit if the unit changes by a power of two.
 pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = Rng::with_seed(first_seed());
     let exponents = size.pick(vec![-300, -1, 40], (-500..=500).step_by(50).collect());
-    // Pixels of a parallel projection have the size 1, and what is far or tiny is so by other numbers.
+    // Pixels of a parallel projection have the size 1, and the scenes named "far and tiny" have fixed sizes.
     let made = KINDS.iter().filter(|(name, _)| !["parallel rays", "far and tiny"].contains(name));
     let scenes: Vec<Scene> = made.map(|(_, make)| make(&mut rng)).collect::<Result<_>>()?;
     for backend in backends {
@@ -69,7 +69,7 @@ pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figu
     Ok(())
 }
 
-/// The scene in another unit.
+/// Returns the scene in another unit.
 pub(crate) fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
     let place = |p: DVec3| scale * p;
     let mut scaled = scene.clone();
@@ -94,7 +94,7 @@ pub(crate) fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
     Ok(scaled)
 }
 
-/// The object with a pattern of cells so many times as large; those of groups are in the units of the group.
+/// Returns the object with the cells of its pattern scaled. Those of groups are in the units of the group.
 fn with_cells(object: Object, scale: f64) -> Result<Object> {
     let material = object.material();
     let Some(finish) = material.finish() else { return Ok(object) };
@@ -107,17 +107,7 @@ fn with_cells(object: Object, scale: f64) -> Result<Object> {
     };
     let pattern = Some(Pattern { weight: weight.checked()?, ..pattern });
     let material = Material::finished(material.coefficients(), Finish { pattern, ..*finish });
-    Ok(match &object {
-        Object::Sphere(o) => Sphere::new(o.radius(), o.center(), material)?.into(),
-        Object::Triangle(o) => Triangle::new(*o.vertices(), material)?.into(),
-        Object::Cuboid(o) => Cuboid::new(*o.corners(), material)?.into(),
-        Object::Plane(o) => Plane::new(o.point(), o.normal(), material)?.into(),
-        Object::Disc(o) => Disc::new(o.radius(), o.center(), o.normal(), material)?.into(),
-        Object::Cylinder(o) => Cylinder::new(o.radius(), o.ends(), material)?.into(),
-        Object::Cone(o) => Cone::new(o.radii(), o.ends(), material)?.into(),
-        Object::Torus(o) => Torus::new(o.radius(), o.thickness(), o.center(), o.normal(), material)?.into(),
-        Object::Instance(_) => object,
-    })
+    Ok(object.with_material(material)?)
 }
 
 fn coefficients(rng: &mut Rng, mirror: f64) -> Result<Coefficients> {
@@ -168,7 +158,7 @@ fn some(rng: &mut Rng) -> Result<Material> {
     }
 }
 
-/// An object of about this size.
+/// Returns a random object of about this size.
 fn any(rng: &mut Rng, at: DVec3, size: f64, material: Material) -> Result<Object> {
     Ok(match rng.u32(0..8) {
         0 => Sphere::new(0.5 * size, at, material)?.into(),
@@ -208,7 +198,7 @@ fn floor(rng: &mut Rng, height: f64) -> Result<Object> {
     Ok(Plane::new(DVec3::new(0.0, height, 0.0), DVec3::Y * within(rng, 0.1, 3.0), material)?.into())
 }
 
-/// A picture of the objects in sunshine and lamplight.
+/// Returns a picture of the objects with suns and lamps.
 fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Result<Scene> {
     let screen = Screen::new(rng.u32(16..32), rng.u32(16..32))?;
     let look = Look::new(eye, target, within(rng, 20.0, 90.0), Some(DVec3::new(0.1, 1.0, 0.05)))?;
@@ -247,7 +237,7 @@ fn of_glass(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Boxes, discs and panes with faces in few planes, and bodies in bodies.
+/// Makes boxes, discs and panes with faces in few planes, and bodies within bodies.
 fn stacked(rng: &mut Rng) -> Result<Scene> {
     let heights = [-1.0, -0.5, 0.0, 0.5, 1.0];
     let mut objects = Vec::new();
@@ -274,7 +264,7 @@ fn patterned(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Faces at multiples of the size of the cells, as decimals that are rounded.
+/// Makes faces at multiples of the size of the cells, written as decimals that are rounded.
 fn on_walls(rng: &mut Rng) -> Result<Scene> {
     let size = [0.1, 0.3, 0.7, 1.0][rng.usize(0..4)];
     let cell = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-4..5)) * size));
@@ -331,7 +321,7 @@ fn grouped(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Moves by numbers without rounding: whichever comes first in the script is seen.
+/// Makes copies moved by exact numbers. The object that comes first in the script is visible.
 fn copies(rng: &mut Rng) -> Result<Scene> {
     let whole = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-6..7)) / 4.0));
     let mut objects = Vec::new();
@@ -348,8 +338,8 @@ fn copies(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, EYE, DVec3::ZERO)
 }
 
-/// Lamps in rooms, in bodies, on surfaces. Nothing shines: where a lamp lies in the plane of a surface, the sign of a cosine
-/// that is 0 would say whether there is a highlight.
+/// Makes lamps in rooms, in bodies, on surfaces. No material has highlights, because for a lamp in the plane of a
+/// surface the sign of a cosine of 0 would decide whether there is one.
 fn lamps(rng: &mut Rng) -> Result<Scene> {
     let mut objects = heap(rng, 6, pattern)?;
     objects.push(floor(rng, -1.5)?);
@@ -357,7 +347,7 @@ fn lamps(rng: &mut Rng) -> Result<Scene> {
     let mut lights = Vec::new();
     for _ in 0..3 {
         let place = match rng.u8(0..3) {
-            // On the floor, and on what stands there.
+            // On the floor, and on the objects that stand there.
             0 => DVec3::new(within(rng, -2.0, 2.0), -1.5, within(rng, -2.0, 2.0)),
             1 => match &scene.objects[rng.usize(0..6)] {
                 Object::Sphere(sphere) => sphere.center() + sphere.radius() * DVec3::Y,
@@ -367,7 +357,7 @@ fn lamps(rng: &mut Rng) -> Result<Scene> {
                 Object::Cylinder(cylinder) => cylinder.ends()[0],
                 Object::Cone(cone) => cone.ends()[1],
                 Object::Torus(torus) => torus.center(),
-                Object::Plane(_) | Object::Instance(_) => DVec3::ZERO,
+                _ => DVec3::ZERO,
             },
             _ => point(rng, 1.5),
         };
@@ -397,7 +387,7 @@ fn from_within(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects, eye, target)
 }
 
-/// Rays that meet rims, caps and tips exactly.
+/// Makes a scene with rays that hit rims, caps and tips exactly.
 fn whole_numbers(rng: &mut Rng) -> Result<Scene> {
     let whole = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-3..4))));
     let mut objects = Vec::new();
@@ -493,7 +483,7 @@ fn parallel(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Long and thin, or wide and flat.
+/// Makes objects that are long and thin, or wide and flat.
 fn slender(rng: &mut Rng) -> Result<Scene> {
     let mut objects = Vec::new();
     for _ in 0..10 {

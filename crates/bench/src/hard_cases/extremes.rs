@@ -1,4 +1,4 @@
-//! Numbers at the ends of the range: an error or the right image, and an answer in any case.
+//! Numbers at the ends of the range: an error or the right image, but always a result.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -10,7 +10,8 @@ use crate::backends::Backend;
 use crate::oracle;
 use crate::scenes::{light, looking_at, moved, table};
 
-/// Infinite inputs are errors; scenes of any size and colours of any brightness are drawn as the oracle draws them.
+/// Checks that infinite inputs are errors, and that scenes of any size and colours of any brightness look as the oracle
+/// draws them.
 pub(super) fn inputs(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let accepted = infinite_inputs();
     let side = size.pick(48, 192);
@@ -45,7 +46,7 @@ pub(super) fn inputs(backends: &[Backend], size: Size, figures: &mut Figures) ->
     Ok(())
 }
 
-/// How many of how many infinite, or not even infinite, inputs are taken as numbers.
+/// Returns how many infinite or NaN inputs are accepted, and the number of inputs.
 fn infinite_inputs() -> (usize, usize) {
     let scripts = [
         "Sphere 1e999 0 0 0 0 0 0 1 1 1",
@@ -71,7 +72,7 @@ fn infinite_inputs() -> (usize, usize) {
     (accepted, scripts.len() + 12)
 }
 
-/// Small scenes of one sphere on a background.
+/// Returns small scenes of one sphere on a background.
 fn bright_and_dim() -> Result<Vec<(&'static str, Scene)>> {
     let screen = Screen::new(24, 24)?;
     let camera = looking_at(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, 0.8, screen)?;

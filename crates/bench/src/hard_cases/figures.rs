@@ -1,4 +1,4 @@
-//! What a hard case finds out: figures with their bounds.
+//! The results of a hard case: figures with their bounds.
 
 use std::fmt;
 
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::backends::{Arithmetic, Backend};
 
-/// How much of a case is measured.
+/// The amount that is measured of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Size {
-    /// Seconds for all cases together.
+    /// Takes seconds for all cases together.
     Quick,
-    /// What the report shows.
+    /// The size for the report.
     Full,
 }
 
@@ -34,23 +34,23 @@ impl fmt::Display for Size {
     }
 }
 
-/// One measurement.
+/// A measurement.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Figure {
     /// The backend that was measured.
     pub backend: String,
-    /// What was measured, with its unit.
+    /// The measured quantity, with its unit.
     pub what: String,
-    /// How many rays, pixels or inputs the figure stands for.
+    /// The number of rays, pixels or inputs that were measured.
     pub samples: usize,
-    /// The worst or the count found; not a number is a failure.
+    /// The worst error or the count; NaN is a failure.
     pub measured: f64,
-    /// What it may be at most; `None` where nothing is promised.
+    /// The largest allowed value; `None` if nothing is promised.
     pub bound: Option<f64>,
 }
 
 impl Figure {
-    /// Whether the bound is kept.
+    /// Returns whether the value is within the bound.
     pub fn passes(&self) -> bool {
         self.bound.is_none_or(|bound| self.measured <= bound)
     }
@@ -86,12 +86,13 @@ impl Figures {
     }
 }
 
-/// The larger; not a number wins.
+/// Returns the larger number, NaN if either is NaN.
 pub(super) fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// A bound for those that choose their arithmetic or use `f64`; `f32` by force is only shown.
+/// Returns the bound for backends that choose their arithmetic or use `f64`. Backends forced to `f32` have none: their
+/// figures are only shown.
 pub(super) fn unless_single(backend: &Backend, bound: f64) -> Option<f64> {
     (backend.arithmetic != Arithmetic::Single).then_some(bound)
 }

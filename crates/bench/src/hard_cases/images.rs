@@ -1,4 +1,4 @@
-//! Whole images of scenes that are moved, scaled, and lit so that shadows are easily wrong.
+//! Images of scenes that are moved, scaled, and lit so that wrong shadows are likely.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -11,19 +11,19 @@ use crate::backends::{Backend, reference};
 use crate::oracle;
 use crate::scenes::{icosphere, light, looking_at, moved, single, table};
 
-/// How many pixels differ by more than `levels` in a channel.
+/// Returns the number of pixels that differ by more than `levels` in a channel.
 pub(super) fn off_by_more_than(levels: u8, a: &RgbImage, b: &RgbImage) -> usize {
     let off =
         |(p, q): (&image::Rgb<u8>, &image::Rgb<u8>)| p.0.iter().zip(q.0).any(|(p, q)| p.abs_diff(q) > levels);
     a.pixels().zip(b.pixels()).filter(|&pair| off(pair)).count()
 }
 
-/// Half a part in a thousand.
+/// Returns the number of pixels that may be wrong: 0.05 % of all.
 fn few(image: &RgbImage) -> f64 {
     0.0005 * f64::from(image.width() * image.height())
 }
 
-/// The same image bit for bit.
+/// Checks that the images of scaled scenes are equal bit for bit.
 pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = table(side, side)?;
@@ -41,7 +41,7 @@ pub(super) fn scaled_by_two(backends: &[Backend], size: Size, figures: &mut Figu
     Ok(())
 }
 
-/// The same image but for rounding.
+/// Checks that the images of scaled scenes are equal except for rounding.
 pub(super) fn scaled_by_ten(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = table(side, side)?;
@@ -57,7 +57,7 @@ pub(super) fn scaled_by_ten(backends: &[Backend], size: Size, figures: &mut Figu
     Ok(())
 }
 
-/// The same image but for the rounding of positions.
+/// Checks that the images of moved scenes are equal except for the rounding of positions.
 pub(super) fn far_from_the_origin(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let side = size.pick(96, 384);
     let scene = moved(&table(side, side)?, 0.1, DVec3::ZERO)?;
@@ -77,8 +77,8 @@ fn matte() -> Result<Material> {
     Ok(Material::new(DVec3::splat(0.1), DVec3::splat(0.8), DVec3::ZERO)?)
 }
 
-/// Material and normal of what each pixel shows; `None` on the background and at outlines, where a backend that rounds may
-/// see a neighbour.
+/// Returns the material and the normal at each pixel. The value is `None` on the background and at outlines, where a
+/// backend that rounds may see a neighbour.
 fn visible(scene: &Scene) -> Vec<Option<(Material, DVec3)>> {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let hits: Vec<_> = (0..width * height)
@@ -97,7 +97,7 @@ fn visible(scene: &Scene) -> Vec<Option<(Material, DVec3)>> {
         .collect()
 }
 
-/// What one convex body shows in these lights: no point that faces a light can be in its shadow.
+/// Returns the colours of a convex body in these lights. No point that faces a light can be in its own shadow.
 fn without_shadows(visible: &[Option<(Material, DVec3)>], lights: &[Light]) -> Vec<Option<[u8; 3]>> {
     let shaded = |(material, normal): &(Material, DVec3)| {
         let color = lights.iter().fold(material.ambient(), |sum, light| {
@@ -110,7 +110,7 @@ fn without_shadows(visible: &[Option<(Material, DVec3)>], lights: &[Light]) -> V
     visible.iter().map(|seen| seen.as_ref().map(shaded)).collect()
 }
 
-/// Pixels that are darker or brighter than an unshadowed surface by more than 2 levels.
+/// Returns the number of pixels that are darker or brighter than an unshadowed surface by more than 2 levels.
 fn speckles(image: &RgbImage, expected: &[Option<[u8; 3]>]) -> usize {
     let off = |(pixel, expected): (&image::Rgb<u8>, &Option<[u8; 3]>)| {
         expected.is_some_and(|e| pixel.0.iter().zip(e).any(|(p, e)| p.abs_diff(e) > 2))
@@ -118,7 +118,7 @@ fn speckles(image: &RgbImage, expected: &[Option<[u8; 3]>]) -> usize {
     image.pixels().zip(expected).filter(|&pair| off(pair)).count()
 }
 
-/// Convex bodies, lit from the side, small and large, near the origin and not.
+/// Measures convex bodies, lit from the side, small and large, near the origin and far from it.
 pub(super) fn acne(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let corners = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]].map(DVec3::from);
@@ -158,7 +158,7 @@ pub(super) fn acne(backends: &[Backend], size: Size, figures: &mut Figures) -> R
     Ok(())
 }
 
-/// A coarse mesh in light that almost runs along its facets.
+/// Measures a coarse mesh in light that is almost parallel to its facets.
 pub(super) fn grazing_light(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let side = size.pick(48, 384);
@@ -187,8 +187,8 @@ pub(super) fn grazing_light(backends: &[Backend], size: Size, figures: &mut Figu
     Ok(())
 }
 
-/// Bodies that hover over a floor by 1e-4 of their size: light that leaks in under them, more than a pixel from where
-/// the oracle says that the shadow ends.
+/// Measures bodies that hover over a floor by 1e-4 of their size. Counts pixels of light that leaks in under them, more
+/// than a pixel from the end of the shadow according to the oracle.
 pub(super) fn contact_shadow(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = matte()?;
     let side = size.pick(64, 384);

@@ -1,8 +1,8 @@
-//! Scenes drawn at random from what breaks ray tracers, each backend judged pixel by pixel by the oracle.
+//! Random scenes that are difficult for ray tracers. The oracle checks each backend pixel by pixel.
 //!
-//! A pixel is wrong when its colour is off by more than 2 levels from every colour that the oracle sees within a
-//! sixteenth of a pixel: what an outline, a shadow's edge or a chain of mirrors makes of a rounding error is not held
-//! against anybody.
+//! A pixel is wrong if its colour is off by more than 2 levels from every colour that the oracle sees within a
+//! sixteenth of a pixel. An outline, the edge of a shadow or a chain of mirrors may therefore amplify a rounding error
+//! up to that distance.
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -17,17 +17,17 @@ use crate::backends::{Backend, reference};
 use crate::oracle;
 use crate::scenes::{light, moved};
 
-/// How far from the pixel, in pixels, an error may show what is not there.
+/// The tolerated displacement, in pixels.
 const BESIDE: f64 = 1.0 / 16.0;
 
-/// Levels that colours may be off.
+/// The tolerated difference of a colour, in levels.
 const LEVELS: f64 = 2.0;
 
-/// What a scene is made of.
+/// The name of a kind of scenes, and the function that makes one.
 pub(super) type Kind = (&'static str, fn(&mut Rng) -> Result<Scene>);
 
-/// The share of pixels that may be wrong: rays that meet corners or the edges of needles exactly, where the last bit of
-/// any arithmetic decides what comes first.
+/// The share of pixels that may be wrong. These are rays that hit corners or the edges of needles exactly, where the
+/// last bit of any arithmetic decides which object is nearer.
 const FEW: f64 = 5e-4;
 
 pub(super) const KINDS: &[Kind] = &[
@@ -48,13 +48,13 @@ pub(super) const KINDS: &[Kind] = &[
     ("bright lights", bright),
 ];
 
-/// The random scene of a seed, and what it is.
+/// Returns the random scene of a seed and its name.
 fn scene(seed: u64) -> Result<(&'static str, Scene)> {
     let (name, make) = KINDS[(seed % KINDS.len() as u64) as usize];
     Ok((name, make(&mut Rng::with_seed(seed))?))
 }
 
-/// A scene of each kind, large enough to look at.
+/// Returns a scene of each kind, large enough to look at.
 pub(crate) fn one_of_each(side: u32) -> Result<Vec<(&'static str, Scene)>> {
     let first = super::SEED / KINDS.len() as u64 * KINDS.len() as u64;
     (first..first + KINDS.len() as u64)
@@ -68,17 +68,17 @@ pub(crate) fn one_of_each(side: u32) -> Result<Vec<(&'static str, Scene)>> {
         .collect()
 }
 
-/// The seed of the first scene: [`super::SEED`], unless `RAYFOLD_SEED` says another.
+/// Returns the seed of the first scene: [`super::SEED`], unless `RAYFOLD_SEED` overrides it.
 pub(super) fn first_seed() -> u64 {
     std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(super::SEED)
 }
 
-/// Every backend on every kind of scene.
+/// Checks every backend on every kind of scene.
 pub(super) fn scenes(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     judge_kinds(KINDS, FEW, backends, size, figures)
 }
 
-/// Every backend on scenes of these kinds; `few` is the share of pixels that may be wrong.
+/// Checks every backend on scenes of these kinds. `few` is the share of pixels that may be wrong.
 pub(super) fn judge_kinds(
     kinds: &[Kind],
     few: f64,
@@ -119,8 +119,8 @@ pub(super) fn judge_kinds(
     Ok(())
 }
 
-/// How many pixels of each image are wrong: of those that differ from the plain tracer's or among each other, and of
-/// `samples` others.
+/// Returns the number of wrong pixels of each image. Checks the pixels at which an image differs from the plain
+/// tracer's, and `samples` others.
 fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Result<Vec<usize>> {
     let plain = reference().render(scene)?;
     let (width, height) = plain.dimensions();
@@ -150,25 +150,26 @@ fn judge(scene: &Scene, images: &[RgbImage], samples: usize, seed: u64) -> Resul
     Ok((0..images.len()).map(count).collect())
 }
 
-/// Whether a pixel's colour is wrong; its row counts from the top.
+/// Returns whether a pixel's colour is wrong. Its row counts from the top.
 pub(crate) fn is_wrong_at(scene: &Scene, (x, y): (u32, u32), color: [u8; 3]) -> bool {
     let (i, j) = (f64::from(x), f64::from(scene.screen.height() - 1 - y));
     let exact = exact_at(scene, (x, y));
     is_off(color, (exact, exact)) && is_off(color, around(scene, (i, j), exact))
 }
 
-/// The oracle's colour of a pixel, as levels before rounding.
+/// Returns the oracle's colour of a pixel, as levels before rounding.
 pub(crate) fn exact_at(scene: &Scene, (x, y): (u32, u32)) -> DVec3 {
     shown(scene, f64::from(x), f64::from(scene.screen.height() - 1 - y))
 }
 
-/// Whether a colour is none between these two.
+/// Returns whether a channel of the colour is outside the range of these two by more than [`LEVELS`].
 fn is_off(color: [u8; 3], (from, to): (DVec3, DVec3)) -> bool {
     let color = DVec3::from_array(color.map(f64::from));
     (from - color).max(color - to).max_element() > LEVELS
 }
 
-/// Of all colours that the oracle sees at a pixel (`exact`) and beside it the least and the greatest, channel by channel.
+/// Returns the least and the greatest value of each channel over the colours that the oracle sees at a pixel (`exact`)
+/// and beside it.
 fn around(scene: &Scene, (i, j): (f64, f64), exact: DVec3) -> (DVec3, DVec3) {
     let (mut from, mut to) = (exact, exact);
     for turn in 0..8 {
@@ -179,7 +180,7 @@ fn around(scene: &Scene, (i, j): (f64, f64), exact: DVec3) -> (DVec3, DVec3) {
     (from, to)
 }
 
-/// The oracle's colour as levels before rounding.
+/// Returns the oracle's colour as levels before rounding.
 fn shown(scene: &Scene, x: f64, y: f64) -> DVec3 {
     oracle::shown(scene.tone, oracle::color_at(scene, x, y))
 }
@@ -192,7 +193,7 @@ pub(super) fn within(rng: &mut Rng, from: f64, to: f64) -> f64 {
     from + (to - from) * rng.f64()
 }
 
-/// Each power of ten between as likely as any other.
+/// Returns a random number whose logarithm is uniformly distributed.
 pub(super) fn power(rng: &mut Rng, from: f64, to: f64) -> f64 {
     10f64.powf(within(rng, from, to))
 }
@@ -226,7 +227,7 @@ fn triangle(rng: &mut Rng, vertices: [DVec3; 3]) -> Result<Object> {
     Ok(Object::Triangle(Triangle::new(vertices, matte(rng)?)?))
 }
 
-/// An object of about this size.
+/// Returns a random object of about this size.
 fn any(rng: &mut Rng, at: DVec3, size: f64) -> Result<Object> {
     match rng.u32(0..3) {
         0 => sphere(rng, 0.5 * size, at),
@@ -246,7 +247,7 @@ fn seen_from(eye: DVec3, target: DVec3, half: f64, screen: Screen) -> Result<Cam
     Ok(Camera::Pinhole(Pinhole::new(eye, target - eye, DVec3::new(0.1, 1.0, 0.05), 1.0, -half, half)?))
 }
 
-/// A picture of the objects, lit.
+/// Returns a picture of the objects, lit.
 fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Result<Scene> {
     let screen = Screen::new(rng.u32(24..48), rng.u32(24..48))?;
     let mut scene = Scene::new(screen, seen_from(eye, target, 0.5, screen)?);
@@ -279,7 +280,8 @@ fn of_all_scales(rng: &mut Rng) -> Result<Scene> {
     picture(rng, objects?, DVec3::ZERO, DVec3::NEG_Z)
 }
 
-/// Boxes, rectangles and triangles whose faces lie in a few planes; the first in the script is seen.
+/// Returns boxes, rectangles and triangles whose faces lie in a few planes. The object that comes first in the script
+/// is visible.
 fn stack(rng: &mut Rng, gap: f64) -> Result<Vec<Object>> {
     let levels = [-1.0, -0.3, 0.4];
     (0..rng.usize(3..20))
@@ -385,12 +387,7 @@ fn equal(rng: &mut Rng) -> Result<Scene> {
                 Object::Sphere(s) => Object::Sphere(Sphere::new(s.radius(), s.center(), surface)?),
                 Object::Cuboid(c) => Object::Cuboid(Cuboid::new(*c.corners(), surface)?),
                 Object::Triangle(t) => Object::Triangle(Triangle::new(*t.vertices(), surface)?),
-                Object::Plane(_)
-                | Object::Disc(_)
-                | Object::Cylinder(_)
-                | Object::Cone(_)
-                | Object::Torus(_)
-                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
+                _ => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();
@@ -432,7 +429,7 @@ fn odd_screens(rng: &mut Rng) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Rays that meet edges, corners and planes exactly.
+/// Makes a scene with rays that hit edges, corners and planes exactly.
 fn whole_numbers(rng: &mut Rng) -> Result<Scene> {
     let whole = |rng: &mut Rng| DVec3::from_array([(); 3].map(|()| f64::from(rng.i32(-4..5))));
     let objects: Result<Vec<_>> = (0..rng.usize(2..40))
@@ -498,12 +495,7 @@ fn bright(rng: &mut Rng) -> Result<Scene> {
                     let surface = Material::new(ambient, diffuse, DVec3::ZERO)?;
                     Object::Triangle(Triangle::new(*t.vertices(), surface)?)
                 }
-                Object::Plane(_)
-                | Object::Disc(_)
-                | Object::Cylinder(_)
-                | Object::Cone(_)
-                | Object::Torus(_)
-                | Object::Instance(_) => unreachable!("not drawn here: {object:?}"),
+                _ => unreachable!("not drawn here: {object:?}"),
             })
         })
         .collect();

@@ -1,6 +1,6 @@
-//! The report on the hard cases: every figure in a file a case, and a page that sums them up.
+//! The report on the hard cases: a file with all figures for each case, and a page that summarises them.
 //!
-//! The page is made of the files alone, so that a case can be measured anew without the others.
+//! The page is made from the files alone, so a case can be measured again without the others.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,30 +15,30 @@ use super::{CASES, Case, SEED};
 #[derive(Debug, Default)]
 pub struct Report {
     runs: Vec<Run>,
-    /// Those of each run.
+    /// The figures of each run.
     figures: Vec<Vec<Figure>>,
 }
 
-/// When a case was measured, and how.
+/// The circumstances in which a case was measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// The case's number.
+    /// The number of the case.
     pub case: String,
     /// The size.
     pub size: Size,
-    /// How long it took by the clock, all backends together.
+    /// The elapsed time in seconds, all backends together.
     pub seconds: f64,
     /// The revision of the project.
     pub revision: String,
-    /// The date of that revision.
+    /// The date of the revision.
     pub date: String,
 }
 
 impl Report {
-    /// The files of `folder` as they are; none where there is no such folder.
+    /// Reads the files of `folder`. Returns an empty report if the folder does not exist.
     ///
     /// # Errors
-    /// When a file cannot be read, or is not such a file.
+    /// Fails if a file cannot be read or is malformed.
     pub fn read(folder: &Path) -> Result<Self> {
         let mut report = Self::default();
         if runs_file(folder).exists() {
@@ -50,7 +50,7 @@ impl Report {
         Ok(report)
     }
 
-    /// Takes in a case that was measured, in place of what was known of it.
+    /// Adds a case that was measured, and replaces its former figures.
     pub fn add(&mut self, run: Run, figures: Vec<Figure>) {
         if let Some(k) = self.runs.iter().position(|old| old.case == run.case) {
             self.runs.remove(k);
@@ -65,7 +65,7 @@ impl Report {
     /// Writes the files to `folder`.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// Fails if a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         write_rows(&runs_file(folder), &self.runs)?;
@@ -75,13 +75,13 @@ impl Report {
         Ok(())
     }
 
-    /// The page; `naive` is the name of the backend that is there to be compared with.
+    /// Returns the page. `naive` is the name of the naive backend, which is there for comparison.
     ///
     /// # Errors
-    /// Never: text has room.
+    /// Cannot fail: writing to a `String` always succeeds.
     pub fn page(&self, naive: &str) -> Result<String> {
         let mut table = String::from(
-            "| case | what is asked | hold | largest figure | naive: hold | naive: largest figure |\n\
+            "| case | requirement | within bound | largest figure | naive: within bound | naive: largest figure |\n\
              | --- | --- | --: | --: | --: | --: |\n",
         );
         let mut failing = String::new();
@@ -122,20 +122,20 @@ impl Report {
         };
         Ok(format!(
             "# Hard cases\n\n\
-             Inputs on which ray tracers are known to go wrong. Of {} figures with a bound {} hold; of the naive \
-             tracer's {} hold {}.\n\n\
-             Written by `cargo run --release -p rayfold-bench -- accuracy --hard-cases`, which measures every backend: the \
-             plain `f64` tracer (`reference`), and packets in each precision by each width of vectors, down a tree and in \
-             other tiles. `{naive}` is a tracer of textbook formulas with an absolute epsilon, written to be compared with, and \
-             held to the others' bounds also where single precision is promised nothing. \
-             What is right is said by an oracle of 640 bits. `tests/hard_cases.rs` holds every backend but the naive one to \
-             the same bounds at quick sizes; seed {SEED}. All figures, also those without a bound, are in \
-             [hard-cases/](hard-cases/): a file a case.\n\n\
-             {}## What is asked, and how much of it holds\n\n\
-             A figure is the worst of its samples or a count; its largest is shown as a share of its bound, or as a count \
-             where none is allowed.\n\n\
+             Inputs that are known to be difficult for ray tracers. Of {} figures with a bound {} are within it; of \
+             the naive tracer's {} figures {} are.\n\n\
+             Written by `cargo run --release -p rayfold-bench -- accuracy --hard-cases`, which measures every backend: \
+             the plain `f64` tracer (`reference`), and packets in each precision and vector width, with a tree and in \
+             other tiles. `{naive}` is a tracer with textbook formulas and an absolute epsilon, for comparison. The \
+             bounds of the others apply to it, even those that are not promised for single precision. An oracle that \
+             computes with 640 bits defines the right results. `tests/hard_cases.rs` checks every backend except the \
+             naive one against the same bounds at quick sizes, with the seed {SEED}. All figures, including those \
+             without a bound, are in [hard-cases/](hard-cases/), one file per case.\n\n\
+             {}## Requirements and results\n\n\
+             A figure is the worst of its samples, or a count. The largest figure of a case is shown as a share of its \
+             bound, or as a count if the bound is 0.\n\n\
              {table}\n\
-             ## What does not hold\n\n\
+             ## Figures beyond their bounds\n\n\
              {failing}",
             ours.bounded,
             ours.hold,
@@ -145,7 +145,7 @@ impl Report {
         ))
     }
 
-    /// When the cases were measured: a paragraph a revision.
+    /// Returns a paragraph per revision with the cases that were measured at it.
     fn measured(&self) -> Result<String> {
         let mut text = String::new();
         let mut runs: &[Run] = &self.runs;
@@ -162,7 +162,7 @@ impl Report {
             };
             writeln!(
                 text,
-                "{cases}: measured at {} size at revision {} of {}, in {:.0} s by the clock.\n",
+                "{cases}: measured at {} size at revision {} of {}, in {:.0} s of elapsed time.\n",
                 first.size,
                 first.revision,
                 first.date,
@@ -174,7 +174,7 @@ impl Report {
 }
 
 impl Run {
-    /// Of a case that was just measured, with the revision that git tells of.
+    /// Describes a run of a case that was just measured, with the revision according to git.
     pub fn now(case: &Case, size: Size, seconds: f64) -> Self {
         let git = |args: &[&str]| {
             let output = std::process::Command::new("git").args(args).output().ok()?;
@@ -192,7 +192,7 @@ impl Run {
     }
 }
 
-/// How many figures with a bound there are, and how far the worst of them goes.
+/// The number of figures with a bound, the number of those within it, and the worst of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Tally {
     bounded: usize,
@@ -200,12 +200,12 @@ struct Tally {
     worst: Worst,
 }
 
-/// The figure that is the farthest beyond its bound, or the nearest to it.
+/// The figure that exceeds its bound most, or is nearest to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Worst {
-    /// Of figures with a bound above 0, in parts of it.
+    /// The largest of the figures with a bound above 0, divided by its bound.
     share: Option<f64>,
-    /// Of figures that should be 0.
+    /// The largest of the figures whose bound is 0.
     count: Option<f64>,
 }
 
@@ -216,7 +216,7 @@ impl Tally {
             let Some(bound) = figure.bound else { continue };
             tally.bounded += 1;
             tally.hold += usize::from(figure.passes());
-            // What is not a number is beyond everything.
+            // NaN exceeds every bound.
             let measured = if figure.measured.is_nan() { f64::INFINITY } else { figure.measured };
             let (worst, reached) = if bound > 0.0 {
                 (&mut tally.worst.share, measured / bound)
@@ -260,9 +260,9 @@ impl std::fmt::Display for Worst {
     }
 }
 
-/// A figure without a bound with that of the others for the same.
+/// Returns a figure with the bound of other figures of the same quantity if it has none.
 fn bounded(figure: Figure, others: &[Figure]) -> Figure {
-    // Behind that stand the seeds that a backend failed at.
+    // The text ends with the seeds at which a backend failed.
     let same = |what: &str| what.split(", seeds").next().map(str::to_owned);
     let alike = others.iter().filter(|other| same(&other.what) == same(&figure.what));
     let bound = figure.bound.or_else(|| alike.filter_map(|other| other.bound).reduce(f64::max));
@@ -318,7 +318,12 @@ mod tests {
         report.add(run("12", Size::Full), figures);
         report.add(run("4", Size::Full), vec![figure("f64", "NaN", 0.0, Some(0.0))]);
         let page = report.page("textbook").unwrap();
-        assert!(page.contains("Of 4 figures with a bound 2 hold; of the naive tracer's 2 hold 1."), "{page}");
+        assert!(
+            page.contains(
+                "Of 4 figures with a bound 2 are within it; of the naive tracer's 2 figures 1 are."
+            ),
+            "{page}"
+        );
         let row =
             |number: &str| page.lines().find(|line| line.starts_with(&format!("| {number} | **"))).unwrap();
         assert!(

@@ -1,4 +1,4 @@
-//! The picture does not tell how objects were searched: by masks, lists or a tree, in tiles of any shape.
+//! The picture does not depend on the search structure (masks, lists or a tree) or on the shape of the tiles.
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -10,13 +10,13 @@ use super::nasty::{Kind, first_seed};
 use super::{everyday, nasty};
 use crate::backends::{Backend, packets};
 
-/// Seeds of scenes where a tile or a leaf once ended a triangle that is thin, or seen from the side.
+/// Seeds of scenes in which a tile or a leaf once cut off a triangle that is thin or seen edge-on.
 const ONCE_TOLD_APART: [&[u64]; 2] = [
     &[1137, 1251, 1566, 5301, 5706, 7917, 8496, 9537, 12_456, 12_672, 14_487, 25_971, 37_791, 48_147, 54_381],
     &[],
 ];
 
-/// Each scene searched in every way: the same picture bit for bit.
+/// Draws each scene with every search structure, and checks that the pictures are equal bit for bit.
 pub(super) fn scenes(_: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let kinds = [nasty::KINDS, everyday::KINDS];
     let mut seeds: Vec<(&[Kind], u64)> = Vec::new();

@@ -1,4 +1,4 @@
-//! What hard cases have in common: random numbers, scenes for rays that are given, and what is right for a ray.
+//! Shared parts of the hard cases: random numbers, scenes for given rays, and the true hit of a ray.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -9,12 +9,12 @@ use crate::backends::{Backend, Hit, Ray};
 use crate::oracle;
 use crate::scenes::{looking_at, single};
 
-/// A random number generator of a case's own.
+/// Returns the random number generator of a case.
 pub(super) fn random(case: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(SEED.wrapping_mul(1000) + case)
 }
 
-/// A point of the unit sphere.
+/// Returns a point of the unit sphere.
 pub(super) fn direction(rng: &mut fastrand::Rng) -> DVec3 {
     loop {
         let v = DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 2.0 - 1.0;
@@ -24,14 +24,15 @@ pub(super) fn direction(rng: &mut fastrand::Rng) -> DVec3 {
     }
 }
 
-/// A scene of objects alone, for rays that are given.
+/// Returns a scene of objects alone, for given rays.
 pub(super) fn objects_only(objects: Vec<Object>) -> Result<Scene> {
     let mut scene = Scene::new(Screen::new(1, 1)?, Camera::Orthographic);
     scene.objects = objects.into();
     Ok(scene)
 }
 
-/// The nearest hits on an object of rays that are those of a camera: it stands wherever rays start.
+/// Returns the nearest hits of rays on an object. A camera stands at the origin of each ray, so that the rays are
+/// camera rays.
 pub(super) fn from_eyes(backend: &Backend, object: Object, rays: &[Ray]) -> Result<Vec<Option<Hit>>> {
     let mut hits = Vec::new();
     for rays in rays.chunk_by(|a, b| a.origin == b.origin) {
@@ -42,8 +43,8 @@ pub(super) fn from_eyes(backend: &Backend, object: Object, rays: &[Ray]) -> Resu
     Ok(hits)
 }
 
-/// A scene of objects that a camera at `eye` sees `width` wide a unit of distance, and whose rays are given: what
-/// chooses the arithmetic looks at all of it.
+/// Returns a scene of objects, for given rays. The camera at `eye` sees `width` per unit of distance; it matters
+/// because the choice of the precision depends on the entire scene.
 pub(super) fn objects_seen(objects: Vec<Object>, eye: DVec3, target: DVec3, width: f64) -> Result<Scene> {
     let mut scene = objects_only(objects)?;
     scene.screen = Screen::new(1000, 1000)?;
@@ -51,13 +52,13 @@ pub(super) fn objects_seen(objects: Vec<Object>, eye: DVec3, target: DVec3, widt
     Ok(scene)
 }
 
-/// A ray from `origin` towards `target`, rounded to `f32`, about of unit length.
+/// Returns a ray from `origin` towards `target`, rounded to `f32`, approximately of unit length.
 pub(super) fn aimed(origin: DVec3, target: DVec3) -> Ray {
     let origin = single(origin);
     Ray { origin, direction: single((target - origin).normalize()) }
 }
 
-/// What is right for a ray: distance in lengths of the direction, normal.
+/// The true hit of a ray: its distance in units of the length of the direction, and its normal.
 pub(super) struct Truth {
     pub(super) t: f64,
     pub(super) normal: DVec3,

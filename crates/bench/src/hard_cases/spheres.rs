@@ -1,4 +1,4 @@
-//! Spheres that are far away, huge, only touched, or around the eye.
+//! Spheres that are far away, huge, barely hit, or around the eye.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -14,8 +14,8 @@ fn sphere(radius: f64, center: DVec3) -> Result<Sphere> {
     Ok(Sphere::new(radius, center, Material::default())?)
 }
 
-/// Wrong only within 4 ulp (of the origin's distance, the largest number that takes part) of the limb; the error of the
-/// distance for rays through the inner 0.99 r.
+/// Checks that hits and misses are wrong only within 4 ulp of the limb (ulp of the distance from the origin, the
+/// largest number involved). Also measures the error of the distance for rays through the inner 0.99 r.
 pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for distance in [1e1, 1e2, 1e3, 1e4, 1e6] {
         let mut rng = random(1);
@@ -27,7 +27,7 @@ pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -
             let objects = [Object::Sphere(ball.clone())];
             let rays: Vec<Ray> = (0..each)
                 .map(|k| {
-                    // Every other ray goes for the limb, where the others seldom pass.
+                    // Every other ray aims at the limb, where random rays are rare.
                     let reach = if k % 2 == 0 { rng.f64().sqrt() } else { 0.98 + 0.04 * rng.f64() };
                     let aside = direction(&mut rng).cross((ball.center() - origin).normalize());
                     aimed(origin, ball.center() + reach * aside.normalize_or_zero())
@@ -51,7 +51,7 @@ pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -
         }
         for (backend, (limb, error)) in backends.iter().zip(worst) {
             let all = spheres * each;
-            // Beyond 1e4 radii `f32` alone promises nothing: there the program chooses `f64`.
+            // Beyond 1e4 radii nothing is promised for forced `f32`: the program chooses `f64` there.
             let near = distance <= 1e4;
             let double = backend.arithmetic == Arithmetic::Double || !near;
             let bound = if double { 1e-8 } else { 1e-6 * distance };
@@ -69,13 +69,13 @@ pub(super) fn distant(backends: &[Backend], size: Size, figures: &mut Figures) -
     Ok(())
 }
 
-/// The relative error of the distance to the ground.
+/// Measures the relative error of the distance to the ground.
 pub(super) fn horizon(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     const RADIUS: f64 = 1e7;
     let objects = [Object::Sphere(sphere(RADIUS, DVec3::new(0.0, -RADIUS, 0.0))?)];
     let scene = objects_seen(objects.to_vec(), DVec3::Y, DVec3::new(1.0, 0.5, 0.0), 1.0)?;
     let mut rng = random(3);
-    // Down to the horizon at a depression of 4.5e-4; from 0.1 on downwards for `f32` by force.
+    // The horizon is at a depression of 4.5e-4. Forced `f32` is bounded only from a depression of 0.1.
     for (what, least) in [("steeper than 0.1", 0.1f64), ("down to 1.1 of the horizon's depression", 4.92e-4)]
     {
         let rays: Vec<Ray> = (0..size.pick(400, 20_000))
@@ -101,7 +101,7 @@ pub(super) fn horizon(backends: &[Backend], size: Size, figures: &mut Figures) -
     Ok(())
 }
 
-/// Rays whose line passes the centre at r + k ulp: along the axes, where the ray is exact, and askew.
+/// Measures rays whose line passes the centre at r + k ulp: along the axes, where the ray is exact, and askew.
 pub(super) fn tangent(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     for backend in backends {
         let (mut axial, mut askew, mut invalid, mut count) = (0f64, 0f64, 0, 0);
@@ -154,7 +154,7 @@ pub(super) fn tangent(backends: &[Backend], size: Size, figures: &mut Figures) -
     Ok(())
 }
 
-/// The right one of two roots, from points that are exactly on the surface and from the inside.
+/// Checks that the right one of two roots is returned, for rays from points exactly on the surface and from the inside.
 pub(super) fn inside(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(5);
     let mut sets: Vec<(Object, Vec<Ray>)> = Vec::new();
@@ -174,7 +174,7 @@ pub(super) fn inside(backends: &[Backend], size: Size, figures: &mut Figures) ->
             let within = single(center + depth * direction(&mut rng));
             around(within, &mut rng, 16);
         }
-        // Into the sphere, ever more along its surface: to 16 roundoffs of f32.
+        // Rays into the sphere that are increasingly tangential to its surface: down to 16 roundoffs of f32.
         for p in on {
             let (u, v) = p.normalize().any_orthonormal_pair();
             for k in 0..size.pick(40, 2000) {
@@ -222,7 +222,7 @@ pub(super) fn inside(backends: &[Backend], size: Size, figures: &mut Figures) ->
     Ok(())
 }
 
-/// Each pixel shows an object that the oracle sees within half a pixel of it.
+/// Checks that each pixel shows an object that the oracle sees within half a pixel of it.
 pub(super) fn giant_and_dwarf(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let objects = [
         Object::Sphere(sphere(1e7, DVec3::new(0.0, -1e7, 0.0))?),

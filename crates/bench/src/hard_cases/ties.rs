@@ -8,7 +8,7 @@ use super::figures::{Figures, Size};
 use super::setup::{aimed, direction, objects_only, objects_seen, random};
 use crate::backends::Backend;
 
-/// Each object of a scene several times over, in mixed order: every hit is that of the first copy.
+/// Checks scenes in which each object appears several times, in mixed order: every hit is that of the first copy.
 pub(super) fn identical(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(24);
     for copies in [2, 30] {
@@ -48,7 +48,7 @@ pub(super) fn identical(backends: &[Backend], size: Size, figures: &mut Figures)
     pictures(backends, size, figures)
 }
 
-/// Later copies are bright and first ones are dark, whatever the number of threads.
+/// Checks pictures in which later copies are bright and first ones are dark. The number of threads must not matter.
 fn pictures(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let mut rng = random(241);
     let side = size.pick(70, 500);
@@ -101,7 +101,8 @@ fn pictures(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<(
     Ok(())
 }
 
-/// Faces of two boxes and two triangles in one plane that is square to the rays: computed distances are equal.
+/// Checks faces of two boxes and two triangles in one plane that is perpendicular to the rays: computed distances are
+/// equal.
 fn faces(backends: &[Backend], size: Size, figures: &mut Figures) -> Result<()> {
     let surface = Material::default();
     let cuboid =

@@ -2,11 +2,9 @@
 //!
 //! It knows nothing of how the tracer writes groups out.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use glam::{DMat3, DVec3};
-use rayfold_scene::{
-    Cone, Cuboid, Cylinder, Disc, Material, Object, Placement, Plane, Sphere, Torus, Triangle,
-};
+use rayfold_scene::{Motion, Object, Placement};
 
 /// The rotations of a cube.
 pub(super) fn right_turns() -> Vec<DMat3> {
@@ -42,24 +40,25 @@ pub(super) fn turn(placement: &Placement, p: DVec3) -> DVec3 {
 /// # Errors
 /// When it is an instance, or a number leaves its range.
 pub(super) fn written_out(object: &Object, by: &Placement) -> Result<Object> {
-    let scale = by.scale();
-    let at = |p: DVec3| place(by, p);
-    let to = |v: DVec3| turn(by, v);
-    let material: Material = object.material().clone();
-    Ok(match object {
-        Object::Sphere(o) => Sphere::new(scale * o.radius(), at(o.center()), material)?.into(),
-        Object::Triangle(o) => Triangle::new(o.vertices().map(at), material)?.into(),
-        Object::Cuboid(o) => Cuboid::new(o.corners().map(at), material)?.into(),
-        Object::Plane(o) => Plane::new(at(o.point()), to(o.normal()), material)?.into(),
-        Object::Disc(o) => Disc::new(scale * o.radius(), at(o.center()), to(o.normal()), material)?.into(),
-        Object::Cylinder(o) => Cylinder::new(scale * o.radius(), o.ends().map(at), material)?.into(),
-        Object::Cone(o) => Cone::new(o.radii().map(|r| scale * r), o.ends().map(at), material)?.into(),
-        Object::Torus(o) => {
-            let (radius, thickness) = (scale * o.radius(), scale * o.thickness());
-            Torus::new(radius, thickness, at(o.center()), to(o.normal()), material)?.into()
-        }
-        Object::Instance(_) => bail!("an object of a group"),
-    })
+    ensure!(!matches!(object, Object::Instance(_)), "an object of a group");
+    Ok(object.moved(&WrittenOut(by), object.material().clone())?)
+}
+
+/// A placement by right angles, its numbers worked out here.
+struct WrittenOut<'a>(&'a Placement);
+
+impl Motion for WrittenOut<'_> {
+    fn point(&self, position: DVec3) -> DVec3 {
+        place(self.0, position)
+    }
+
+    fn direction(&self, direction: DVec3) -> DVec3 {
+        turn(self.0, direction)
+    }
+
+    fn length(&self, length: f64) -> f64 {
+        self.0.scale() * length
+    }
 }
 
 #[cfg(test)]

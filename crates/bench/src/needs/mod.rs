@@ -1,8 +1,8 @@
-//! `rayfold-bench needs`: what a scene pays for parts of the tracer that it does not use.
+//! `rayfold-bench needs`: the cost to a scene of parts of the tracer that it does not use.
 //!
-//! The tracer is built whole and without parts (its cargo features), and instructions are counted by valgrind: the same on
-//! every run, on a busy machine too. valgrind's processor has AVX2 and not AVX-512, so that this is the path that is counted,
-//! and the only one that is built.
+//! The tracer is built whole and without parts (its cargo features). valgrind counts instructions, which are the same
+//! on every run, also on a busy machine. valgrind's processor has AVX2 and not AVX-512, so only the AVX2 path is built
+//! and counted.
 
 mod parts;
 mod subjects;
@@ -16,43 +16,43 @@ use anyhow::{Context, Result, ensure};
 use rayfold_files::OutputFile;
 use rayon::prelude::*;
 
-use self::parts::{Build, PARTS, builds, uses};
+use self::parts::{Build, builds, parts, uses};
 use self::subjects::{Subject, subjects};
 
-/// What to do with the counts.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives needs.md
+    /// Write needs.md into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
     /// Print the table and write nothing
     #[arg(long)]
     check: bool,
-    /// Only builds without a part whose name holds this; writes nothing
+    /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
 }
 
-/// The most that a scene may execute beyond a build without what it does not use, in percent.
+/// The goal: a scene executes at most this many more instructions than in a build without its unused parts, in percent.
 const MOST: f64 = 0.5;
 
-/// The driver's exit code for a scene that needs what it was built without.
+/// The driver's exit code for a scene that needs a part that its build lacks.
 const LEFT_OUT: i32 = 3;
 
-/// Builds that are made at once: the tracer is compiled in one piece, on one core.
+/// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;
 
 /// A line of the table.
 struct Row {
     subject: &'static str,
-    /// What the build is without.
+    /// The parts that the build lacks.
     without: String,
     whole: u64,
     less: u64,
 }
 
 impl Row {
-    /// What the whole build executes beyond the other, in percent.
+    /// Returns the excess of instructions of the whole build over the other, in percent.
     fn beyond(&self) -> f64 {
         100.0 * (self.whole as f64 / self.less as f64 - 1.0)
     }
@@ -69,8 +69,8 @@ impl Row {
 /// Counts, prints the table and writes the report.
 ///
 /// # Errors
-/// When a part costs a scene too much that does not use it, when a build draws what it cannot or another picture, or
-/// when valgrind or cargo fails.
+/// Fails if a part costs too much to a scene that does not use it, if a build draws a scene whose parts it lacks or
+/// draws another picture, or if valgrind or cargo fails.
 pub fn run(args: &Args) -> Result<()> {
     ensure!(
         Command::new("valgrind").arg("--version").output().is_ok_and(|run| run.status.success()),
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The driver whole, and as each of the builds.
+/// Builds the driver whole and without parts.
 fn build(builds: &[Build], folder: &Path) -> Result<Vec<PathBuf>> {
     let next = AtomicUsize::new(0);
     let builder = |place: usize| -> Result<Vec<(usize, PathBuf)>> {
@@ -143,12 +143,12 @@ fn build(builds: &[Build], folder: &Path) -> Result<Vec<PathBuf>> {
 fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<PathBuf> {
     let name = if without.is_empty() { "whole".into() } else { format!("without {}", without.join(", ")) };
     eprintln!("building the tracer, {name}");
-    let with: Vec<_> = PARTS.iter().map(|part| part.feature).filter(|part| !without.contains(part)).collect();
+    let with: Vec<_> = parts().map(|(part, _)| part).filter(|part| !without.contains(part)).collect();
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let status = Command::new(cargo)
         .args(["build", "--quiet", "--locked", "--release", "--package", "rayfold-tracer"])
         .args(["--example", "frames", "--no-default-features", "--features", &with.join(",")])
-        // In one piece: how the compiler cuts it into several depends on what is in it, and moves counts by up to 10 %.
+        // One codegen unit, because the division into several depends on the code, and changes counts by up to 10 %.
         .args(["--config", "profile.release.package.rayfold-tracer.codegen-units=1"])
         .arg("--target-dir")
         .arg(target)
@@ -160,7 +160,8 @@ fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<Path
     Ok(program.to_owned())
 }
 
-/// A row for each build that leaves out what the scene does not use; the others must refuse it.
+/// Returns a row for each build that lacks only parts that the scene does not use. Checks that the other builds refuse
+/// the scene.
 fn compare(subject: &Subject, script: &Path, (builds, programs): (&[Build], &[PathBuf])) -> Result<Vec<Row>> {
     let (whole, picture) = frame(&programs[0], script, subject.precision)?;
     let mut rows = Vec::new();
@@ -182,7 +183,7 @@ fn compare(subject: &Subject, script: &Path, (builds, programs): (&[Build], &[Pa
     Ok(rows)
 }
 
-/// Instructions of one frame, and the digest of some.
+/// Returns the instructions of one frame, and a digest of several frames.
 fn frame(program: &Path, script: &Path, precision: &str) -> Result<(u64, String)> {
     let (one, _) = count(program, script, "1", precision)?;
     let (three, digest) = count(program, script, "3", precision)?;
@@ -205,7 +206,7 @@ fn count(program: &Path, script: &Path, times: &str, precision: &str) -> Result<
     Ok((collected.trim().parse()?, answer))
 }
 
-/// The most that any of the rows is beyond what its scene needs.
+/// Returns the row with the largest excess.
 fn worst<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     rows.max_by(|a, b| a.beyond().total_cmp(&b.beyond()))
 }
@@ -214,21 +215,23 @@ fn report(rows: &[Row]) -> Result<String> {
     let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
     let verdict = if beyond.is_empty() {
         let most = worst(rows.iter()).context("nothing counted")?;
-        format!("All {} pairs hold; the most is {}.", rows.len(), most.told())
+        format!("All {} pairs are within the bound; the largest excess is {}.", rows.len(), most.told())
     } else {
         format!("**This run failed** for {} of {} pairs: {}.", beyond.len(), rows.len(), beyond.join("; "))
     };
     let mut text = format!(
-        "# Only what a scene needs\n\n\
-         Written by `cargo run -p rayfold-bench -- needs`; `.ci/run` runs it with `--check`. Instructions of a frame, \
-         preparations included, on one thread and the AVX2 path, counted by `valgrind --tool=callgrind`: by the whole \
-         tracer, compiled in one piece, and by one that was built without a part that the scene does not use. *Beyond* is what the whole one \
-         executes more; the run fails where it is over {MOST} %. Every pair draws the same picture bit for bit, and a \
-         scene that uses what a build leaves out is refused by it. Those without a part of version 1 of the language \
-         are without all of version 2 besides. Parts of version 2 are left out several at a time, such that for each scene of \
-         version 2 and each part that it does not use there is a build without that part.\n\n\
+        "# The cost of unused features\n\n\
+         Written by `cargo run -p rayfold-bench -- needs`; `.ci/run` runs it with `--check`. `valgrind \
+         --tool=callgrind` counts the instructions of a frame, including its preparation, on one thread and the AVX2 \
+         path. It does so for the whole tracer, compiled as one unit, and for builds without a part that the scene \
+         does not use. *Beyond* is the excess of the whole tracer; the run fails if it is more than {MOST} %. Every \
+         pair draws the same picture bit for bit, and a build refuses a scene that uses a part which it lacks. Builds \
+         without a part of version 1 of the language also lack all of version 2. Parts of version 2 are left out \
+         several at a time, such that for each scene of version 2 and each part that it does not use there is a build \
+         without that part.\n\n\
          {verdict}\n\n\
-         | built without | scenes | most beyond | of |\n| --- | --- | --- | --- |\n"
+         | built without | scenes | most beyond | of |\n\
+         | --- | --- | --- | --- |\n"
     );
     for of_build in rows.chunk_by(|a, b| a.without == b.without) {
         let most = worst(of_build.iter()).context("a build without scenes")?;
@@ -259,7 +262,9 @@ mod tests {
     fn a_report_tells_that_all_hold() {
         let report = report(&rows(100_500)).expect("rows of each part");
         assert!(
-            report.contains("All 13 pairs hold; the most is balls without mirrors (+0.50 %)."),
+            report.contains(
+                "All 13 pairs are within the bound; the largest excess is balls without mirrors (+0.50 %)."
+            ),
             "{report}"
         );
         assert!(!report.contains("failed"), "{report}");
@@ -270,6 +275,6 @@ mod tests {
         let report = report(&rows(100_600)).expect("rows of each part");
         let told = "**This run failed** for 1 of 13 pairs: balls without mirrors (+0.60 %).";
         assert!(report.contains(told), "{report}");
-        assert!(!report.contains("hold"), "{report}");
+        assert!(!report.contains("within the bound"), "{report}");
     }
 }

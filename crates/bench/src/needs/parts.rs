@@ -5,45 +5,29 @@
 //! of so many parts would take too long for what every change must pass.
 
 use glam::DVec3;
-use rayfold_scene::{Light, Object, Scene, Tone};
+use rayfold_scene::{Light, Object, Scene};
+use rayfold_tracer::parts::{PARTS, is_turned_box};
 
-/// A part: its cargo feature, and which scenes use it.
-pub(super) struct Part {
-    pub(super) feature: &'static str,
-    pub(super) is_used: fn(&Scene) -> bool,
-}
+/// Returns whether a scene uses a part.
+type IsUsed = fn(&Scene) -> bool;
 
-/// All parts that can be left out.
-pub(super) const PARTS: [Part; 22] = [
-    Part { feature: "boxes", is_used: |scene| has(scene, |o| matches!(o, Object::Cuboid(_))) },
-    Part { feature: "triangles", is_used: |scene| has(scene, |o| matches!(o, Object::Triangle(_))) },
-    Part { feature: "mirrors", is_used: |scene| scene.objects.iter().any(is_mirror) || uses("glass", scene) },
-    Part { feature: "shadows", is_used: |scene| !scene.lights.is_empty() && !is_one_ball(scene) },
-    Part { feature: "tree", is_used: |scene| scene.objects.len() > 64 },
-    Part { feature: "beyond", is_used: has_more_than_version_1 },
-    Part { feature: "planes", is_used: |scene| has(scene, |o| matches!(o, Object::Plane(_))) },
-    Part { feature: "discs", is_used: |scene| has(scene, |o| matches!(o, Object::Disc(_))) },
-    Part {
-        feature: "cones",
-        is_used: |scene| has(scene, |o| matches!(o, Object::Cylinder(_) | Object::Cone(_))),
-    },
-    Part { feature: "tori", is_used: |scene| has(scene, |o| matches!(o, Object::Torus(_))) },
-    Part { feature: "turned-boxes", is_used: |scene| scene.objects.iter().any(is_turned_box) },
-    Part {
-        feature: "groups",
-        is_used: |scene| scene.objects.iter().any(|o| matches!(o, Object::Instance(_))),
-    },
-    Part { feature: "highlights", is_used: |scene| is_made(scene, |f| f.shine.is_some()) },
-    Part { feature: "patterns", is_used: |scene| is_made(scene, |f| f.pattern.is_some()) },
-    Part { feature: "glass", is_used: |scene| is_made(scene, |f| f.glass.is_some()) },
-    Part { feature: "lamps", is_used: |scene| scene.lights.iter().any(|l| matches!(l, Light::Lamp(_))) },
-    Part { feature: "skies", is_used: |scene| scene.background.color().is_none() },
-    Part { feature: "srgb", is_used: |scene| scene.tone == Tone::Srgb },
-    Part { feature: "samples", is_used: is_sampled },
-    Part { feature: "lenses", is_used: |scene| is_sampled(scene) && scene.lens.radius() > 0.0 },
-    Part { feature: "shutters", is_used: |scene| is_sampled(scene) && scene.shutter.open() > 0.0 },
-    Part { feature: "extents", is_used: |scene| is_sampled(scene) && scene.lights.iter().any(has_extent) },
+/// The parts of version 1, and those that all shapes of version 2 share: cargo features, and the scenes that use them.
+const OF_VERSION_1: [(&str, IsUsed); 7] = [
+    ("boxes", |scene| has(scene, |o| matches!(o, Object::Cuboid(_)))),
+    ("triangles", |scene| has(scene, |o| matches!(o, Object::Triangle(_)))),
+    ("mirrors", |scene| scene.objects.iter().any(is_mirror) || uses("glass", scene)),
+    ("shadows", |scene| !scene.lights.is_empty() && !is_one_ball(scene)),
+    ("tree", |scene| scene.objects.len() > 64),
+    ("beyond", has_more_than_version_1),
+    ("glass", |scene| {
+        scene.objects.iter().any(|o| o.material().finish().is_some_and(|finish| finish.glass.is_some()))
+    }),
 ];
+
+/// Returns all parts that can be left out, each with the scenes that use it.
+pub(super) fn parts() -> impl Iterator<Item = (&'static str, IsUsed)> {
+    OF_VERSION_1.into_iter().chain(PARTS.iter().map(|part| (part.feature, part.is_used)))
+}
 
 /// All of version 2.
 pub(super) const VERSION_2: &[&str] = &[
@@ -107,7 +91,7 @@ pub(super) fn builds() -> Vec<Build> {
 
 /// Whether a scene uses the part of this name.
 pub(super) fn uses(feature: &str, scene: &Scene) -> bool {
-    PARTS.iter().any(|part| part.feature == feature && (part.is_used)(scene))
+    parts().any(|(part, is_used)| part == feature && is_used(scene))
 }
 
 fn has(scene: &Scene, is_it: fn(&Object) -> bool) -> bool {
@@ -123,17 +107,6 @@ pub(super) fn is_mirror(object: &Object) -> bool {
     object.material().mirror() != DVec3::ZERO || pattern.is_some_and(|p| p.other.mirror() != DVec3::ZERO)
 }
 
-fn is_turned_box(object: &Object) -> bool {
-    let Object::Instance(instance) = object else { return false };
-    let is_along_axes = |x: &f64| *x == 0.0 || x.abs() == 1.0;
-    matches!(instance.object(), Object::Cuboid(_))
-        && !instance.placement().rotation().to_cols_array().iter().all(is_along_axes)
-}
-
-fn is_made(scene: &Scene, is_it: fn(&rayfold_scene::model::Finish) -> bool) -> bool {
-    scene.objects.iter().any(|object| object.material().finish().is_some_and(is_it))
-}
-
 /// Skies, lamps, finishes, and shapes with axes of their own.
 fn has_more_than_version_1(scene: &Scene) -> bool {
     let is_old = |object: &Object| match object {
@@ -142,24 +115,11 @@ fn has_more_than_version_1(scene: &Scene) -> bool {
             !is_turned_box(object)
                 && matches!(instance.object(), Object::Sphere(_) | Object::Cuboid(_) | Object::Triangle(_))
         }
-        Object::Plane(_) | Object::Disc(_) | Object::Cylinder(_) | Object::Cone(_) | Object::Torus(_) => {
-            false
-        }
+        _ => false,
     };
     scene.background.color().is_none()
         || scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)))
         || scene.objects.iter().any(|object| !is_old(object) || object.material().finish().is_some())
-}
-
-fn is_sampled(scene: &Scene) -> bool {
-    scene.samples.most() > 1
-}
-
-fn has_extent(light: &Light) -> bool {
-    match light {
-        Light::Directional(sun) => sun.angle() > 0.0,
-        Light::Lamp(lamp) => lamp.radius() > 0.0,
-    }
 }
 
 /// Nothing is in the light of a ball alone.
@@ -175,9 +135,9 @@ mod tests {
     #[test]
     fn for_each_scene_there_is_a_build_without_each_part_that_it_does_not_use() {
         let (subjects, builds) = (subjects().unwrap(), builds());
-        for Part { feature, .. } in &PARTS {
+        for (feature, _) in parts() {
             assert!(
-                builds.iter().any(|build| build.without.contains(feature)),
+                builds.iter().any(|build| build.without.contains(&feature)),
                 "no build is without {feature}"
             );
         }
@@ -187,9 +147,9 @@ mod tests {
                     && !build.without.iter().any(|part| uses(part, &subject.scene))
             };
             // No other part of version 2 is there without `beyond`: that is for scenes of version 1.
-            let parts = PARTS.iter().map(|part| part.feature);
-            let of_its_version =
-                parts.filter(|part| VERSION_2.contains(part) == subject.is_of_version_2 && *part != "beyond");
+            let of_its_version = parts()
+                .map(|(feature, _)| feature)
+                .filter(|part| VERSION_2.contains(part) == subject.is_of_version_2 && *part != "beyond");
             for feature in of_its_version.filter(|feature| !uses(feature, &subject.scene)) {
                 let has_one = builds.iter().filter(is_its).any(|build| build.without.contains(&feature));
                 assert!(has_one, "{}: no build without {feature}", subject.name);
@@ -200,7 +160,7 @@ mod tests {
     #[test]
     fn each_part_is_used_by_a_scene_and_not_by_another() {
         let subjects = subjects().unwrap();
-        for Part { feature, is_used } in &PARTS {
+        for (feature, is_used) in parts() {
             let count = subjects.iter().filter(|subject| is_used(&subject.scene)).count();
             assert!((1..subjects.len()).contains(&count), "{feature}: {count}");
         }

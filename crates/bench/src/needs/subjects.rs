@@ -1,4 +1,4 @@
-//! The scenes that are counted: each lacks something, and has much else or little.
+//! The scenes for which instructions are counted. Each lacks some features, and uses many others or few.
 
 use anyhow::{Context, Result, bail};
 use glam::DVec3;
@@ -7,20 +7,20 @@ use rayfold_scene::{Limits, Object, Scene, parse};
 use super::parts::is_mirror;
 use crate::scenes::{cloud, example, rock, table};
 
-/// A scene, and the numbers that it is drawn with.
+/// A scene, and the precision with which it is drawn.
 pub(super) struct Subject {
     pub(super) name: &'static str,
     pub(super) precision: &'static str,
-    /// In its first frame.
+    /// The scene of its first frame.
     pub(super) scene: Scene,
     pub(super) script: String,
     pub(super) is_of_version_2: bool,
 }
 
-/// All of them.
+/// Returns all scenes.
 ///
 /// # Errors
-/// When an example of the project cannot be read.
+/// Fails if an example of the project cannot be read.
 pub(super) fn subjects() -> Result<Vec<Subject>> {
     let mut subjects = of_version_1()?;
     for (name, lines) in OF_VERSION_2 {
@@ -33,14 +33,14 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
     Ok(subjects)
 }
 
-/// Camera and sun of those of version 2.
+/// The camera and the sun of the scenes of version 2.
 const BEFORE: &str = "\
 Screen 160 120
 Camera 0 2 8   0 -0.2 -1   0 1 0   1   -0.6 -0.45 0.6 0.45
 Ilight 0.9 0.9 0.8   -1 -2 -1
 ";
 
-/// Each with as little as can be beside what its name says.
+/// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
 const OF_VERSION_2: [(&str, &str); 16] = [
     (
         "a plane and balls",
@@ -215,7 +215,7 @@ fn is_ball(object: &Object) -> bool {
     matches!(object, Object::Sphere(_))
 }
 
-/// The box around a ball, without its mirror.
+/// Returns the bounding box of a sphere, without its mirror.
 fn boxed(object: &Object) -> Result<Object> {
     let Object::Sphere(ball) = object else { bail!("not a ball") };
     let reach = DVec3::splat(0.8 * ball.radius());

@@ -1,18 +1,19 @@
-//! Mirrors and glass: where light goes, and how much of it.
+//! Mirrors and glass: the directions and the shares of light.
 
 use super::real::{Real, Vector};
 
-/// The direction mirrored at a surface of this unit normal.
+/// Returns the direction reflected at a surface with this unit normal.
 pub fn reflected(direction: &Vector, normal: &Vector) -> Vector {
     let twice = direction.dot(normal).shifted(1);
     direction.plus(&-&twice, normal)
 }
 
-/// The share of light that is mirrored, and where the rest goes, for a unit direction, a unit normal that faces it and
-/// the index of what lies behind over that of what lies before.
+/// Returns the reflected share of light, and the direction of the transmitted rest. The direction and the normal have
+/// unit length, and the normal faces the direction. `index` is the refractive index behind the surface divided by that
+/// before it.
 ///
-/// With c the cosine and g² = index² - 1 + c², Fresnel's mean of both polarisations is
-/// ½·((g - c)/(g + c))²·(1 + ((c·(g + c) - 1)/(c·(g - c) + 1))²), and all of it where g is not real.
+/// With c the cosine and g² = index² - 1 + c², the share is Fresnel's mean of both polarisations: ½·((g - c)/(g +
+/// c))²·(1 + ((c·(g + c) - 1)/(c·(g - c) + 1))²). It is 1 if g is not real.
 pub(super) fn refracted(direction: &Vector, normal: &Vector, index: &Real) -> (Real, Option<Vector>) {
     let one = Real::from(1.0);
     let c = -&direction.dot(normal);

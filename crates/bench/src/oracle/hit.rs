@@ -1,4 +1,4 @@
-//! Which object a ray meets first.
+//! The first hit of a ray.
 
 use glam::DVec3;
 use rayfold_scene::{Glass, Object};
@@ -7,31 +7,33 @@ use super::line::Line;
 use super::real::{Real, Vector};
 use super::shapes;
 
-/// Where a ray meets an object first.
+/// The first hit of a ray with an object.
 #[derive(Clone, Debug)]
 pub struct Hit {
-    /// Position of the object in the script.
+    /// The position of the object in the script.
     pub object: usize,
-    /// In lengths of the direction.
+    /// The distance along the ray, in units of the length of its direction.
     pub t: Real,
-    /// Unit normal, facing the ray. On the edge of a box that of the first axis which leads there, on a rim the side's.
+    /// The unit normal, facing the ray. On the edge of a box it is the normal of the first axis whose face leads to
+    /// that edge; on a rim it is the normal of the side.
     pub normal: Vector,
-    /// Whether normals that point out of the object point along the ray.
+    /// Whether the ray leaves the object: its outward normal points along the ray (positive dot product).
     pub(super) leaves: bool,
 }
 
-/// The nearest hit of the ray exactly as given.
+/// Returns the nearest hit of a ray that is exact in `f64`.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     nearest_on(objects, &Line { origin: origin.into(), direction: direction.into() }, &Real::zero())
 }
 
-/// The nearest hit farther than `start`, in lengths of the direction, of a ray that is itself without rounding.
+/// Returns the nearest hit farther than `start` of an exact ray. Distances are in units of the length of the direction.
 pub fn nearest_beyond(objects: &[Object], origin: &Vector, direction: &Vector, start: &Real) -> Option<Hit> {
     nearest_on(objects, &Line { origin: origin.clone(), direction: direction.clone() }, start)
 }
 
-/// The nearest hit farther away than `start`; of hits at the same distance that of the first object without glass, or else of
-/// the first. Distances that differ by less than one part in 2^400 are the same: roots are rounded.
+/// Returns the nearest hit farther than `start`. If several objects are hit at the same distance, the first one without
+/// glass wins, or else the first. Distances that differ by less than one part in 2^400 are equal, because roots are
+/// rounded.
 pub(super) fn nearest_on(objects: &[Object], line: &Line, start: &Real) -> Option<Hit> {
     let mut best: Option<(usize, Real)> = None;
     for (index, object) in objects.iter().enumerate() {
@@ -50,7 +52,7 @@ pub(super) fn nearest_on(objects: &[Object], line: &Line, start: &Real) -> Optio
     Some(Hit { object, t, normal, leaves })
 }
 
-/// What an object lets through.
+/// Returns the glass of an object, if its material has one.
 pub(super) fn glass_of(object: &Object) -> Option<Glass> {
     object.material().finish().and_then(|finish| finish.glass)
 }

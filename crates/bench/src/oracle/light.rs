@@ -1,4 +1,4 @@
-//! What arrives from a light.
+//! Incident light.
 
 use glam::DVec3;
 use rayfold_scene::{Light, Scene};
@@ -7,16 +7,16 @@ use super::hit::{glass_of, nearest_on};
 use super::line::Line;
 use super::real::{Real, Vector};
 
-/// Light that arrives.
+/// The incident light of a source.
 pub(super) struct Arriving {
-    /// Unit vector to where it comes from.
+    /// The unit vector towards the source.
     pub(super) towards: Vector,
-    /// What is left of it.
+    /// The colour after absorption and attenuation.
     pub(super) color: Vector,
 }
 
-/// `None` where nothing does: from behind, in a shadow, at the lamp itself. Nearer than `start` are the surfaces that `point`
-/// lies on.
+/// Returns the light that arrives at `point`, or `None` if the source is behind the surface, hidden, or at `point`
+/// itself. Surfaces nearer than `start` contain `point` and are ignored.
 pub(super) fn arriving(
     scene: &Scene,
     light: &Light,
@@ -56,7 +56,7 @@ pub(super) fn arriving(
     Some(Arriving { towards, color })
 }
 
-/// max(0, N·h)ⁿ, h halfway between two unit vectors.
+/// Returns max(0, N·h)ⁿ, with h halfway between two unit vectors.
 pub(super) fn highlight(exponent: f64, normal: &Vector, towards: &Vector, towards_eye: &Vector) -> f64 {
     let one = Real::from(1.0);
     let halfway = towards.plus(&one, towards_eye);
@@ -67,6 +67,6 @@ pub(super) fn highlight(exponent: f64, normal: &Vector, towards: &Vector, toward
     if cosine.sign() <= 0 {
         return 0.0;
     }
-    // cosⁿ = e^(n·ln(1 - (1 - cos))), whose last difference is exact here.
+    // cosⁿ = e^(n·ln(1 - (1 - cos))). The inner difference 1 - cos is exact here.
     (exponent * (-(&one - &cosine).to_f64()).ln_1p()).exp()
 }

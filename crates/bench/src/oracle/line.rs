@@ -1,21 +1,21 @@
-//! Rays without rounding, and which of them is a pixel.
+//! Exact rays, and the ray of a pixel.
 
 use glam::DVec3;
 use rayfold_scene::{Camera, Look, Screen};
 
 use super::real::{Real, Vector};
 
-/// A half-line; its direction has any length but zero.
+/// A ray. Its direction has any length but zero.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Where it starts.
+    /// The start of the ray.
     pub origin: Vector,
-    /// Where it goes.
+    /// The direction of the ray.
     pub direction: Vector,
 }
 
 impl Line {
-    /// The ray of a pixel, in the words of the language; indices may be fractions.
+    /// Returns the ray of a pixel, by the formulas of the language reference. Indices may be fractions.
     pub(super) fn of_pixel(camera: &Camera, screen: Screen, x: f64, y: f64) -> Self {
         let pinhole = match camera {
             Camera::Orthographic => {
@@ -29,7 +29,7 @@ impl Line {
         let v = w.cross(&u);
         let along = |from: f64, to: f64, index: f64, count: u32| {
             let (from, to) = (Real::from(from), Real::from(to));
-            // A single sample is the middle; beside it is as near as in an image of a thousand.
+            // A single sample is at the centre. The distance to its neighbours is that of an image of 1,000 pixels.
             let (index, last) =
                 if count == 1 { (index + 500.0, 1000.0) } else { (index, f64::from(count - 1)) };
             let part = Real::from(index).over(&Real::from(last));
@@ -58,7 +58,7 @@ impl Line {
         Self { origin: look.eye().into(), direction: direction.unit() }
     }
 
-    /// The point so many lengths of the direction away.
+    /// Returns the point at the distance `t`, in units of the length of the direction.
     pub(super) fn at(&self, t: &Real) -> Vector {
         self.origin.plus(t, &self.direction)
     }

@@ -1,9 +1,9 @@
-//! What the scene language says, without rounding.
+//! The oracle: the scene language without rounding errors.
 //!
-//! A second implementation of hits, normals and shading, in numbers of 640 bits and the most direct formulas. Where a
-//! tracer and the oracle differ, the tracer has rounded. It shares no code with the tracers, is slow (some 10 µs an
-//! object and ray, a torus a hundred times that) and knows nothing of how they work. Only what may err by 2⁻²⁰ (noise,
-//! powers, the sRGB curve) is left to `f64`.
+//! A second implementation of hits, normals and shading, in numbers of 640 bits and with the most direct formulas. If a
+//! tracer differs from the oracle, the tracer has rounded. The oracle shares no code with the tracers and is slow: some
+//! 10 µs per object and ray, a hundred times that for a torus. Only values that may have an error of 2⁻²⁰ (noise,
+//! powers, the sRGB curve) are computed in `f64`.
 //!
 //! ```
 //! use glam::DVec3;
@@ -38,25 +38,25 @@ pub use line::Line;
 pub use real::{Real, Vector};
 pub use shapes::{edge_clearance, sphere_clearance};
 
-/// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
+/// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     color_at(scene, f64::from(i), f64::from(j))
 }
 
-/// The colour beside a pixel, where the ray of a fractional index goes.
+/// Returns the colour at fractional pixel indices.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
     let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
     let path = Path { start: Real::zero(), bounces: 0, weight: DVec3::ONE.into(), has_met_glass: false };
     color_along(scene, &line, &path).to_dvec3()
 }
 
-/// Which object a pixel shows, and its normal there.
+/// Returns the position of the object that a pixel shows, and its normal there.
 pub fn first_hit(scene: &Scene, i: u32, j: u32) -> Option<(usize, DVec3)> {
     let line = Line::of_pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
     nearest_on(&scene.objects, &line, &Real::zero()).map(|hit| (hit.object, hit.normal.to_dvec3()))
 }
 
-/// The whole image, its first row at the top.
+/// Returns the entire image, its first row at the top.
 pub fn image(scene: &Scene) -> RgbImage {
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let pixels: Vec<_> = (0..width * height)
@@ -66,7 +66,7 @@ pub fn image(scene: &Scene) -> RgbImage {
     RgbImage::from_raw(width, height, pixels).unwrap_or_default()
 }
 
-/// Colours as the language makes levels of them, before they are rounded.
+/// Converts a colour to levels by the language's rule, before they are rounded.
 pub fn shown(tone: Tone, color: DVec3) -> DVec3 {
     let encoded = |light: f64| match tone {
         Tone::Plain => light,
@@ -76,17 +76,17 @@ pub fn shown(tone: Tone, color: DVec3) -> DVec3 {
     255.0 * DVec3::from_array(color.to_array().map(|c| encoded(c.clamp(0.0, 1.0))))
 }
 
-/// The levels of a pixel.
+/// Returns the levels of a pixel.
 pub fn levels(tone: Tone, color: DVec3) -> [u8; 3] {
     shown(tone, color).to_array().map(|level| level.round() as u8)
 }
 
-/// How a ray has come where it starts.
+/// The state of a ray at its start.
 struct Path {
-    /// What it meets nearer than that it has passed.
+    /// Hits nearer than this are ignored.
     start: Real,
     bounces: u32,
-    /// The product of all factors, without signs.
+    /// The product of the absolute values of all factors.
     weight: Vector,
     has_met_glass: bool,
 }
@@ -102,7 +102,7 @@ fn color_along(scene: &Scene, line: &Line, path: &Path) -> Vector {
     let (place, face) = shapes::place(object, line, &hit.t);
     let [ambient, diffuse, mirror] = pattern::coefficients(material, &place, face);
     let point = line.at(&hit.t);
-    // A point on a surface is irrational: the ray that leaves it meets the surface again next to its start.
+    // A point on a surface is rounded, so the ray that leaves it hits the surface again next to its start.
     let farthest = point.to_dvec3().abs().max_element();
     let start = Real::from(shapes::extent(&scene.objects).max(farthest)).shifted(-300);
 

@@ -1,6 +1,6 @@
 //! Perlin's improved noise (SIGGRAPH 2002), as a sum over the corners of a cell.
 
-/// The numbers 0 to 255 as Perlin shuffled them, in hexadecimal.
+/// Perlin's permutation of the numbers 0 to 255, in hexadecimal.
 const SHUFFLED: [&str; 8] = [
     "97a0895b5a0f830dc95f6035c2e907e18c24671e458e086325f0150a17be0694",
     "f778ea4b001ac53e5efcdbcb75230b2039b12158ed953857ae147d88aba844af",
@@ -12,7 +12,7 @@ const SHUFFLED: [&str; 8] = [
     "b854ccb07379322d7f0496fe8aeccd5dde72431d1848f38d80c34e42d73d9cb4",
 ];
 
-/// From the middle of a cube to those of its edges, in the order of the last four bits of a hash.
+/// The directions from the centre of a cube to the centres of its edges, in the order of the last four bits of a hash.
 const EDGES: [[i8; 3]; 16] = [
     [1, 1, 0],
     [-1, 1, 0],
@@ -32,7 +32,7 @@ const EDGES: [[i8; 3]; 16] = [
     [0, -1, -1],
 ];
 
-/// The noise at a place, about -1 to 1.
+/// Returns the noise at a point, approximately in -1..1.
 pub(super) fn noise(place: [f64; 3]) -> f64 {
     let cell = place.map(f64::floor);
     let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! Coefficients where a surface has a pattern.
+//! The coefficients of a patterned surface.
 
 use rayfold_scene::model::Weight;
 use rayfold_scene::{Coefficients, Material};
@@ -6,8 +6,8 @@ use rayfold_scene::{Coefficients, Material};
 use super::noise::noise;
 use super::real::{Real, Vector};
 
-/// Ambient, diffuse and mirror coefficients at a place in the coordinates of the object's numbers; a flat part that is square to
-/// an axis has a number of its own there.
+/// Returns the ambient, diffuse and mirror coefficients at a point, which is in the coordinates of the object's
+/// numbers. `face` is the axis that a flat part is perpendicular to, and its exact coordinate on that axis.
 pub(super) fn coefficients(material: &Material, place: &Vector, face: Option<(usize, f64)>) -> [Vector; 3] {
     let each = |c: Coefficients| [c.ambient(), c.diffuse(), c.mirror()].map(Vector::from);
     let own = each(material.coefficients());

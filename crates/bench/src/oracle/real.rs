@@ -1,7 +1,8 @@
-//! Numbers that are as good as exact, and vectors of them.
+//! Numbers of high precision, and vectors of them.
 //!
-//! Sums, differences and products of numbers that come from `f64`s within 2^±150 of one another are exact in the
-//! discriminants, areas and cross products of the oracle; quotients and roots are right to 190 decimal digits.
+//! For numbers that come from `f64`s within 2^±150 of one another, the sums, differences and products in the
+//! discriminants, areas and cross products of the oracle are exact. Quotients and roots have 190 correct decimal
+//! digits.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -9,7 +10,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 use astro_float_num::{BigFloat, Consts, RoundingMode, Sign};
 use glam::DVec3;
 
-/// Bits of the significand: what `b² - a·c` of a sphere needs for exactness, with room for scenes of wide range.
+/// The bits of the significand. They make `b² - a·c` of a sphere exact, with room for scenes of wide range.
 const BITS: usize = 640;
 const ROUNDING: RoundingMode = RoundingMode::ToEven;
 
@@ -18,37 +19,37 @@ const ROUNDING: RoundingMode = RoundingMode::ToEven;
 pub struct Real(BigFloat);
 
 impl Real {
-    /// Zero.
+    /// Returns zero.
     pub fn zero() -> Self {
         Self::from(0.0)
     }
 
-    /// `self / other`.
+    /// Returns `self / other`.
     pub fn over(&self, other: &Self) -> Self {
         Self(self.0.div(&other.0, BITS, ROUNDING))
     }
 
-    /// Square root of a number that is not negative.
+    /// Returns the square root of a number that is not negative.
     pub fn root(&self) -> Self {
         Self(self.0.sqrt(BITS, ROUNDING))
     }
 
-    /// The tangent of half an angle in degrees.
+    /// Returns the tangent of half an angle in degrees.
     pub(super) fn tangent_of_half(degrees: f64) -> Self {
-        // The cache of constants is only a matter of time.
+        // The cache of constants only saves time.
         let Ok(mut constants) = Consts::new() else { return Self(BigFloat::nan(None)) };
         let half_turn = Self(constants.pi(BITS, ROUNDING));
         let angle = (&Self::from(degrees) * &half_turn).over(&Self::from(360.0));
         Self(angle.0.tan(BITS, ROUNDING, &mut constants))
     }
 
-    /// The smallest whole number that is not less, for numbers below 2^50.
+    /// Returns the smallest integer that is not less, for numbers below 2^50.
     pub(super) fn ceiling(&self) -> f64 {
         let near = self.to_f64().ceil();
         [near - 1.0, near, near + 1.0].into_iter().find(|&whole| Self::from(whole) >= *self).unwrap_or(near)
     }
 
-    /// -1, 0 or 1.
+    /// Returns -1, 0 or 1.
     pub fn sign(&self) -> i32 {
         if self.0.is_zero() {
             0
@@ -59,12 +60,12 @@ impl Real {
         }
     }
 
-    /// The absolute value.
+    /// Returns the absolute value.
     pub fn magnitude(&self) -> Self {
         Self(self.0.abs())
     }
 
-    /// `self · 2^exponent`.
+    /// Returns `self · 2^exponent`.
     pub fn shifted(&self, exponent: i32) -> Self {
         let mut shifted = self.0.clone();
         if let Some(e) = shifted.exponent().filter(|_| !shifted.is_zero()) {
@@ -73,20 +74,20 @@ impl Real {
         Self(shifted)
     }
 
-    /// The nearest `f64`.
+    /// Returns the nearest `f64`.
     pub fn to_f64(&self) -> f64 {
         let Some((words, _, sign, exponent, _)) = self.0.as_raw_parts() else {
             return if self.0.is_nan() { f64::NAN } else { f64::INFINITY.copysign(f64::from(self.sign())) };
         };
         let Some((&top, rest)) = words.split_last() else { return 0.0 };
-        // 64 leading bits, the last of them sticky: the conversion to 53 bits rounds as it would from all of them.
+        // The 64 leading bits, with a sticky last bit. Their conversion to 53 bits therefore rounds as all bits would.
         let sticky = u64::from(rest.iter().any(|&word| word != 0));
         let value = scaled((top | sticky) as f64, exponent - 64);
         if sign == Sign::Neg { -value } else { value }
     }
 }
 
-/// `x · 2^exponent`, in steps that leave `f64` only where the result does.
+/// Returns `x · 2^exponent`. Intermediate results overflow or underflow only if the result does.
 fn scaled(mut x: f64, mut exponent: i32) -> f64 {
     while exponent != 0 {
         let step = exponent.clamp(-1000, 1000);
@@ -98,7 +99,7 @@ fn scaled(mut x: f64, mut exponent: i32) -> f64 {
 
 impl From<f64> for Real {
     fn from(x: f64) -> Self {
-        // The conversion takes normal numbers only.
+        // The conversion accepts normal numbers only.
         let shift = if x.is_subnormal() { 100 } else { 0 };
         Self(BigFloat::from_f64(x * 2f64.powi(shift), BITS)).shifted(-shift)
     }
@@ -149,52 +150,52 @@ impl PartialOrd for Real {
 pub struct Vector(pub [Real; 3]);
 
 impl Vector {
-    /// The scalar product.
+    /// Returns the scalar product.
     pub fn dot(&self, other: &Self) -> Real {
         let [x, y, z] = &self.0;
         let [a, b, c] = &other.0;
         &(&(x * a) + &(y * b)) + &(z * c)
     }
 
-    /// The vector product.
+    /// Returns the cross product.
     pub fn cross(&self, other: &Self) -> Self {
         let [x, y, z] = &self.0;
         let [a, b, c] = &other.0;
         Self([&(y * c) - &(z * b), &(z * a) - &(x * c), &(x * b) - &(y * a)])
     }
 
-    /// `self + factor · other`.
+    /// Returns `self + factor · other`.
     pub fn plus(&self, factor: &Real, other: &Self) -> Self {
         Self(std::array::from_fn(|axis| &self.0[axis] + &(factor * &other.0[axis])))
     }
 
-    /// `self - other`.
+    /// Returns `self - other`.
     pub fn minus(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|axis| &self.0[axis] - &other.0[axis]))
     }
 
-    /// The vector of length 1 in this direction.
+    /// Returns the vector of length 1 in this direction.
     pub fn unit(&self) -> Self {
         let length = self.dot(self).root();
         Self(std::array::from_fn(|axis| self.0[axis].over(&length)))
     }
 
-    /// Componentwise.
+    /// Returns the componentwise product.
     pub(super) fn times(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|axis| &self.0[axis] * &other.0[axis]))
     }
 
-    /// Without signs.
+    /// Returns the absolute values of the components.
     pub(super) fn magnitude(&self) -> Self {
         Self(std::array::from_fn(|axis| self.0[axis].magnitude()))
     }
 
-    /// Away from this one.
+    /// Returns the vector of the opposite direction.
     pub fn opposite(&self) -> Self {
         Self(std::array::from_fn(|axis| -&self.0[axis]))
     }
 
-    /// The nearest vector of `f64`s.
+    /// Returns the nearest vector of `f64`s.
     pub fn to_dvec3(&self) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|axis| self.0[axis].to_f64()))
     }

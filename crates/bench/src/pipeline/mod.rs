@@ -1,8 +1,9 @@
-//! `rayfold-bench pipeline`: the paper's table on the local invoker and the store built in, or MinIO.
+//! `rayfold-bench pipeline`: the paper's table with the local invoker and the built-in store, MinIO or SeaweedFS.
 //!
-//! For each scene and each number of invocations at once: the GIF made by the assemble function, with cold and with warm
-//! processes, and the GIF made here from fetched frames; and every frame drawn one after the other, without a GIF.
-//! Uploads go through the store, events through its webhook, and the function binaries are the ones that ship.
+//! For each scene and each number of concurrent invocations, a GIF is made by the assemble function, with cold and with
+//! warm processes, and by this program from fetched frames. In addition all frames are drawn one after the other,
+//! without a GIF. Uploads go through the store, events through its webhook, and the function binaries are those that
+//! ship.
 
 mod report;
 mod run;
@@ -18,22 +19,21 @@ use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{RenderOptions, render};
 
-pub(crate) use run::put;
-use run::{Compiled, Folder, Run};
+pub(crate) use run::{Compiled, Folder, Run, put, run as make};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// What keeps the bucket
+    /// Use this S3 store
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
     store: StoreKind,
-    /// The folder that receives pipeline.md and its plot, or pipeline-minio.md
+    /// Write pipeline.md and its plot, or the pages of another store, into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// The folder with the scenes
+    /// Read the scenes from this folder
     #[arg(long, default_value = "scenes")]
     scenes: PathBuf,
-    /// Only these scenes
+    /// Measure only these scenes
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
 }
@@ -43,8 +43,8 @@ fn stores() -> impl TypedValueParser<Value = StoreKind> {
         .map(|name| StoreKind::named(&name).unwrap_or_default())
 }
 
-/// As the paper names them, in its order, with its seconds: at 10 invocations compiled locally and in the cloud, at 5
-/// the same, and locally without a GIF.
+/// The scenes in the paper's order, with the paper's names and seconds: with 10 invocations compiled locally and in the
+/// cloud, with 5 the same, and locally without a GIF.
 const PAPER: [(&str, &str, [Option<f64>; 5]); 5] = [
     ("sphere_light", "sphere_lig", [Some(55.885), Some(61.226), Some(68.147), Some(73.453), Some(37.43)]),
     ("moving_up", "moving_u", [Some(56.500), Some(61.993), Some(73.279), Some(78.626), Some(44.38)]),
@@ -53,20 +53,20 @@ const PAPER: [(&str, &str, [Option<f64>; 5]); 5] = [
     ("hello", "hello", [Some(183.565), None, Some(171.016), None, Some(359.61)]),
 ];
 
-/// Invocations of a function at once, as many as the paper had ray tracers.
+/// The numbers of concurrent invocations of a function, as many as the paper had ray tracers.
 const AT_ONCE: [usize; 2] = [10, 5];
 
 /// All runs of a scene.
 pub(crate) struct Scene {
     pub(crate) folder: Folder,
     pub(crate) paper: [Option<f64>; 5],
-    /// For each of [`AT_ONCE`].
+    /// One for each of [`AT_ONCE`].
     pub(crate) runs: Vec<Runs>,
-    /// Drawing frame after frame on one thread.
+    /// The time to draw all frames one after the other on one thread.
     pub(crate) sequential: Duration,
 }
 
-/// The runs at one number of invocations at once.
+/// The runs with one number of concurrent invocations.
 pub(crate) struct Runs {
     pub(crate) cold: Run,
     pub(crate) warm: Run,
@@ -76,7 +76,7 @@ pub(crate) struct Runs {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When the store or the functions cannot be started, an animation fails, or the report cannot be written.
+/// Fails if the store or the functions cannot be started, an animation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
@@ -85,6 +85,7 @@ pub fn run(args: &Args) -> Result<()> {
     let name = match args.store {
         StoreKind::BuiltIn => "pipeline",
         StoreKind::Minio => "pipeline-minio",
+        StoreKind::SeaweedFs => "pipeline-seaweedfs",
     };
     let plot = format!("{name}-timeline.svg");
     timeline::plot(&args.output.join(&plot), scenes.last().context("no scene")?)?;
@@ -114,7 +115,7 @@ async fn measure(args: &Args) -> Result<Vec<Scene>> {
             while seen.try_recv().is_ok() {}
             let mut take = async |label: &str, compiled| {
                 let animation = format!("{name}-{at_once}-{label}");
-                run::run(&platform, &mut seen, &folder, &animation, compiled).await
+                make(&platform, &mut seen, &folder, &animation, compiled).await
             };
             let cold = take("cold", Compiled::ByTheFunction).await?;
             let warm = take("warm", Compiled::ByTheFunction).await?;
@@ -129,7 +130,7 @@ async fn measure(args: &Args) -> Result<Vec<Scene>> {
     Ok(scenes)
 }
 
-/// Draws every frame on one thread, one after the other.
+/// Draws every frame on one thread, one after the other. Returns the time.
 fn sequential(folder: &Folder) -> Result<Duration> {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     one.install(|| {

@@ -1,4 +1,4 @@
-//! The page: our seconds next to the paper's, and where they go.
+//! The page: our times beside the paper's, and their parts.
 
 use std::fmt::Write as _;
 
@@ -13,20 +13,24 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let (flag, other, of_store) = match store {
         StoreKind::BuiltIn => ("", " ([on MinIO](pipeline-minio.md))", "The store"),
-        StoreKind::Minio => (" --store minio", " ([on the store built in](pipeline.md))", "MinIO"),
+        StoreKind::Minio => (" --store minio", " ([on the built-in store](pipeline.md))", "MinIO"),
+        StoreKind::SeaweedFs => {
+            (" --store seaweedfs", " ([on the built-in store](pipeline.md))", "SeaweedFS")
+        }
     };
     writeln!(
         page,
         "# Pipeline on {store}\n\n\
-         Written by `cargo run --release -p rayfold-bench -- pipeline{flag}`{other}; all figures are of one run, on \
-         {threads} processors and with a load of {load} (`/proc/loadavg`) when it began: what else runs on the machine \
-         counts in every time below.\n\n\
-         {of_store}, the local invoker, the uploads and the functions share the machine. The paper's seconds are of its \
-         figure 4: up to ten ray tracers on machines of their own, images of 1024 x 1024, another renderer; our scenes \
-         are drawn after its names, object counts and frame counts, so the rows can be read side by side, not divided.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- pipeline{flag}`{other}; all figures are from one run, on \
+         {threads} processors. The load at its start was {load} (`/proc/loadavg`); other programs on the machine \
+         affect every time below.\n\n\
+         {of_store}, the local invoker, the uploads and the functions share the machine. The paper's seconds are from \
+         its figure 4: up to ten ray tracers, each on its own machine, images of 1024 x 1024, another renderer. Our \
+         scenes have its names, object counts and frame counts, so the rows can be compared, but their ratios have no \
+         meaning.\n\n\
          ## Seconds from the first upload to the GIF\n\n\
-         *Cloud*: the assemble function makes the GIF; *local*: frames are fetched and compiled by the client (both \
-         with warm processes); *cold*: as cloud, each process started for it. *Sequential*: every frame drawn on one \
+         *Cloud*: the assemble function makes the GIF. *Local*: the client fetches the frames and makes the GIF. Both \
+         have warm processes. *Cold*: like cloud, with new processes. *Sequential*: every frame is drawn on one \
          thread, one after the other, without a GIF.\n"
     )?;
     let mut head = "| scene | objects | frames |".to_owned();
@@ -53,8 +57,9 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
     }
     writeln!(
         page,
-        "\n## Where a frame's time goes\n\n\
-         Means over the frames, in milliseconds, as the render function logs them; *GIF* is the building of the whole \
+        "\n\
+         ## The stages of a frame\n\n\
+         Means over the frames in milliseconds, from the render function's log. *GIF* is the time to build the whole \
          GIF, *after upload* the seconds from the last upload to the GIF.\n\n\
          | scene | at once | run | read | draw | put | fold | GIF | after upload |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
@@ -70,11 +75,12 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
     })?;
     writeln!(
         page,
-        "\n## Requests a frame, and cold starts\n\n\
-         Counted between each process and the store. *Billed* is what S3 charges for (all but DELETE), of both \
-         functions together, the assembler's reading of each frame included.\n\n\
-         | scene | at once | run | render: GET | PUT | LIST | assemble: GET | PUT | LIST | billed a frame | cold starts \
-         | mean ms to the first `next` |\n\
+        "\n\
+         ## Requests per frame, and cold starts\n\n\
+         Requests are counted between each process and the store. *Billed* are those that S3 charges for (all except \
+         DELETE), of both functions together, including the assembler's read of each frame.\n\n\
+         | scene | at once | run | render: GET | PUT | LIST | assemble: GET | PUT | LIST | billed per frame | cold \
+         starts | mean ms to the first `next` |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     )?;
     each(scenes, |scene, at_once, label, run| {
@@ -89,7 +95,7 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
         writeln!(page, "| {scene} | {at_once} | {label} | {cells} | {billed:.2} | {starts} | {init:.1} |")
             .map_err(Into::into)
     })?;
-    writeln!(page, "\n## Who worked when\n\n![a row a process, a bar an invocation]({plot})")?;
+    writeln!(page, "\n## Timeline\n\n![one row per process, one bar per invocation]({plot})")?;
     writeln!(page, "\nBlue is the render function, orange the assemble function.")?;
     Ok(page)
 }

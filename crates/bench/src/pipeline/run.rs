@@ -1,4 +1,4 @@
-//! One animation from its first upload to its GIF, with all that was seen meanwhile.
+//! One animation from its first upload to its GIF, with the observations made in between.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,16 +18,16 @@ use rayfold_scene::{AnimationSettings, SETTINGS_FILE, natural_cmp, parse_setting
 use serde_json::Value;
 use tokio::sync::mpsc::UnboundedReceiver;
 
-/// Uploads side by side.
+/// The number of concurrent uploads.
 const UPLOADS: usize = 16;
 
-/// Between two looks for the result.
+/// The time between two polls for the result.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Far beyond any scene.
+/// The time limit, much longer than any scene takes.
 const PATIENCE: Duration = Duration::from_secs(1800);
 
-/// Who makes the GIF.
+/// The program that makes the GIF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Compiled {
     /// The assemble function.
@@ -66,7 +66,7 @@ impl Folder {
         self.scripts().count()
     }
 
-    /// Spheres, triangles, boxes and lights of a script, on the average.
+    /// Returns the mean number of spheres, triangles, boxes and lights of a script.
     pub(crate) fn objects(&self) -> f64 {
         let is_object = |line: &&str| {
             let command = line.split_whitespace().next().unwrap_or_default().to_lowercase();
@@ -77,22 +77,22 @@ impl Folder {
     }
 }
 
-/// What a run cost.
+/// The cost of a run.
 pub(crate) struct Run {
-    /// From the first upload to the GIF.
+    /// The time from the first upload to the GIF.
     pub(crate) total: Duration,
-    /// From the last upload to the GIF.
+    /// The time from the last upload to the GIF.
     pub(crate) after_upload: Duration,
-    /// The mean of each stage of a frame, in milliseconds: reading, drawing, putting, folding.
+    /// The mean time of each stage of a frame, in milliseconds: reading, drawing, putting, folding.
     pub(crate) stages: [f64; 4],
-    /// The assembler's building of the GIF, or ours.
+    /// The time in which the assembler, or this program, built the GIF.
     pub(crate) building: Duration,
-    /// Of all invocations of render and of assemble.
+    /// The requests of all invocations of render and of assemble.
     pub(crate) requests: BTreeMap<Function, Requests>,
-    /// New processes, and their mean time from the start to the first call of `next`.
+    /// The number of new processes, and the mean time from their start to their first call of `next`.
     pub(crate) cold_starts: usize,
     pub(crate) init: Duration,
-    /// Of every invocation: function, process, start and end after the first upload.
+    /// All invocations: function, process, start and end after the first upload.
     pub(crate) invocations: Vec<(Function, u32, Duration, Duration)>,
 }
 
@@ -107,7 +107,7 @@ pub(crate) async fn run(
     let store = platform.store();
     let animation = Animation::new(animation)?;
     let frames = folder.frames();
-    // One frame more than there will be keeps the assembler asleep.
+    // With one frame more than there will be, the assembler does not start.
     let wanted = if compiled == Compiled::Here { frames + 1 } else { frames };
     let settings = format!("{{\"frames\": {wanted}, \"fps\": {}}}", folder.settings.fps());
     let start = Instant::now();
@@ -166,7 +166,7 @@ async fn until(mut is_so: impl AsyncFnMut() -> Result<bool>) -> Result<()> {
     Ok(())
 }
 
-/// Fetches the frames and makes the GIF of them.
+/// Fetches the frames and makes the GIF from them.
 async fn compile(store: &S3Store, animation: &Animation, folder: &Folder) -> Result<Vec<u8>> {
     let object = store.get(&animation.manifest()).await?;
     let manifest = Manifest::decode(animation, &object.body)?;
@@ -184,7 +184,7 @@ async fn compile(store: &S3Store, animation: &Animation, folder: &Folder) -> Res
     Ok(gif)
 }
 
-/// Adds up what was seen.
+/// Sums up the observations of a run.
 fn told(seen: impl Iterator<Item = Observation>, start: Instant) -> Run {
     let mut stages = [0.0; 4];
     let (mut drawn, mut building, mut inits) = (0, 0, Vec::new());

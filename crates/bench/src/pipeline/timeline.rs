@@ -1,4 +1,4 @@
-//! Who worked when: a row a process, a bar an invocation.
+//! The timeline of a run: one row per process, one bar per invocation.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::Scene;
 
 const SIZE: (u32, u32) = (900, 360);
 
-/// Draws the cold run of the scene with the most invocations at once.
+/// Plots the cold run of the scene with the largest number of concurrent invocations.
 pub(super) fn plot(path: &Path, scene: &Scene) -> Result<()> {
     draw(path, scene).map_err(|error| anyhow!("{}: {error}", path.display()))
 }

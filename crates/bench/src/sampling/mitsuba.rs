@@ -116,12 +116,7 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
             let corners = [u, v, w].map(|corner| corner.to_array());
             json!({"kind": "triangle", "corners": corners})
         }
-        Object::Plane(_)
-        | Object::Disc(_)
-        | Object::Cylinder(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => anyhow::bail!("only spheres, boxes and triangles are translated"),
+        _ => anyhow::bail!("only spheres, boxes and triangles are translated"),
     };
     if let (Value::Object(told), Value::Object(shape)) = (&mut told, shape) {
         told.extend(shape);

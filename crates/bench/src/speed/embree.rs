@@ -1,4 +1,4 @@
-//! Embree as a peer, where a C++ compiler and its headers are: camera and shadow rays against a mesh.
+//! Embree as a peer, if a C++ compiler and its headers are installed: camera and shadow rays against a mesh.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,19 +8,19 @@ use rayfold_scene::{Camera, Light, Object, Scene};
 
 const SOURCE: &str = include_str!("embree_peer.cpp");
 
-/// Processor time of one image's rays, without building the tree, on one thread.
+/// The processor time of one image's rays on one thread, without building the tree.
 pub(crate) struct Seconds {
-    /// Camera rays, one by one and in packets.
+    /// The time of the camera rays, singly and in packets.
     pub(crate) camera: [f64; 2],
-    /// The same with a shadow ray from each hit.
+    /// The time with a shadow ray from each hit in addition.
     pub(crate) lit: [f64; 2],
-    /// Rays that meet the mesh.
+    /// The number of rays that hit the mesh.
     pub(crate) hits: u64,
-    /// Hits that the light does not reach.
+    /// The number of hits in shadow.
     pub(crate) dark: u64,
 }
 
-/// The peer program; `None` where it cannot be compiled, with the reason.
+/// Compiles the peer program. Returns the reason if it cannot be compiled.
 pub(crate) fn compile(folder: &Path) -> Result<Result<PathBuf, String>> {
     let (source, program) = (folder.join("embree_peer.cpp"), folder.join("embree_peer"));
     std::fs::write(&source, SOURCE)?;
@@ -35,7 +35,8 @@ pub(crate) fn compile(folder: &Path) -> Result<Result<PathBuf, String>> {
     })
 }
 
-/// Runs the peer on the triangles of a scene with a pinhole camera, a light and a square screen, a multiple of 4 wide.
+/// Runs the peer on the triangles of a scene with a pinhole camera, a light and a square screen. The width is a
+/// multiple of 4.
 pub(crate) fn run(program: &Path, folder: &Path, scene: &Scene, rounds: u32) -> Result<Seconds> {
     let mut corners = Vec::new();
     for object in scene.objects.iter() {

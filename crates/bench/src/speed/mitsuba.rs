@@ -1,6 +1,6 @@
-//! Mitsuba 3 as a peer, where Python has it: camera and shadow rays against spheres, discs and cylinders.
+//! Mitsuba 3 as a peer, if it is installed for Python: camera and shadow rays against spheres, discs and cylinders.
 //!
-//! Its LLVM variant finds shapes by Embree's user geometry, with kernels that it compiles for the machine.
+//! Its LLVM variant intersects shapes as Embree's user geometry, with kernels that it compiles for the machine.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -11,21 +11,21 @@ use serde_json::{Value, json};
 
 const PROGRAM: &str = include_str!("mitsuba_peer.py");
 
-/// Processor time on one thread, without shading.
+/// The processor time on one thread, without shading.
 pub(crate) struct Seconds {
-    /// Of camera rays and shadow rays together.
+    /// The time of camera rays and shadow rays together.
     pub(crate) seconds: f64,
-    /// How many these are.
+    /// The number of these rays.
     pub(crate) rays: f64,
 }
 
-/// Whether Python finds it.
+/// Returns whether Python finds Mitsuba.
 pub(crate) fn is_here() -> bool {
     let asked = Command::new("python3").args(["-c", "import mitsuba, numpy"]).stderr(Stdio::null()).status();
     asked.is_ok_and(|status| status.success())
 }
 
-/// Runs the peer on a scene of shapes that it knows, in a sun, seen by a pinhole camera; none for another.
+/// Runs the peer on a scene with a sun and a pinhole camera. Returns `None` if Mitsuba lacks a shape.
 pub(crate) fn run(scene: &Scene, rounds: u32) -> Result<Option<Seconds>> {
     let Some(shapes) = scene.objects.iter().map(shape).collect::<Option<Vec<Value>>>() else {
         return Ok(None);
@@ -52,7 +52,7 @@ pub(crate) fn run(scene: &Scene, rounds: u32) -> Result<Option<Seconds>> {
     Ok(Some(Seconds { seconds: camera + shadow, rays }))
 }
 
-/// What a Python program prints that is told so much.
+/// Runs a Python program with JSON as its input, and returns its output.
 pub(crate) fn ask(program: &str, told: &Value) -> Result<String> {
     let mut child = Command::new("python3")
         .args(["-c", program])
@@ -66,7 +66,7 @@ pub(crate) fn ask(program: &str, told: &Value) -> Result<String> {
     Ok(String::from_utf8(run.stdout)?)
 }
 
-/// Its numbers; none if Mitsuba has no such shape. A cylinder is open there.
+/// Returns the numbers of a shape; `None` if Mitsuba has no such shape. Its cylinders are open.
 fn shape(object: &Object) -> Option<Value> {
     match object {
         Object::Sphere(o) => {
@@ -82,11 +82,6 @@ fn shape(object: &Object) -> Option<Value> {
             let [a, b] = o.ends().map(|end| end.to_array());
             Some(json!({"kind": "cylinder", "a": a, "b": b, "radius": o.radius()}))
         }
-        Object::Triangle(_)
-        | Object::Cuboid(_)
-        | Object::Plane(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => None,
+        _ => None,
     }
 }

@@ -1,4 +1,4 @@
-//! `rayfold-bench speed`: processor time against the work asked for, and side by side with peers.
+//! `rayfold-bench speed`: processor time by the amount of work, and compared with peers.
 
 mod embree;
 pub(crate) mod mitsuba;
@@ -19,18 +19,18 @@ use crate::cpu_time::{self, median};
 use crate::plot::{Labels, Series, log_log};
 use crate::scenes::{EXAMPLES, cloud, example, rock, table};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives speed.md and its plots
+    /// Write speed.md and its plots into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// Small sizes and few rounds: a check that everything runs, not a measurement
+    /// Use small sizes and few rounds: a check that everything runs, not a measurement
     #[arg(long)]
     quick: bool,
 }
 
-/// Sizes of everything.
+/// The sizes of all parts.
 struct Plan {
     rounds: usize,
     objects: &'static [u32],
@@ -61,7 +61,7 @@ const QUICK: Plan = Plan {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
+/// Fails if a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let plan = if args.quick { &QUICK } else { &FULL };
     std::fs::create_dir_all(&args.output)?;
@@ -70,9 +70,9 @@ pub fn run(args: &Args) -> Result<()> {
     let widths: Vec<_> = levels().iter().map(|(name, _)| *name).collect();
     let mut report = format!(
         "# Speed\n\n\
-         Written by `cargo run --release -p rayfold-bench -- speed{command}`; all figures are of one run on a machine \
-         with {}. Times are processor time, not that of the clock: the machine may be busy with other work. What is \
-         compared is run in turn, {} times; medians are shown. *One core* is a pool of one thread.\n\n",
+         Written by `cargo run --release -p rayfold-bench -- speed{command}`; all figures are from one run on a \
+         machine with {}. Times are processor times, because the machine may be busy with other work. Programs that \
+         are compared run in turn, {} times; the table shows medians. *One core* is a pool of one thread.\n\n",
         widths.join(", "),
         plan.rounds
     );
@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
     rest += &one.install(|| beside_embree(plan, &mut ratios))?;
     rest += &examples(plan, &one, &mut ratios)?;
     rest += &one.install(|| growth(plan, &args.output))?;
-    report += "| their time / ours | is | asked for |\n| --- | --- | --- |\n";
+    report += "| their time / ours | measured | goal |\n| --- | --- | --- |\n";
     for Ratio { what, is, least } in &ratios {
         writeln!(report, "| {what} | {is:.2} | {least} |")?;
     }
@@ -91,23 +91,23 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(OutputFile::write(&path, report, false)?)
 }
 
-/// What a peer takes for each second of ours.
+/// The peer's time divided by ours.
 struct Ratio {
     what: String,
     is: f64,
-    /// As the project has promised it.
+    /// The goals of the project.
     least: &'static str,
 }
 
-/// What the original tracer took for a frame of its `hello`, 512 x 512, in seconds: optimised for the machine that it
-/// was measured on, the one of these reports. It is not part of this run.
+/// The time of the original tracer for a frame of its `hello`, 512 x 512, in seconds. It was optimised for the machine
+/// on which it was measured, the one of these reports. This run does not measure it.
 const ORIGINAL_HELLO: f64 = 0.057;
 
 fn best() -> Backend {
     packets("rayfold", RenderOptions::default())
 }
 
-/// Median processor time of the images of several backends, drawn in turn.
+/// Draws with several backends in turn. Returns the median processor time of each.
 fn in_turn(scene: &Scene, backends: &[&Backend], rounds: usize) -> Result<Vec<f64>> {
     let mut seconds = vec![Vec::new(); backends.len()];
     for _ in 0..rounds {
@@ -120,11 +120,11 @@ fn in_turn(scene: &Scene, backends: &[&Backend], rounds: usize) -> Result<Vec<f6
     Ok(seconds.into_iter().map(median).collect())
 }
 
-/// POV-Ray's time over ours.
+/// The goals for POV-Ray's time divided by ours.
 const ASKED: [(&str, &str); 2] = [("AVX-512", "16, goal 30"), ("AVX2", "11, goal 20")];
 
 fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
-    let mut text = String::from("## Beside POV-Ray\n\n");
+    let mut text = String::from("## Comparison with POV-Ray\n\n");
     if !povray::is_here() {
         text += "`povray` is not on this machine: not measured.\n\n";
         return Ok(text);
@@ -161,9 +161,10 @@ fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
         text,
         "1024 x 768, 22 spheres, 2 boxes, 2 triangles, 2 lights, shadows, 5 bounces, one core, precision chosen by the \
          program. POV-Ray draws the same picture ({off:.3} % of the pixels off by more than 2 levels), without \
-         anti-aliasing and radiosity. Its time includes starting and reading the scene; *drawing* is what is left when \
-         the time of an image of 8 x 6 pixels is taken off. Ours is that of `render`.\n\n\
-         | renderer | CPU ms | POV-Ray's / ours | POV-Ray's drawing / ours |\n| --- | --- | --- | --- |\n\
+         anti-aliasing and radiosity. Its time includes its start and reading the scene; *drawing* is its time minus \
+         that of an image of 8 x 6 pixels. Ours is that of `render`.\n\n\
+         | renderer | CPU ms | POV-Ray's / ours | POV-Ray's drawing / ours |\n\
+         | --- | --- | --- | --- |\n\
          | POV-Ray | {:.1}, drawing {:.1} | 1 | 1 |\n",
         1e3 * whole,
         1e3 * drawing
@@ -187,7 +188,7 @@ fn beside_povray(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
 }
 
 fn beside_embree(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
-    let mut text = String::from("## Beside Embree\n\n");
+    let mut text = String::from("## Comparison with Embree\n\n");
     let folder = tempfile::tempdir()?;
     let program = match embree::compile(folder.path())? {
         Ok(program) => program,
@@ -219,11 +220,11 @@ fn beside_embree(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
     let rays = f64::from(plan.peer_side).powi(2);
     write!(
         text,
-        "{} triangles; {rays} camera rays, of which {hits} hit; the same with a shadow ray from each hit, of which {dark} \
-         are in the dark. One core, robust intersection. Embree's time is that of its calls, the fastest of three passes, \
-         without shading; ours is that of drawing a scene that is prepared, with shading and the writing of pixels. Neither \
-         has the building of the tree.\n\n\
-         | rays | way | CPU ms | Mrays/s | Embree one by one / this | Embree's packets / this |\n\
+        "{} triangles; {rays} camera rays, of which {hits} hit; then the same rays with a shadow ray from each hit, of \
+         which {dark} are blocked. One core, robust intersection. Embree's time is that of its calls, the fastest of \
+         three passes, without shading. Ours is that of drawing a prepared scene, with shading and writing pixels. \
+         Both exclude the construction of the tree.\n\n\
+         | rays | way | CPU ms | Mrays/s | Embree's single rays / this | Embree's packets / this |\n\
          | --- | --- | --- | --- | --- | --- |\n",
         lit.objects.len()
     )?;
@@ -251,7 +252,7 @@ fn beside_embree(plan: &Plan, ratios: &mut Vec<Ratio>) -> Result<String> {
     Ok(text)
 }
 
-/// How long preparing a scene takes, and then drawing it.
+/// Returns the time to prepare a scene, and then to draw it.
 fn halves(scene: &Scene, options: &RenderOptions) -> Result<(f64, f64)> {
     let (preparing, drawing) = cpu_time::of(|| Drawing::new(scene, options))?;
     let drawing = drawing?;
@@ -263,8 +264,9 @@ fn halves(scene: &Scene, options: &RenderOptions) -> Result<(f64, f64)> {
 fn examples(plan: &Plan, one: &rayon::ThreadPool, ratios: &mut Vec<Ratio>) -> Result<String> {
     let all = rayon::ThreadPoolBuilder::new().build()?;
     let mut text = format!(
-        "## The five scenes\n\nOne frame of each, on one core and with all {} cores: the processor time of both should be \
-         the same, as nothing is done twice.\n\n\
+        "## The five scenes\n\n\
+         One frame of each, on one core and on all {} cores. Both should take the same processor time, because no work \
+         is done twice.\n\n\
          | scene | CPU ms, one core | Mpixels/s | CPU ms, all cores | the plain tracer, CPU ms | plain / ours |\n\
          | --- | --- | --- | --- | --- | --- |\n",
         all.current_num_threads()
@@ -300,7 +302,7 @@ fn examples(plan: &Plan, one: &rayon::ThreadPool, ratios: &mut Vec<Ratio>) -> Re
     Ok(text)
 }
 
-/// Time over objects, triangles and pixels, with the exponent of the power that fits best.
+/// Plots time by objects, triangles and pixels, and fits the exponent of the power.
 fn growth(plan: &Plan, folder: &Path) -> Result<String> {
     let backend = best();
     let time = |scene: Result<Scene>, rounds: usize| -> Result<f64> {
@@ -335,9 +337,12 @@ fn growth(plan: &Plan, folder: &Path) -> Result<String> {
     courses.push(("pixels of the table", pixels));
 
     let mut text = String::from(
-        "## Cost against work\n\nOne core. The exponent is that of the power law fitted to the points (least squares of \
-         the logarithms): 1 is cost in proportion, 0 no cost.\n\n![Cost against work](speed-growth.svg)\n\n\
-         | what grows | exponent | points: count, CPU ms |\n| --- | --- | --- |\n",
+        "## Cost by amount of work\n\n\
+         On one core. The exponent is that of the power law fitted to the points (least squares of the logarithms): 1 \
+         means proportional cost, 0 constant cost.\n\n\
+         ![Cost by amount of work](speed-growth.svg)\n\n\
+         | what grows | exponent | points: count, CPU ms |\n\
+         | --- | --- | --- |\n",
     );
     for (name, points) in &courses {
         let shown: Vec<_> = points.iter().map(|(count, s)| format!("{count}: {:.2}", 1e3 * s)).collect();
@@ -347,13 +352,16 @@ fn growth(plan: &Plan, folder: &Path) -> Result<String> {
         .into_iter()
         .map(|(name, points)| Series { name: name.into(), points, joined: true })
         .collect();
-    let labels =
-        Labels { title: "Cost against work", x: "spheres, triangles, pixels", y: "CPU seconds an image" };
+    let labels = Labels {
+        title: "Cost by amount of work",
+        x: "spheres, triangles, pixels",
+        y: "CPU seconds per image",
+    };
     log_log(&folder.join("speed-growth.svg"), &labels, &series)?;
     Ok(text)
 }
 
-/// The slope of the line through the logarithms.
+/// Returns the slope of the line through the logarithms.
 fn exponent(points: &[(f64, f64)]) -> f64 {
     let logs: Vec<_> = points.iter().map(|&(x, y)| (x.ln(), y.ln())).collect();
     let count = logs.len() as f64;

@@ -1,4 +1,4 @@
-//! POV-Ray as a peer: the scene in its language, and its processor time.
+//! POV-Ray as a peer: translates the scene to its language, and measures its processor time.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,19 +13,19 @@ use rayfold_tracer::MAX_BOUNCES;
 
 use crate::cpu_time;
 
-/// Whether the program is on this machine.
+/// Returns whether the program is installed.
 pub(crate) fn is_here() -> bool {
     let asked = Command::new("povray").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     asked.is_ok()
 }
 
-/// Draws the scene on one thread, without anti-aliasing. Returns the processor time of the whole program in seconds,
+/// Draws the scene on one thread, without anti-aliasing. Returns the processor time of the entire program in seconds,
 /// and the image.
 pub(crate) fn render(scene: &Scene, folder: &Path, size: (u32, u32)) -> Result<(f64, RgbImage)> {
     render_as(scene, folder, size, &["-A"])
 }
 
-/// The same with options of its own for anti-aliasing.
+/// Draws the scene like [`render`], with the given options for anti-aliasing.
 pub(crate) fn render_as(
     scene: &Scene,
     folder: &Path,
@@ -50,7 +50,7 @@ pub(crate) fn render_as(
     Ok((seconds, image))
 }
 
-/// A binary portable pixmap of 8 bits.
+/// Decodes a binary portable pixmap of 8 bits.
 fn portable_pixmap(bytes: &[u8]) -> Option<RgbImage> {
     let mut numbers = Vec::new();
     let mut at = bytes.strip_prefix(b"P6").map(|_| 2)?;
@@ -71,13 +71,14 @@ fn vector(v: DVec3) -> String {
     format!("<{:e},{:e},{:e}>", v.x, v.y, v.z)
 }
 
-/// The same picture: light is linear, shadows are hard, a mirror adds, and nothing is cut off for being faint.
+/// Translates the scene so that the picture is the same: light is linear, shadows are hard, a mirror adds its light,
+/// and no ray is dropped for a small weight.
 fn translated(scene: &Scene) -> Result<String> {
     let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera is translated") };
     let (u, v, w) = pinhole.basis();
     let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
     let middle = 0.5 * (a + b);
-    // Samples in pixels' centres there, on the window's corners here.
+    // POV-Ray samples at the centres of pixels. Here the outermost samples are at the corners of the window.
     let wider = |n: u32| f64::from(n) / f64::from(n.max(2) - 1);
     let right = u * (b.x - a.x) * wider(scene.screen.width());
     let up = v * (b.y - a.y) * wider(scene.screen.height());
@@ -113,7 +114,7 @@ fn translated(scene: &Scene) -> Result<String> {
                 let placement = instance.placement();
                 let axes = placement.rotation() * placement.scale();
                 let inner = shape(instance.object())?;
-                // The pattern lies in the group's coordinates.
+                // The pattern is in the group's coordinates.
                 writeln!(text, "{inner} {surface} {} }}", matrix(axes, placement.translation()))?;
             }
             object => writeln!(text, "{} {surface} }}", shape(object)?)?,
@@ -122,7 +123,7 @@ fn translated(scene: &Scene) -> Result<String> {
     Ok(text)
 }
 
-/// The shape, without its closing brace.
+/// Returns the shape, without its closing brace.
 fn shape(object: &Object) -> Result<String> {
     Ok(match object {
         Object::Sphere(s) => format!("sphere {{ {}, {:e}", vector(s.center()), s.radius()),
@@ -147,7 +148,7 @@ fn shape(object: &Object) -> Result<String> {
             format!("cone {{ {a}, {from:e}, {b}, {to:e}")
         }
         Object::Torus(t) => {
-            // Around the second axis there.
+            // POV-Ray's tori are around the second axis.
             let y = t.normal().normalize();
             let (x, z) = y.any_orthonormal_pair();
             let axes = matrix(DMat3::from_cols(x, y, z), t.center());
@@ -163,11 +164,11 @@ fn matrix(axes: DMat3, origin: DVec3) -> String {
     format!("matrix <{}>", numbers.join(","))
 }
 
-/// The same for ambient colours that are the same share of the diffuse ones in both materials of a pattern. Noise is another
-/// one there: the picture differs, the work is alike.
+/// Returns the material. The colours agree if the ratio of ambient to diffuse is equal in both materials of a pattern.
+/// POV-Ray's noise differs: so does the picture, but the work is similar.
 fn surface(material: &Material) -> Result<String> {
     let diffuse = material.diffuse();
-    // Emission is multiplied by the pigment.
+    // POV-Ray multiplies emission by the pigment.
     let part = |a: f64, r: f64| if r == 0.0 { 0.0 } else { a / r };
     let ambient = material.ambient();
     let emission =

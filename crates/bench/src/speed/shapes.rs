@@ -1,4 +1,5 @@
-//! `rayfold-bench shapes`: what a ray costs, shape by shape, and with glass, patterns, highlights and lamps, beside peers.
+//! `rayfold-bench shapes`: the cost of a ray by shape, and with glass, patterns, highlights and lamps, compared with
+//! peers.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -22,24 +23,24 @@ use crate::backends::{Backend, levels, packets};
 use crate::cpu_time::{self, median};
 use crate::scenes::{light, looking_at};
 
-/// What to measure.
+/// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives shapes.md and shapes.csv
+    /// Write shapes.md and shapes.csv into this folder
     #[arg(long, default_value = "docs/reports")]
     output: PathBuf,
-    /// Small pictures, drawn once: a check that everything runs, not a measurement
+    /// Use small pictures, drawn once: a check that everything runs, not a measurement
     #[arg(long)]
     quick: bool,
-    /// How often everything is drawn, in turn
+    /// Draw everything this often, in turn
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
-    /// Only scenes whose name holds this
+    /// Measure only scenes whose name contains this
     #[arg(long, default_value = "")]
     scene: String,
 }
 
-/// What a scene is there to measure, and so what is asked of it: POV-Ray's time over ours, on AVX-512 and on AVX2.
+/// The feature that a scene measures. It determines the goals: POV-Ray's time divided by ours, on AVX-512 and on AVX2.
 #[derive(Clone, Copy)]
 enum Asked {
     Shape,
@@ -51,17 +52,17 @@ impl Asked {
     fn ratios(self) -> [f64; 2] {
         match self {
             Self::Shape => [30.0, 20.0],
-            // Its time is that of roots of quartics, on both sides.
+            // Roots of quartics take most of the time in both programs.
             Self::Torus => [10.0, 10.0],
             Self::Surface => [15.0, 15.0],
         }
     }
 }
 
-/// The widths that are measured.
+/// The vector widths that are measured.
 const WIDTHS: [&str; 2] = ["AVX-512", "AVX2"];
 
-/// Objects of a scene but for planes: a grid of so many columns and rows.
+/// The objects of a scene, except planes, form a grid of this many columns and rows.
 const GRID: (u32, u32) = (6, 4);
 
 type Subject = (&'static str, Asked, fn(&mut Rng) -> Result<Vec<Object>>);
@@ -85,25 +86,25 @@ const SUBJECTS: [Subject; 16] = [
     ("spheres in lamplight", Asked::Shape, |rng| scattered(rng, plain, sphere)),
 ];
 
-/// What was measured of a scene, in milliseconds of processor time but for the counts.
+/// The measurements of a scene, in milliseconds of processor time except for the counts.
 struct Row {
     name: &'static str,
     asked: Asked,
     objects: usize,
-    /// From the camera and to lights; none where glass makes more of them.
+    /// The number of camera and shadow rays; `None` if glass spawns more.
     rays: Option<u64>,
-    /// For each of [`WIDTHS`] that the machine has.
+    /// One for each of [`WIDTHS`] that the machine supports.
     ours: Vec<f64>,
-    /// POV-Ray's drawing, and the share of pixels that are off by more than 2 levels from ours.
+    /// POV-Ray's time to draw, and the share of pixels that differ by more than 2 levels from ours.
     pov: Option<(f64, f64)>,
-    /// Mitsuba's nanoseconds a ray.
+    /// Mitsuba's time per ray in nanoseconds.
     mitsuba: Option<f64>,
 }
 
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
+/// Fails if a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     std::fs::create_dir_all(&args.output)?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -166,7 +167,7 @@ fn measured((name, asked, make): &Subject, args: &Args) -> Result<Row> {
     })
 }
 
-/// The share of pixels off by more than 2 levels, in percent.
+/// Returns the share of pixels off by more than 2 levels, in percent.
 fn off(a: &RgbImage, b: &RgbImage) -> f64 {
     let is_off = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 2);
     100.0 * a.pixels().zip(b.pixels()).filter(is_off).count() as f64 / a.pixels().len() as f64
@@ -185,27 +186,27 @@ impl Row {
 fn report(args: &Args, rows: &[Row]) -> Result<String> {
     let command = if args.quick { " --quick".into() } else { format!(" --rounds {}", args.rounds) };
     let mut text = format!(
-        "# What a ray costs, shape by shape\n\n\
-         Written by `cargo run --release -p rayfold-bench -- shapes{command}`; all figures are of one run. 1024 x 768 pixels, 24 \
-         objects of one kind (planes: 3) and a sun, shadows, 5 bounces, on one core. Times are processor time, for the machine may be \
-         busy; what is compared is drawn in turn, and medians are shown. Ours is all of `render`, preparing included; POV-Ray's \
-         (one thread, no anti-aliasing) is without what an image of 8 x 6 pixels takes it. A ray is one of the camera or one to a light \
-         that a surface faces; those that glass sends on are not counted. *Off*: pixels of POV-Ray's picture that are off by \
-         more than 2 levels from ours: its noise is another function. \
-         Mitsuba 3 (LLVM variant, single precision, \
-         one thread) is given the rays and asked for hits and shadows, without shading; its cylinders have no caps.\n\n"
+        "# The cost of a ray by shape\n\n\
+         Written by `cargo run --release -p rayfold-bench -- shapes{command}`; all figures are from one run. Pictures \
+         have 1024 x 768 pixels, 24 objects of one kind (planes: 3) and a sun, with shadows and 5 bounces, on one \
+         core. Times are processor times, because the machine may be busy; programs that are compared draw in turn, \
+         and the table shows medians. Ours is that of `render`, including preparation. POV-Ray's (one thread, no \
+         anti-aliasing) excludes its time for an image of 8 x 6 pixels. A ray is a camera ray or one to a light that a \
+         surface faces; rays spawned by glass are not counted. *Off*: pixels of POV-Ray's picture that differ by more \
+         than 2 levels from ours; its noise is another function. Mitsuba 3 (LLVM variant, single precision, one \
+         thread) gets the rays and computes hits and shadows, without shading; its cylinders have no caps.\n\n"
     );
     let short: Vec<String> = rows.iter().flat_map(short_of).collect();
     let verdict = match (rows.iter().any(|row| row.pov.is_some()), short.is_empty()) {
         (false, _) => "POV-Ray is not on this machine: not compared.".to_owned(),
-        (true, true) => "Every ratio is at least what was asked for.".to_owned(),
-        (true, false) => format!("Short of what was asked for: {}.", short.join("; ")),
+        (true, true) => "Every ratio meets its goal.".to_owned(),
+        (true, false) => format!("Below the goal: {}.", short.join("; ")),
     };
     write!(
         text,
         "{verdict}\n\n\
-         | scene | rays | AVX-512, ms | AVX2, ms | POV-Ray, ms | POV-Ray / AVX-512 | asked | POV-Ray / AVX2 | asked | off, % \
-         | AVX-512, ns a ray | AVX2 | POV-Ray | Mitsuba |\n\
+         | scene | rays | AVX-512, ms | AVX2, ms | POV-Ray, ms | POV-Ray / AVX-512 | goal | POV-Ray / AVX2 | goal | \
+         off, % | AVX-512, ns per ray | AVX2 | POV-Ray | Mitsuba |\n\
          | --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n"
     )?;
     for row in rows {
@@ -234,7 +235,7 @@ fn report(args: &Args, rows: &[Row]) -> Result<String> {
     Ok(text)
 }
 
-/// Where a row is short of what was asked for.
+/// Lists the goals that a row misses.
 fn short_of(row: &Row) -> Vec<String> {
     let asked = row.asked.ratios();
     let is_short = |&(k, asked): &(usize, f64)| row.ratio(k).is_some_and(|ratio| ratio < asked);
@@ -277,10 +278,10 @@ fn scene(
 }
 
 type Surface = fn(&mut Rng) -> Result<Material>;
-/// A shape of about the radius 0.6 around a place.
+/// A function that makes a shape of about the radius 0.6 around a point.
 type Shape = fn(&mut Rng, DVec3, Material) -> Result<Object>;
 
-/// A grid of objects, out of line.
+/// Returns a grid of objects, randomly displaced.
 fn scattered(rng: &mut Rng, surface: Surface, shape: Shape) -> Result<Vec<Object>> {
     let (columns, rows) = GRID;
     let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
@@ -377,7 +378,7 @@ fn torus(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
     Ok(Torus::new(0.5, 0.1 + 0.1 * rng.f64(), at, direction(rng), material)?.into())
 }
 
-/// A floor and two walls.
+/// Returns a floor and two walls.
 fn planes(rng: &mut Rng) -> Result<Vec<Object>> {
     let walls = [
         (DVec3::NEG_Y, DVec3::Y),

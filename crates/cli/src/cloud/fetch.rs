@@ -33,7 +33,7 @@ pub(crate) struct Args {
     animation: Animation,
     #[command(flatten)]
     bucket: BucketArgs,
-    /// What to write: .gif, or a pattern such as frames/%04d.png (or .tif) for the frames, whose folder is made
+    /// File to write: .gif, or a pattern such as frames/%04d.png (or .tif) for the frames, whose folder is made
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// The GIF that there is, also when it does not show the scripts as they are now
@@ -54,7 +54,7 @@ enum Wanted {
 /// When OUT is neither a GIF nor a pattern, or a flag does not go with it.
 fn wanted(args: &Args) -> Result<Wanted, Usage> {
     let shown = args.output.display();
-    match Target::parse(&args.output) {
+    match Target::parse(&args.output, None) {
         Ok(Target::Animation(Container::Gif, Place::File(path))) if !args.partial => Ok(Wanted::Gif(path)),
         Ok(Target::Images(pattern, format)) if !args.last => Ok(Wanted::Frames(pattern, format)),
         Ok(Target::Images(..)) => {
@@ -196,7 +196,7 @@ async fn fetch_frames(
         anyhow::bail!("{animation} has no frames that are drawn");
     };
     pattern.make_folder()?;
-    let mut progress = Progress::start(console, "frames", drawn.len() as u64);
+    let progress = Progress::start(console, "frames", drawn.len() as u64);
     let mut done = 0;
     let take = |frame: FetchedFrame<'_>| {
         write_frame(&frame, pattern, format).map_err(io::Error::other)?;

@@ -27,7 +27,7 @@ pub(crate) mod submit;
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Scripts that are named, at most.
-const MOST_NAMED: usize = 20;
+const MAX_NAMED: usize = 20;
 
 /// `--bucket`, for every subcommand that talks to one.
 #[derive(Clone, Debug, clap::Args)]
@@ -101,11 +101,11 @@ async fn agree(names: &[String], question: &str, console: &Console) -> anyhow::R
     if !console.can_ask() {
         return Ok(None);
     }
-    for name in names.iter().take(MOST_NAMED) {
+    for name in names.iter().take(MAX_NAMED) {
         console.say(format_args!("  {}", visible(name)));
     }
-    if names.len() > MOST_NAMED {
-        console.say(format_args!("  and {} more", names.len() - MOST_NAMED));
+    if names.len() > MAX_NAMED {
+        console.say(format_args!("  and {} more", names.len() - MAX_NAMED));
     }
     console.ask(&format!("{} [y/N]", visible(question)));
     // On a thread that is left alone when the run is told to stop: nothing ends the reading of a terminal.
@@ -130,9 +130,9 @@ fn is_yes(answer: &str) -> bool {
 
 /// Names in a row, or as many as people read.
 fn named(names: &[String]) -> String {
-    let mut text = names.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-    if names.len() > MOST_NAMED {
-        text += &format!(" and {} more", names.len() - MOST_NAMED);
+    let mut text = names.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if names.len() > MAX_NAMED {
+        text += &format!(" and {} more", names.len() - MAX_NAMED);
     }
     text
 }

@@ -9,7 +9,7 @@ use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
 
 use super::age::Age;
-use super::{BucketArgs, Client, MOST_NAMED, Watch, named, parse_animation, report, with_bucket};
+use super::{BucketArgs, Client, MAX_NAMED, Watch, named, parse_animation, report, with_bucket};
 use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
 use crate::wording::{Size, number};
@@ -284,7 +284,7 @@ fn document(watches: &[Watch<'_>], overview: Option<&Overview>, one_line: bool) 
         count: misplaced.len(),
         named: misplaced
             .iter()
-            .take(MOST_NAMED)
+            .take(MAX_NAMED)
             .map(|misplaced| MisplacedEntry { key: &misplaced.key, problem: misplaced.problem })
             .collect(),
     });

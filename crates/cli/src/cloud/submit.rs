@@ -25,14 +25,14 @@ use crate::render::target::must_be_gif;
 use crate::values;
 use crate::wording::number;
 
-/// Bytes of a script's name that MinIO can draw: it keeps objects as files, whose names have at most 255 bytes, and a
+/// Bytes of a script's name that can be drawn on MinIO and SeaweedFS: their path segments have at most 255 bytes, and a
 /// frame's has its script's version, too.
-const LONGEST_NAME_ON_MINIO: usize = 200;
+const LONGEST_NAME: usize = 200;
 
-/// Render a folder of scripts in the cloud and download the animation
+/// Render a folder of scripts, or one script, in the cloud and download the animation
 ///
 /// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed), waits,
-/// and downloads the GIF. Scripts in the bucket that the folder does not have, somebody else's perhaps, are deleted only
+/// and downloads the GIF. A script alone is a folder that holds nothing else. Scripts in the bucket that the folder does not have, somebody else's perhaps, are deleted only
 /// with --delete, or after a yes at a terminal. Interrupting it loses nothing: the same command picks up where the bucket
 /// is.
 #[derive(Debug, clap::Args)]
@@ -49,7 +49,8 @@ Examples:
   rayfold submit scenes/hello --bucket my-bucket --dry-run
       shows what would be done")]
 pub(crate) struct Args {
-    /// The folder
+    /// The folder, or one script
+    #[arg(value_name = "FOLDER")]
     folder: PathBuf,
     #[command(flatten)]
     bucket: BucketArgs,
@@ -59,7 +60,7 @@ pub(crate) struct Args {
     /// Upload and leave
     #[arg(long)]
     no_wait: bool,
-    /// The animation's name in the bucket, which may hold slashes [default: the folder's name]
+    /// The animation's name in the bucket, which may hold slashes [default: the folder's name, or the script's without .txt]
     #[arg(long, value_name = "ANIMATION", value_parser = parse_animation)]
     name: Option<Animation>,
     /// Delete scripts in the bucket that the folder does not have, without asking
@@ -69,15 +70,11 @@ pub(crate) struct Args {
     #[arg(long, conflicts_with_all = ["output", "no_wait"])]
     dry_run: bool,
     /// The largest image that a script may ask for, in pixels; the functions have a limit of their own
-    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, allow_negative_numbers = true, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
 }
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    anyhow::ensure!(
-        args.folder.is_dir() || !args.folder.exists(),
-        Usage(format!("{} is a file: expected a folder of scripts", args.folder.display()))
-    );
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let is_fetched = !args.no_wait && !args.dry_run;
     let order =
@@ -172,7 +169,8 @@ impl Order {
 
 fn name_of(folder: &Path) -> anyhow::Result<Animation> {
     let place = folder.canonicalize().with_context(|| format!("cannot read {}", folder.display()))?;
-    let name = place.file_name().and_then(|name| name.to_str());
+    let name = if place.is_dir() { place.file_name() } else { place.file_stem() };
+    let name = name.and_then(|name| name.to_str());
     let name = name.ok_or_else(|| Usage(format!("{} has no name to use: give --name", folder.display())))?;
     Ok(Animation::new(name)?)
 }
@@ -189,10 +187,10 @@ fn submission(
         let name = path.file_name().and_then(|name| name.to_str());
         let name = name.with_context(|| format!("the name of {} is not UTF-8", path.display()))?;
         let name = ScriptName::new(script_name(name).unwrap_or(name))?;
-        if name.as_str().len() > LONGEST_NAME_ON_MINIO {
+        if name.as_str().len() > LONGEST_NAME {
             console.note(format_args!(
-                "{name}.txt: on S3 it is drawn; on MinIO, which keeps objects as files, a name of more than \
-                 {LONGEST_NAME_ON_MINIO} bytes is too long for its frame"
+                "{name}.txt: on S3 it is drawn; on MinIO and SeaweedFS, whose path segments have at most 255 bytes, a name of \
+                 more than {LONGEST_NAME} bytes is too long for its frame"
             ));
         }
         scripts.push((name, path.to_path_buf()));

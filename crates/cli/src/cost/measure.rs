@@ -31,11 +31,16 @@ pub(super) struct Measured {
     pub(super) frame_kb: f64,
 }
 
-/// Draws some frames of `input`, for functions of so many MB.
+/// Draws some frames of `input`, for functions of so many MB on so many places.
 ///
 /// # Errors
 /// When a script has an error, or the scripts are no animation.
-pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> anyhow::Result<Measured> {
+pub(super) fn measure(
+    input: &[PathBuf],
+    memory_mb: f64,
+    places: Option<u64>,
+    console: &Console,
+) -> anyhow::Result<Measured> {
     let limits = Limits::default();
     let input = Input::animation(input, &limits)?;
     let plan = match Plan::new(&input, &limits, &Wishes::default(), console)? {
@@ -54,7 +59,7 @@ pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> a
             let mut shortest = f64::INFINITY;
             for _ in 0..TRIES {
                 let start = Instant::now();
-                let file = Format::Png.encode(&draw(&plan, job)?)?;
+                let file = Format::Png.encode(&draw(&plan, job, None)?)?;
                 shortest = shortest.min(start.elapsed().as_secs_f64());
                 bytes += file.len();
             }
@@ -64,13 +69,13 @@ pub(super) fn measure(input: &[PathBuf], memory_mb: f64, console: &Console) -> a
     })?;
     let drawing_ms = 1e3 * seconds / jobs.len() as f64;
     let bytes = bytes as f64 / jobs.len() as f64;
-    let waiting_ms = waiting_ms(frames);
+    let waiting_ms = waiting_ms(frames, places);
     console.note(format_args!(
         "drawn here on one thread: {} of {frames}, {drawing_ms:.1} ms each, a PNG of {} each; requests and pauses add \
          {waiting_ms:.0} ms",
         number(jobs.len() as u64, "frame"),
         Size(bytes as u64)
     ));
-    let ms = render_ms(frames, drawing_ms, memory_mb);
+    let ms = render_ms(frames, places, drawing_ms, memory_mb);
     Ok(Measured { frames, size, ms, frame_kb: bytes / 1e3 })
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::ValueEnum;
 use rayfold_client::cost::{Prices, Section, Workload, estimate};
-use rayfold_pipeline::assemble::MOST_PIECES;
+use rayfold_pipeline::assemble::MAX_PIECES;
 use rayfold_scene::Screen;
 use serde::Serialize;
 
@@ -21,7 +21,7 @@ use crate::values;
 use measure::measure;
 
 /// The longest that assembling may take, in seconds: invocations of the assemble function, of 15 minutes each.
-const MOST_ASSEMBLING_S: f64 = MOST_PIECES as f64 * 900.0;
+const MAX_ASSEMBLING_S: f64 = MAX_PIECES as f64 * 900.0;
 
 /// US dollars that are shown as 0.0001; what costs less is summed up.
 const LEAST_SHOWN: f64 = 0.000_05;
@@ -43,34 +43,37 @@ pub(crate) struct Args {
     #[arg(required_unless_present = "frames")]
     input: Vec<PathBuf>,
     /// How many frames
-    #[arg(long, value_name = "N", value_parser = values::count::<u64>, conflicts_with = "input", requires = "ms")]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, allow_negative_numbers = true, conflicts_with = "input", requires = "ms")]
     frames: Option<u64>,
     /// Milliseconds that the render function takes for one, as its log says, with this --memory [default: measured]
     #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     ms: Option<f64>,
     /// The frames' size in pixels [default: 512x512, or that of the scripts]
-    #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with = "input")]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_negative_numbers = true, conflicts_with = "input")]
     size: Option<Screen>,
+    /// Number of invocations of the render function that run at once [default: 1000, the limit of most accounts]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>)]
+    places: Option<u64>,
     /// Memory of the render function, in MB
-    #[arg(long, value_name = "MB", default_value = "1769", value_parser = positive)]
+    #[arg(long, value_name = "MB", default_value = "1769", value_parser = positive, allow_negative_numbers = true)]
     memory: f64,
     /// Memory of the assemble function, in MB
-    #[arg(long, value_name = "MB", default_value = "3008", value_parser = positive)]
+    #[arg(long, value_name = "MB", default_value = "3008", value_parser = positive, allow_negative_numbers = true)]
     assemble_memory: f64,
     /// What the functions run on
     #[arg(long, value_enum, default_value_t)]
     architecture: Architecture,
     /// Milliseconds that the assemble function takes for a frame, if you know better than from the size
-    #[arg(long, value_name = "MS", value_parser = positive)]
+    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
     assemble_ms: Option<f64>,
     /// Size of a frame's PNG in kB, if you know better than what is measured, or from the size
-    #[arg(long, value_name = "KB", value_parser = positive)]
+    #[arg(long, value_name = "KB", value_parser = positive, allow_negative_numbers = true)]
     frame_kb: Option<f64>,
     /// Size of the GIF in MB, if you know better
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     gif_mb: Option<f64>,
     /// Minutes between two sweeps
-    #[arg(long, value_name = "MIN", default_value = "15", value_parser = positive)]
+    #[arg(long, value_name = "MIN", default_value = "15", value_parser = positive, allow_negative_numbers = true)]
     sweep_minutes: f64,
     /// With a key of the stack's own
     #[arg(long)]
@@ -110,12 +113,12 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let work = workload(args, console)?;
     let sections = estimate(&work, &prices);
     let assembling_s = work.assembling_s();
-    if assembling_s > MOST_ASSEMBLING_S {
+    if assembling_s > MAX_ASSEMBLING_S {
         console.warn(format_args!(
             "assembling takes about {} s, and what takes more than {} s is refused: expected \
              fewer or smaller frames; or fetch the frames, and assemble them by rayfold encode",
             amount(assembling_s),
-            amount(MOST_ASSEMBLING_S)
+            amount(MAX_ASSEMBLING_S)
         ));
     }
     match args.format {
@@ -148,7 +151,7 @@ fn read(file: Option<&PathBuf>) -> anyhow::Result<Prices> {
 fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
     let measured = match args.frames {
         Some(_) => None,
-        None => Some(measure(&args.input, args.memory, console)?),
+        None => Some(measure(&args.input, args.memory, args.places, console)?),
     };
     let measured = measured.as_ref();
     let frames = measured.map(|measured| measured.frames).or(args.frames).context("how many frames?")?;
@@ -159,6 +162,7 @@ fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
     };
     let guessed = Workload::new(frames, size, ms);
     Ok(Workload {
+        places: args.places,
         memory_mb: args.memory,
         assemble_memory_mb: args.assemble_memory,
         arm64: args.architecture == Architecture::Arm64,
@@ -194,6 +198,13 @@ fn table(work: &Workload, prices: &Prices, sections: &[Section]) -> String {
         prices.as_of,
         prices.currency,
     );
+    if let Some(places) = work.places {
+        let (rendering, assembling) = (amount(work.rendering_s()), amount(work.assembling_s()));
+        let at_once =
+            if places == 1 { "1 place".to_owned() } else { format!("{} places", amount(places as f64)) };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "On {at_once}: drawn in {rendering} s, assembled in {assembling} s");
+    }
     for section in sections {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "\n{}", section.title);

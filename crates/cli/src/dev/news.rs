@@ -64,6 +64,12 @@ impl<'a> News<'a> {
                 Outcome::Succeeded(_) | Outcome::Failed(_) => {}
             },
             Seen::DeadLetter { body } => self.console.note(format_args!("given up: {body}")),
+            Seen::Joined { invoker } => {
+                self.console.note(format_args!("invoker {invoker} shares the work"));
+            }
+            Seen::Lost { invoker } => {
+                self.console.note(format_args!("invoker {invoker} has gone; its work is taken over"));
+            }
             Seen::Event { .. } | Seen::Started(_) | Seen::Requested { .. } => {}
         }
     }

@@ -1,147 +1,274 @@
-//! PNG and TIFF files as frames: one that is a picture, or all frames of an animated PNG and all pages of a TIFF.
+//! Files as frames: a picture is one frame, an animated file has all its frames, and a TIFF all its pages.
 //!
-//! What a file says of its pixels is obeyed as far as a GIF can show it: its gamma, its orientation, its transparency.
+//! The gamma, orientation and transparency of a file are applied as far as a GIF can show them.
 
 use std::cell::Cell;
-use std::fs::File;
-use std::io::{BufReader, Seek};
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{Context, bail, ensure};
+use image::codecs::gif::GifDecoder;
+use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
 use image::codecs::tiff::TiffDecoder;
+use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
-use image::{AnimationDecoder, DynamicImage, ImageDecoder, Limits, Rgb, RgbImage};
+use image::{AnimationDecoder, DynamicImage, Frames, ImageDecoder, Limits, Rgb, RgbImage};
 
+use super::source::{Reader, Source};
 use super::tiff::{self, PageReader};
+use super::video::{SIGNATURE, Video};
+use crate::interrupt;
 
-/// The gamma of what is shown; a file's gamma so near to it changes nothing that could be seen (libpng's threshold).
+/// The gamma of the display. A gamma of a file that is so near to it makes no visible difference (libpng's threshold).
 const DISPLAY_GAMMA: f64 = 2.2;
 const GAMMA_THRESHOLD: f64 = 0.05;
 
-/// What a PNG file begins with.
-const PNG_SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+/// The first bytes of each kind of file.
+const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+const JPEG_SIGNATURE: &[u8] = b"\xff\xd8\xff";
+const GIF_SIGNATURE: &[u8] = b"GIF8";
+const WEBP_SIGNATURE: &[u8] = b"RIFF";
 
-/// A picture of a file, or the frames of one that is animated.
+/// The time for which players show a frame of an animated file whose own time is zero, or too short in their view.
+const USUAL_SECONDS: f64 = 0.1;
+const LEAST_SECONDS: f64 = 0.011;
+
+/// A picture in a file, or the frames of an animated file.
 #[derive(Clone, Debug)]
 pub(super) struct Picture {
-    /// Its file.
-    pub(super) path: PathBuf,
-    /// How many frames it is.
-    pub(super) frames: u64,
+    source: Source,
+    /// The number of frames; `None` for a video, where it is not known.
+    pub(super) frames: Option<u64>,
     kind: Kind,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Kind {
     Png { gamma: Option<f64> },
-    AnimatedPng { gamma: Option<f64> },
+    Jpeg,
+    WebP,
     TiffPage { at: u64 },
+    Animated { format: Animated, gamma: Option<f64> },
+    Video(Video),
 }
 
-/// What takes the frames of a file, one after the other.
-type Take<'a> = &'a mut dyn FnMut(RgbImage) -> anyhow::Result<()>;
+#[derive(Clone, Copy, Debug)]
+enum Animated {
+    Png,
+    Gif,
+    WebP,
+}
+
+/// The function that takes the frames of a file in order, each with the seconds for which the file shows it.
+type Take<'a> = &'a mut dyn FnMut(RgbImage, Option<f64>) -> anyhow::Result<()>;
 
 impl Picture {
-    /// Looks into a file: whether it is a PNG or TIFF image, and of how many frames.
+    /// Examines a file: its kind, and its number of frames.
     ///
     /// # Errors
-    /// When it is none, or cannot be read; the file is named.
+    /// When the file cannot be shown or read; the error names it.
     pub(super) fn all_of(path: &Path) -> anyhow::Result<Vec<Self>> {
-        named(path, || {
+        let source = Source::File(path.to_path_buf());
+        named(&source.name(), || {
             ensure!(!path.is_dir(), "it is a folder, expected its images, such as {0}/*.png", path.display());
-            let file = rayfold_files::open(path)?;
-            let of = |frames, kind| Self { path: path.to_path_buf(), frames, kind };
-            // Of a file that is shorter there is nothing to see.
-            let header = tiff::header(&mut &file).unwrap_or_default();
-            (&file).rewind()?;
-            match header {
-                header if header == PNG_SIGNATURE => {
-                    let reader = png::Decoder::new(BufReader::new(&file)).read_info()?;
-                    let gamma = gamma(reader.info());
-                    Ok(vec![match reader.info().animation_control {
-                        Some(animation) if animation.num_frames > 1 => {
-                            of(animation.num_frames.into(), Kind::AnimatedPng { gamma })
-                        }
-                        _ => of(1, Kind::Png { gamma }),
-                    }])
-                }
-                header if tiff::is_tiff(&header) => {
-                    let pages = tiff::pages(&mut BufReader::new(&file))?;
-                    Ok(pages.into_iter().map(|at| of(1, Kind::TiffPage { at })).collect())
-                }
-                _ => bail!("it is neither a PNG nor a TIFF image"),
+            Self::of(&source)
+        })
+    }
+
+    /// Reads standard input: a picture or an animation as a whole, a video frame by frame.
+    ///
+    /// # Errors
+    /// When the input cannot be shown, or a signal came during the wait for it.
+    pub(super) fn all_of_stdin() -> anyhow::Result<Vec<Self>> {
+        let read = interrupt::wait_for(|| {
+            let mut bytes = Vec::new();
+            let mut stdin = std::io::stdin();
+            stdin.by_ref().take(SIGNATURE.len() as u64).read_to_end(&mut bytes)?;
+            if bytes != SIGNATURE {
+                stdin.read_to_end(&mut bytes)?;
             }
+            Ok::<_, std::io::Error>(bytes)
+        })?;
+        let name = Source::Memory(Arc::default()).name();
+        named(&name, || {
+            let bytes = read?;
+            let is_video = bytes == SIGNATURE;
+            let source = Source::Memory(bytes.into());
+            if !is_video {
+                return Self::of(&source);
+            }
+            let video = Video::read(Box::new(SIGNATURE.as_slice().chain(std::io::stdin())))?;
+            Ok(vec![Self { source, frames: None, kind: Kind::Video(video) }])
         })
     }
 
-    /// Columns and rows, as it is shown.
+    fn of(source: &Source) -> anyhow::Result<Vec<Self>> {
+        let of = |frames, kind| Self { source: source.clone(), frames: Some(frames), kind };
+        let animated = |frames, format, still, gamma| {
+            if frames > 1 { of(frames, Kind::Animated { format, gamma }) } else { of(1, still) }
+        };
+        let mut reader = source.open()?;
+        // A shorter file has no picture.
+        let header = tiff::header(&mut reader).unwrap_or_default();
+        std::io::Seek::rewind(&mut reader)?;
+        let begins = |with: &[u8]| header.starts_with(with);
+        Ok(if begins(PNG_SIGNATURE) {
+            let reader = png::Decoder::new(reader).read_info()?;
+            let gamma = gamma(reader.info());
+            let frames = reader.info().animation_control.map_or(1, |animation| animation.num_frames);
+            vec![animated(frames.into(), Animated::Png, Kind::Png { gamma }, gamma)]
+        } else if begins(JPEG_SIGNATURE) {
+            JpegDecoder::new(reader)?;
+            vec![of(1, Kind::Jpeg)]
+        } else if begins(GIF_SIGNATURE) {
+            vec![of(count_of_gif(reader)?, Kind::Animated { format: Animated::Gif, gamma: None })]
+        } else if begins(WEBP_SIGNATURE) {
+            let decoder = image_webp::WebPDecoder::new(reader)?;
+            let frames = if decoder.is_animated() { decoder.num_frames().into() } else { 1 };
+            vec![animated(frames, Animated::WebP, Kind::WebP, None)]
+        } else if begins(SIGNATURE) {
+            vec![Self {
+                source: source.clone(),
+                frames: None,
+                kind: Kind::Video(Video::read(Box::new(reader))?),
+            }]
+        } else if tiff::is_tiff(&header) {
+            let pages = tiff::pages(&mut reader)?;
+            pages.into_iter().map(|at| of(1, Kind::TiffPage { at })).collect()
+        } else {
+            bail!("it is no image: expected PNG, APNG, JPEG, GIF, WebP, TIFF or .y4m")
+        })
+    }
+
+    /// Returns the name for messages.
+    pub(super) fn name(&self) -> String {
+        self.source.name()
+    }
+
+    /// Returns the frames per second of a video; other files give none.
+    pub(super) fn fps(&self) -> Option<f64> {
+        match &self.kind {
+            Kind::Video(video) => Some(video.fps),
+            _ => None,
+        }
+    }
+
+    /// Returns the columns and rows as the picture is shown.
     ///
     /// # Errors
-    /// When its header cannot be read; the file is named.
+    /// When the header cannot be read; the error names the file.
     pub(super) fn size(&self) -> anyhow::Result<(u32, u32)> {
-        named(&self.path, || match self.kind {
-            Kind::Png { .. } | Kind::AnimatedPng { .. } => shown_size(self.png()?),
-            Kind::TiffPage { at } => shown_size(self.tiff(at)?),
+        named(&self.name(), || match &self.kind {
+            Kind::Png { .. } | Kind::Animated { format: Animated::Png, .. } => shown_size(self.png()?),
+            Kind::Jpeg => shown_size(JpegDecoder::new(self.source.open()?)?),
+            Kind::WebP | Kind::Animated { format: Animated::WebP, .. } => {
+                shown_size(WebPDecoder::new(self.source.open()?)?)
+            }
+            Kind::Animated { format: Animated::Gif, .. } => shown_size(GifDecoder::new(self.source.open()?)?),
+            Kind::TiffPage { at } => shown_size(self.tiff(*at)?),
+            Kind::Video(video) => Ok(video.size),
         })
     }
 
-    /// Decodes it, if it is one frame.
+    /// Decodes the picture if it is a single frame.
     ///
     /// # Errors
-    /// When it cannot be decoded; the file is named.
+    /// When the picture cannot be decoded; the error names the file.
     pub(super) fn decode(&self) -> anyhow::Result<Option<RgbImage>> {
-        named(&self.path, || {
-            Ok(match self.kind {
-                Kind::AnimatedPng { .. } => None,
-                Kind::Png { gamma } => Some(shown(self.png()?, gamma)?),
-                Kind::TiffPage { at } => Some(shown(self.tiff(at)?, None)?),
+        named(&self.name(), || {
+            Ok(match &self.kind {
+                Kind::Animated { .. } | Kind::Video(_) => None,
+                Kind::Png { gamma } => Some(shown(self.png()?, *gamma)?),
+                Kind::Jpeg => Some(shown(JpegDecoder::new(self.source.open()?)?, None)?),
+                Kind::WebP => Some(shown(WebPDecoder::new(self.source.open()?)?, None)?),
+                Kind::TiffPage { at } => Some(shown(self.tiff(*at)?, None)?),
             })
         })
     }
 
-    /// Decodes the frames of an animated PNG, each as a whole picture.
+    /// Decodes the frames of an animation or a video, each as a whole picture.
     ///
     /// # Errors
-    /// When they cannot be decoded, with the file's name, and those of `take`.
+    /// When the frames cannot be decoded, with the file's name, and the errors of `take`.
     pub(super) fn decode_each(&self, take: Take<'_>) -> anyhow::Result<()> {
-        let Kind::AnimatedPng { gamma } = self.kind else { return Ok(()) };
-        let (orientation, mut frames) = named(&self.path, || {
-            let orientation = self.png()?.orientation()?;
-            Ok((orientation, self.png()?.apng()?.into_frames()))
-        })?;
-        for number in 1..=self.frames {
-            let next = named(&self.path, || {
-                let frame =
-                    frames.next().with_context(|| format!("frame {number} of {} is missing", self.frames))?;
-                let mut image = DynamicImage::ImageRgba8(frame?.into_buffer());
+        let (format, gamma) = match &self.kind {
+            Kind::Animated { format, gamma } => (*format, *gamma),
+            Kind::Video(video) => {
+                let mut taken = Ok(());
+                let read = video.each(|image| {
+                    taken = take(image, None);
+                    anyhow::ensure!(taken.is_ok());
+                    Ok(())
+                });
+                // An error of `take` is not about the file.
+                taken?;
+                return named(&self.name(), || read);
+            }
+            _ => return Ok(()),
+        };
+        let (orientation, mut frames) = named(&self.name(), || self.animation(format))?;
+        for number in 1..=self.frames.unwrap_or_default() {
+            let (next, seconds) = named(&self.name(), || {
+                let frame = frames.next().with_context(|| {
+                    format!("frame {number} of {} is missing", self.frames.unwrap_or_default())
+                })??;
+                let (parts, whole) = frame.delay().numer_denom_ms();
+                let seconds = f64::from(parts) / f64::from(whole.max(1)) / 1_000.0;
+                let mut image = DynamicImage::ImageRgba8(frame.into_buffer());
                 image.apply_orientation(orientation);
-                Ok(opaque(image, gamma))
+                Ok((opaque(image, gamma), if seconds < LEAST_SECONDS { USUAL_SECONDS } else { seconds }))
             })?;
-            take(next)?;
+            take(next, Some(seconds))?;
         }
         Ok(())
     }
 
-    fn png(&self) -> anyhow::Result<PngDecoder<BufReader<File>>> {
-        Ok(PngDecoder::with_limits(BufReader::new(rayfold_files::open(&self.path)?), Limits::default())?)
+    fn animation(&self, format: Animated) -> anyhow::Result<(Orientation, Frames<'static>)> {
+        let reader = self.source.open()?;
+        Ok(match format {
+            Animated::Png => (self.png()?.orientation()?, self.png()?.apng()?.into_frames()),
+            Animated::Gif => (Orientation::NoTransforms, GifDecoder::new(reader)?.into_frames()),
+            Animated::WebP => {
+                let mut decoder = WebPDecoder::new(reader)?;
+                (decoder.orientation()?, decoder.into_frames())
+            }
+        })
     }
 
-    fn tiff(&self, at: u64) -> anyhow::Result<TiffDecoder<BufReader<PageReader<File>>>> {
-        let page = PageReader::new(rayfold_files::open(&self.path)?, at)?;
-        let mut decoder = TiffDecoder::new(BufReader::new(page))?;
+    fn png(&self) -> anyhow::Result<PngDecoder<Reader>> {
+        Ok(PngDecoder::with_limits(self.source.open()?, Limits::default())?)
+    }
+
+    fn tiff(&self, at: u64) -> anyhow::Result<TiffDecoder<std::io::BufReader<PageReader<Reader>>>> {
+        let page = PageReader::new(self.source.open()?, at)?;
+        let mut decoder = TiffDecoder::new(std::io::BufReader::new(page))?;
         decoder.set_limits(Limits::default())?;
         Ok(decoder)
     }
 }
 
-/// Does what reads a file. A decoder that panics, as some do on files that are out of the ordinary, is an error.
-fn named<T>(path: &Path, read: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
+/// Counts the frames of a GIF without decoding them.
+fn count_of_gif(reader: Reader) -> anyhow::Result<u64> {
+    let mut options = gif::DecodeOptions::new();
+    options.skip_frame_decoding(true);
+    let mut decoder = options.read_info(reader)?;
+    let mut count = 0;
+    while decoder.next_frame_info()?.is_some() {
+        count += 1;
+    }
+    ensure!(count > 0, "it has no frame");
+    Ok(count)
+}
+
+/// Runs `read`, and names the file in its error. A panic of a decoder, as of some on unusual files, is an error.
+fn named<T>(name: &str, read: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     let read = quietly(read).unwrap_or_else(|| bail!("the decoder cannot cope with it"));
-    // The decoders' words say already what their causes say again.
-    read.map_err(|error| anyhow::anyhow!("{error}"))
-        .with_context(|| format!("cannot read {}", path.display()))
+    // The decoders' messages already contain those of their causes.
+    read.map_err(|error| anyhow::anyhow!("{}", error.to_string().trim()))
+        .with_context(|| format!("cannot read {name}"))
 }
 
 thread_local! {
@@ -165,8 +292,8 @@ fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
     done.ok()
 }
 
-/// The exponent that a PNG's samples were encoded by, if it is not that of the display. What says more about the colours
-/// counts instead.
+/// Returns the exponent by which the samples of a PNG were encoded, if it is not that of the display. Chunks with more
+/// information on the colours take precedence.
 fn gamma(info: &png::Info<'_>) -> Option<f64> {
     let says_more =
         info.srgb.is_some() || info.icc_profile.is_some() || info.coding_independent_code_points.is_some();
@@ -196,7 +323,7 @@ fn shown(mut decoder: impl ImageDecoder, gamma: Option<f64>) -> anyhow::Result<R
     Ok(opaque(image, gamma))
 }
 
-/// A GIF's pixel is there or not; what is half there is shown over black.
+/// Blends an image over black: a pixel of a GIF is either opaque or transparent.
 fn opaque(image: DynamicImage, gamma: Option<f64>) -> RgbImage {
     let image = match gamma {
         Some(gamma) => with_gamma(image, gamma),
@@ -213,7 +340,7 @@ fn opaque(image: DynamicImage, gamma: Option<f64>) -> RgbImage {
     })
 }
 
-/// Samples that were encoded by an exponent, as sRGB (IEC 61966-2-1) encodes them.
+/// Converts samples that were encoded by an exponent to sRGB (IEC 61966-2-1).
 fn with_gamma(image: DynamicImage, gamma: f64) -> DynamicImage {
     let mut image = image.into_rgba16();
     let levels: Vec<u16> = (0..=u16::MAX)
@@ -256,7 +383,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_an_error_with_the_files_name() {
-        let error = named::<()>(Path::new("a.tif"), || panic!("index out of bounds")).unwrap_err();
+        let error = named::<()>("a.tif", || panic!("index out of bounds")).unwrap_err();
         assert_eq!(format!("{error:#}"), "cannot read a.tif: the decoder cannot cope with it");
     }
 }

@@ -1,34 +1,34 @@
-//! The pages of a TIFF file. The decoder reads the first one; another is read as the first of a file whose header leads to
-//! it.
+//! The pages of a TIFF file. The decoder reads only the first page of a file; for another page it gets a header that
+//! points to that page.
 
 use std::collections::HashSet;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use anyhow::{Context, bail, ensure};
 
-/// The tags that matter here, and what they say.
+/// The tags that are read here.
 const NEW_SUBFILE_TYPE: u16 = 254;
 const PLANAR_CONFIGURATION: u16 = 284;
 const TILE_WIDTH: u16 = 322;
 
-/// Bits of NewSubfileType: a smaller copy of another page, and a mask for one.
+/// The bits of NewSubfileType for a smaller copy of another page, and for a mask.
 const NO_PAGE: u64 = 0b101;
 
-/// PlanarConfiguration of samples that are stored channel by channel.
+/// The PlanarConfiguration of samples that are stored channel by channel.
 const PLANAR: u64 = 2;
 
-/// More pages than any file of pictures has.
-const MOST_PAGES: usize = 1 << 20;
+/// A number of pages above that of any file of pictures.
+const MAX_PAGES: usize = 1 << 20;
 
-/// How the numbers of a file are written.
+/// The byte order and offset size of a file.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     is_big_endian: bool,
-    /// BigTIFF, whose offsets have eight bytes.
+    /// Whether it is a BigTIFF, whose offsets have eight bytes.
     is_large: bool,
 }
 
-/// Returns where the directories of the pages are, in order. Smaller copies and masks are no pages.
+/// Returns the offsets of the pages' directories, in order. Smaller copies and masks are not pages.
 ///
 /// # Errors
 /// When the file is cut off or its directories lead in a circle, and for a page that the decoder cannot read.
@@ -38,10 +38,10 @@ pub(super) fn pages(file: &mut (impl Read + Seek)) -> anyhow::Result<Vec<u64>> {
     let mut at = layout.first(file).context(cut_off)?;
     let (mut pages, mut seen) = (Vec::new(), HashSet::new());
     while at != 0 {
-        ensure!(seen.insert(at) && seen.len() <= MOST_PAGES, "its pages lead in a circle");
+        ensure!(seen.insert(at) && seen.len() <= MAX_PAGES, "its pages lead in a circle");
         let (directory, next) = Directory::read(file, at, layout).context(cut_off)?;
         if directory.subfile & NO_PAGE == 0 || pages.is_empty() {
-            // The decoder panics.
+            // The decoder panics on such a page.
             ensure!(
                 !(directory.is_tiled && directory.planes == PLANAR),
                 "page {} is stored in tiles and channel by channel, which cannot be read: expected strips, or the \
@@ -56,15 +56,15 @@ pub(super) fn pages(file: &mut (impl Read + Seek)) -> anyhow::Result<Vec<u64>> {
     Ok(pages)
 }
 
-/// Says whether a file that begins so is a TIFF image.
+/// Returns whether a file with this header is a TIFF image.
 pub(super) fn is_tiff(header: &[u8; 8]) -> bool {
     Layout::of(header).is_ok()
 }
 
-/// Reads a file's first bytes.
+/// Reads the first eight bytes of a file.
 ///
 /// # Errors
-/// When it has fewer.
+/// When the file is shorter.
 pub(super) fn header(file: &mut (impl Read + Seek)) -> io::Result<[u8; 8]> {
     let mut header = [0; 8];
     file.rewind()?;
@@ -83,7 +83,7 @@ impl Layout {
         })
     }
 
-    /// Where the offset of the first directory is, and how many bytes an offset has.
+    /// Returns the position of the first directory's offset, and the size of an offset in bytes.
     fn offset(self) -> (u64, usize) {
         if self.is_large { (8, 8) } else { (4, 4) }
     }
@@ -105,7 +105,7 @@ impl Layout {
     }
 }
 
-/// What matters of a page.
+/// The entries of a page's directory that are read here.
 #[derive(Debug, Default)]
 struct Directory {
     subfile: u64,
@@ -114,7 +114,7 @@ struct Directory {
 }
 
 impl Directory {
-    /// Reads it, and where the next one is.
+    /// Reads a directory, and the offset of the next one.
     fn read(file: &mut (impl Read + Seek), at: u64, layout: Layout) -> io::Result<(Self, u64)> {
         let (_, bytes) = layout.offset();
         file.seek(SeekFrom::Start(at))?;
@@ -126,7 +126,7 @@ impl Directory {
             layout.number(file, bytes)?;
             let mut value = vec![0; bytes];
             file.read_exact(&mut value)?;
-            // SHORT or LONG, at the value's beginning.
+            // A SHORT or LONG, at the start of the value.
             let width = if kind == 3 { 2 } else { 4 };
             let value = layout.number(&mut &value[..], width)?;
             match u16::try_from(tag) {

@@ -6,6 +6,7 @@ use image::{GenericImageView, RgbImage};
 use png::{BitDepth, ColorType, Compression, EncodingError};
 use rayfold_gif::{Plays, Thinning};
 
+use super::rate::fraction;
 use super::target::Movie;
 
 /// Parts of a second in which a frame's time is counted where a whole number of frames does not fill it: milliseconds, or
@@ -14,7 +15,7 @@ const PARTS: [u16; 2] = [1_000, 100];
 
 /// The most frames a second that browsers show: they show a frame of 10 ms or less for 100 ms, and round down to whole
 /// milliseconds. With more, frames are left out as in a GIF.
-pub(super) const MOST_FPS: f64 = 90.0;
+pub(super) const MAX_FPS: f64 = 90.0;
 
 /// Frames on their way.
 pub(super) struct Apng<W: Write> {
@@ -36,29 +37,37 @@ impl<W: Write> Apng<W> {
         file.set_color(ColorType::Rgb);
         file.set_depth(BitDepth::Eight);
         file.set_compression(Compression::Balanced);
-        let thinning = Thinning::new(movie.fps, MOST_FPS);
-        let frames = thinning.left_of(movie.frames);
+        let thinning = Thinning::new(movie.fps, MAX_FPS);
+        let known = movie.frames.ok_or_else(|| {
+            io::Error::other("an .apng begins with the number of its frames, which a video does not say: make a .gif of it")
+        })?;
+        let frames = thinning.left_of(known);
         let count = u32::try_from(frames).map_err(io::Error::other)?;
         file.set_animated(count, plays(movie.plays)).map_err(into_io)?;
         let file = file.write_header().map_err(into_io)?;
         Ok(Self { file, movie, thinning, frames, written: 0, last: None })
     }
 
-    /// Takes the next frame, which is as large as the others.
+    /// Takes the next frame, which is as large as the others, and how many seconds it is shown if not as long as they.
     ///
     /// # Errors
     /// The writer's.
-    pub(super) fn push(&mut self, frame: RgbImage) -> io::Result<()> {
-        self.thinning.push(frame).map_or(Ok(()), |frame| self.write(frame))
+    pub(super) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+        if seconds.is_some() && self.movie.fps > MAX_FPS {
+            let message =
+                format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
+            return Err(io::Error::other(message));
+        }
+        self.thinning.push(frame).map_or(Ok(()), |frame| self.write(frame, seconds))
     }
 
-    fn write(&mut self, frame: RgbImage) -> io::Result<()> {
+    fn write(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
         let (number, whole) = (self.written, (0, 0, frame.width(), frame.height()));
         self.written += 1;
         let (left, top, width, height) = self.last.as_ref().map_or(whole, |last| changed(last, &frame));
         let (time, parts) = match self.movie.last_delay_cs {
             Some(hundredths) if self.written == self.frames => (hundredths, 100),
-            _ => delay(self.thinning.fps(), number),
+            _ => seconds.map_or_else(|| delay(self.thinning.fps(), number), in_parts),
         };
         self.file.set_frame_delay(time, parts).map_err(into_io)?;
         if self.last.is_some() {
@@ -78,10 +87,10 @@ impl<W: Write> Apng<W> {
     /// The writer's.
     pub(super) fn finish(mut self) -> io::Result<u64> {
         if let Some(last) = self.thinning.finish() {
-            self.write(last)?;
+            self.write(last, None)?;
         }
         self.file.finish().map_err(into_io)?;
-        Ok(self.movie.frames - self.frames)
+        Ok(self.movie.frames.unwrap_or_default() - self.frames)
     }
 }
 
@@ -97,8 +106,8 @@ fn plays(plays: Plays) -> u32 {
 /// How long the frame of this number, from 0, is shown: so many parts of so many that a second has. Rounding does not
 /// add up.
 fn delay(fps: f64, number: u64) -> (u16, u16) {
-    if fps.fract() == 0.0 && (1.0..=65_535.0).contains(&fps) {
-        return (1, fps as u16);
+    if let (frames @ 1..=65_535, seconds @ 1..=65_535) = fraction(fps) {
+        return (seconds as u16, frames as u16);
     }
     let fits = |parts: &&u16| f64::from(**parts) / fps < f64::from(u16::MAX);
     let parts = *PARTS.iter().find(fits).unwrap_or(&PARTS[1]);
@@ -106,8 +115,14 @@ fn delay(fps: f64, number: u64) -> (u16, u16) {
     ((start(number + 1) - start(number)) as u16, parts)
 }
 
+/// A time as so many parts of so many that a second has.
+fn in_parts(seconds: f64) -> (u16, u16) {
+    let parts = if seconds * 1_000.0 <= 65_535.0 { 1_000 } else { 100 };
+    ((seconds * f64::from(parts)).round() as u16, parts)
+}
+
 /// Column, row, width and height of what differs; a pixel if nothing does, because a frame must have one.
-fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
+pub(super) fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
     let differs = |x: u32, y: u32| last.get_pixel(x, y) != frame.get_pixel(x, y);
     let (width, height) = frame.dimensions();
     let rows: Vec<u32> = (0..height).filter(|&y| (0..width).any(|x| differs(x, y))).collect();

@@ -13,11 +13,11 @@ use image::RgbImage;
 use rayfold_files::{OutputFile, probe};
 use rayfold_gif::Plays;
 use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
-use rayfold_tracer::{Precision, RenderOptions};
+use rayfold_tracer::{Precision, Progress as Work, RenderOptions};
 
 use crate::ahead;
 use crate::console::Console;
-use crate::input::{Input, is_stdin};
+use crate::input::{Input, is_stdin, must_be_new, must_not_replace};
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 use crate::plan::{Job, Plan, Wishes};
@@ -28,12 +28,15 @@ use crate::values;
 use crate::wording::{Size, number};
 
 mod apng;
+pub(crate) mod fit;
 pub(crate) mod movie;
+mod rate;
 pub(crate) mod target;
 mod watch;
+mod webp;
 mod y4m;
 
-use movie::MovieError;
+use movie::{MovieError, Push};
 use target::{Container, Format, Movie, Pattern, Place, Target};
 
 /// Render scripts to an animation, to one image, or to many
@@ -61,27 +64,36 @@ pub(crate) struct Args {
     /// A folder (its *.txt in natural order), script files (in the given order), or - for standard input
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// What to write: .gif, .apng or .y4m for an animation (- is .y4m to standard output); .png, .tif or .tiff for one
+    /// File to write: .gif, .apng, .webp or .y4m for an animation (- is .y4m to standard output); .png, .tif or .tiff for one
     /// frame, with %04d in the name for many, whose folder is made
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
-    /// Frames a second [default: what animation.json says, or 10]
+    /// Format of an animation, whatever the ending of OUT [default: by the ending; for -, y4m]
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    format: Option<Container>,
+    /// Leave a file that is there already, and fail
+    #[arg(long, conflicts_with_all = ["watch", "skip_existing"])]
+    no_clobber: bool,
+    /// Frames a second, such as 25, 12.5 or 30000/1001 [default: what animation.json says, or 10]
     #[arg(long, value_name = "RATE", value_parser = values::rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     #[command(flatten)]
     playback: Playback,
+    /// Reduce the levels of colours until the .gif or .webp has at most this size, such as 8M or 500k. Frames are drawn once
+    #[arg(long, value_name = "SIZE", value_parser = values::bytes, allow_negative_numbers = true)]
+    max_size: Option<u64>,
     /// In a .gif, keep every frame of at most 256 colours exactly. Without this flag, a slow fade of a large image (more than 100,000
     /// pixels) may be off by up to 4 levels of 255, in a file several times smaller
     #[arg(long)]
     exact: bool,
     /// Draw every frame in this size, such as 640x480, instead of that of its Screen
-    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_negative_numbers = true)]
     size: Option<Screen>,
     /// Draw frame N, or frames A to B, counted from 1
-    #[arg(long, value_name = "N|A..B", value_parser = parse_frames)]
+    #[arg(long, value_name = "N|A..B", value_parser = parse_frames, allow_negative_numbers = true)]
     frame: Option<Frames>,
     /// Draw at most N rays a pixel, fewer where the error is below E levels [default: 1], instead of what Samples says
-    #[arg(long, value_name = "N[,E]", value_parser = values::samples)]
+    #[arg(long, value_name = "N[,E]", value_parser = values::samples, allow_negative_numbers = true)]
     samples: Option<Samples>,
     /// Leave frames that are there already, whole and of the right size: goes on where Ctrl-C stopped. Files of scripts
     /// that have changed since are left, too
@@ -96,7 +108,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     threads: Threads,
     /// The largest image that a script may ask for, in pixels
-    #[arg(long, value_name = "N", value_parser = values::count::<u64>, default_value_t = Limits::PIXELS)]
+    #[arg(long, value_name = "N", value_parser = values::count::<u64>, allow_negative_numbers = true, default_value_t = Limits::PIXELS)]
     max_pixels: u64,
 }
 
@@ -123,8 +135,9 @@ impl From<Numbers> for Precision {
 type Frames = (Option<u64>, Option<u64>);
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
-    let target = Target::parse(&args.output)?;
+    let target = Target::parse(&args.output, args.format)?;
     check(args, &target)?;
+    args.threads.tell(console);
     args.threads.start()?;
     if args.watch {
         watch::draw_again(&args.input, console, || draw_all(args, &target, console))
@@ -138,16 +151,16 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 fn check(args: &Args, target: &Target) -> Result<(), Usage> {
     let usage = |message: &str| Err(Usage(message.into()));
     match target {
-        Target::Animation(Container::Gif | Container::Apng, _) => {}
+        Target::Animation(Container::Gif | Container::Apng | Container::Webp, _) => {}
         Target::Animation(Container::Y4m, _) if args.playback.is_given() => {
             return usage(
-                "--loop, --once and --final-delay are for .gif and .apng: a .y4m holds frames and their rate alone",
+                "--loop, --once and --final-delay are for .gif, .apng and .webp: a .y4m holds frames and their rate alone",
             );
         }
         Target::Animation(Container::Y4m, _) => {}
         Target::Image(..) | Target::Images(..) if args.fps.is_some() || args.playback.is_given() => {
             return usage(
-                "--fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif or .apng",
+                "--fps, --loop, --once and --final-delay are for animations: expected an output that ends in .gif, .apng or .webp",
             );
         }
         Target::Image(..) | Target::Images(..) => {}
@@ -155,6 +168,7 @@ fn check(args: &Args, target: &Target) -> Result<(), Usage> {
     if args.exact && !matches!(target, Target::Animation(Container::Gif, _)) {
         return usage("--exact is for .gif: every other output keeps all colours of a frame");
     }
+    check_max_size(args.max_size, target)?;
     if args.skip_existing && !matches!(target, Target::Images(..)) {
         return usage("--skip-existing is for a file a frame: expected a pattern such as frames/%04d.png");
     }
@@ -176,6 +190,16 @@ fn check(args: &Args, target: &Target) -> Result<(), Usage> {
     }
 }
 
+/// # Errors
+/// When a size is given for an output that has only one quality.
+pub(crate) fn check_max_size(max_size: Option<u64>, target: &Target) -> Result<(), Usage> {
+    match target {
+        _ if max_size.is_none() => Ok(()),
+        Target::Animation(Container::Gif | Container::Webp, _) => Ok(()),
+        _ => Err(Usage("--max-size is for .gif and .webp: other outputs keep all that is in a frame".into())),
+    }
+}
+
 fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<()> {
     let wishes = Wishes {
         size: args.size,
@@ -183,6 +207,12 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
         frames: args.frame.unwrap_or_default(),
         precision: args.precision.into(),
     };
+    if args.no_clobber {
+        match target {
+            Target::Animation(_, Place::File(path)) | Target::Image(path, _) => must_be_new(path)?,
+            Target::Animation(_, Place::StandardOutput) | Target::Images(..) => {}
+        }
+    }
     match target {
         Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
         Target::Animation(_, Place::StandardOutput) => {}
@@ -192,6 +222,17 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     }
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let input = Input::animation(&args.input, &limits)?;
+    match target {
+        Target::Animation(_, Place::File(path)) | Target::Image(path, _) => {
+            must_not_replace(path, input.files())?;
+        }
+        Target::Animation(_, Place::StandardOutput) => {}
+        Target::Images(pattern, _) => {
+            if let Some(taken) = input.files().find(|file| pattern.names(file)) {
+                must_not_replace(taken, std::iter::once(taken))?;
+            }
+        }
+    }
     let plan = match Plan::new(&input, &limits, &wishes, console)? {
         Ok(plan) => plan,
         Err(faults) => anyhow::bail!("nothing was written: {}", faults.count()),
@@ -207,7 +248,12 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     match target {
         Target::Animation(container, place) => animation(args, *container, place, &plan, console),
         Target::Image(path, format) => image(path, *format, &plan, console),
-        Target::Images(pattern, format) => images(pattern, *format, args.skip_existing, &plan, console),
+        Target::Images(pattern, format) => {
+            if args.no_clobber {
+                plan.jobs().try_for_each(|job| must_be_new(&pattern.path(job.number)))?;
+            }
+            images(pattern, *format, args.skip_existing, &plan, console)
+        }
     }
 }
 
@@ -242,27 +288,35 @@ fn animation(
     AnimationSettings::new(None, fps, 0).map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
     let movie = Movie {
         size: (size.width(), size.height()),
-        frames: plan.len(),
+        frames: Some(plan.shown_count()),
         fps,
         plays: args.playback.plays(Plays::repeated(plan.settings.loops())),
         last_delay_cs: args.playback.last_delay_cs(),
         exact: args.exact,
     };
-    let mut progress = Progress::start(console, "frames", plan.len());
+    let durations = plan.durations()?;
+    if container == Container::Y4m && !durations.is_empty() {
+        console.warn("durations are left out: a .y4m holds frames and their rate alone");
+    }
+    let progress = Progress::of_frames(console, plan.shown_count());
     let mut done = 0;
-    let written = movie::write(place, container, movie, |push| {
+    let fill = |push: Push<'_>| {
         ahead::in_order(
-            plan.jobs(),
+            plan.shown(),
             plan.window(),
-            |job| draw(plan, &job),
+            |job| draw(plan, &job, progress.drawn()),
             |frame| {
                 anyhow::ensure!(!interrupt::stopping(), "interrupted");
-                push(frame)?;
+                push(frame, durations.get(&done).copied())?;
                 done += 1;
                 progress.set(console, done);
                 Ok(())
             },
         )
+    };
+    let written = progress.watch(console, || match args.max_size {
+        None => movie::write(place, container, movie, fill),
+        Some(limit) => fit::write(place, container, movie, limit, console, fill),
     });
     let took = progress.finish();
     match written {
@@ -284,9 +338,10 @@ fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow:
             path.display()
         );
     };
-    let progress = Progress::start(console, "frames", 1);
+    let progress = Progress::of_frames(console, 1);
     // On a thread of the pool, so that it is not idle while the image is drawn.
-    let file = rayon::scope(|_| format.encode(&draw(plan, &job)?))?;
+    let drawing = || rayon::scope(|_| format.encode(&draw(plan, &job, progress.drawn())?));
+    let file = progress.watch(console, drawing)?;
     OutputFile::write(path, &file, true)?;
     let took = progress.finish().as_secs_f64();
     console.note(format_args!("{}: {}, in {took:.2} s", path.display(), Size(file.len() as u64)));
@@ -308,35 +363,38 @@ fn images(
     console: &Console,
 ) -> anyhow::Result<()> {
     pattern.make_folder()?;
-    let mut progress = Progress::start(console, "frames", plan.len());
+    let progress = Progress::of_frames(console, plan.len());
     let (mut done, mut bytes, mut skipped) = (0, 0, 0);
     let files = AtomicU64::new(0);
-    let written = ahead::in_order(
-        plan.jobs(),
-        plan.window(),
-        |job| {
-            let path = pattern.path(job.number);
-            if skip_existing && is_drawn(&path, format, plan.scene(&job)?.screen) {
-                return Ok(Drawn::Skipped);
-            }
-            if skip_existing {
-                probe(&path)?;
-            }
-            let file = format.encode(&draw(plan, &job)?)?;
-            OutputFile::write(path, &file, false)?;
-            files.fetch_add(1, Ordering::Relaxed);
-            Ok(Drawn::Written(file.len() as u64))
-        },
-        |drawn| {
-            match drawn {
-                Drawn::Written(size) => bytes += size,
-                Drawn::Skipped => skipped += 1,
-            }
-            done += 1;
-            progress.set(console, done);
-            Ok(())
-        },
-    );
+    let drawing = || {
+        ahead::in_order(
+            plan.jobs(),
+            plan.window(),
+            |job| {
+                let path = pattern.path(job.number);
+                if skip_existing && is_drawn(&path, format, plan.scene(&job)?.screen) {
+                    return Ok(Drawn::Skipped);
+                }
+                if skip_existing {
+                    probe(&path)?;
+                }
+                let file = format.encode(&draw(plan, &job, progress.drawn())?)?;
+                OutputFile::write(path, &file, false)?;
+                files.fetch_add(1, Ordering::Relaxed);
+                Ok(Drawn::Written(file.len() as u64))
+            },
+            |drawn| {
+                match drawn {
+                    Drawn::Written(size) => bytes += size,
+                    Drawn::Skipped => skipped += 1,
+                }
+                done += 1;
+                progress.set(console, done);
+                Ok(())
+            },
+        )
+    };
+    let written = progress.watch(console, drawing);
     let took = progress.finish().as_secs_f64();
     written.with_context(|| format!("{} of {} written", files.into_inner(), number(plan.len(), "frame")))?;
     let number_of = |job: Option<Job>| job.map_or(1, |job| job.number);
@@ -359,14 +417,18 @@ fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
     image.is_some_and(|image| image.dimensions() == (screen.width(), screen.height()))
 }
 
-/// Draws a frame, unless the run was told to stop.
+/// Draws a frame, unless the run is stopping. `progress` counts its work.
 ///
 /// # Errors
 /// When it was, and those of the renderer.
-pub(crate) fn draw(plan: &Plan, job: &Job) -> anyhow::Result<RgbImage> {
+pub(crate) fn draw(plan: &Plan, job: &Job, progress: Option<&Work>) -> anyhow::Result<RgbImage> {
     anyhow::ensure!(!interrupt::stopping(), "interrupted");
-    let options =
-        RenderOptions { cancel: Some(interrupt::flag()), precision: plan.precision, ..Default::default() };
+    let options = RenderOptions {
+        cancel: Some(interrupt::flag()),
+        progress,
+        precision: plan.precision,
+        ..Default::default()
+    };
     plan.expose(job, |exposure| rayfold_tracer::render_exposed(exposure, &options))?
         .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
 }

@@ -7,8 +7,9 @@ use image::RgbImage;
 use rayfold_files::OutputFile;
 use rayfold_gif::{Encoder, Settings};
 
-use super::apng::{Apng, MOST_FPS};
+use super::apng::{Apng, MAX_FPS};
 use super::target::{Container, Movie, Place};
+use super::webp::{Length, WebP};
 use super::y4m::Y4m;
 use crate::console::Console;
 use crate::interrupt;
@@ -21,7 +22,7 @@ const BUFFER: usize = 1 << 20;
 /// Why an animation could not be written.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MovieError {
-    /// Whoever reads standard output has had enough.
+    /// The reader of standard output has closed it.
     #[error("the reader of standard output has closed it")]
     Closed,
     #[error("cannot write to standard output: it is closed, or /dev/null that is open for reading too")]
@@ -32,9 +33,20 @@ pub(crate) enum MovieError {
     Output(#[from] rayfold_files::Error),
     #[error(transparent)]
     Gif(rayfold_gif::Error),
+    /// The file is as large as it may be.
+    #[error("the file is too large")]
+    Full,
+    /// Frames cannot be kept until they fit.
+    #[error("{0:#}")]
+    Store(anyhow::Error),
 }
 
-/// What was written.
+/// Why a sink takes no more.
+#[derive(Debug, thiserror::Error)]
+#[error("too large")]
+struct TooLarge;
+
+/// A description of the animation that was written.
 #[derive(Debug)]
 pub(crate) struct Written {
     pub(crate) frames: u64,
@@ -45,34 +57,69 @@ pub(crate) struct Written {
     pub(crate) bytes: u64,
 }
 
-/// Takes the next frame.
-pub(crate) type Push<'a> = &'a mut (dyn FnMut(RgbImage) -> Result<(), MovieError> + Send);
+/// Takes the next frame, and how many seconds it is shown if not as long as the others.
+pub(crate) type Push<'a> = &'a mut (dyn FnMut(RgbImage, Option<f64>) -> Result<(), MovieError> + Send);
 
 /// Writes an animation of the frames that `fill` pushes, in their order. A file appears once it is whole.
 ///
 /// # Errors
-/// Those of `fill`, and [`MovieError`].
+/// The errors of `fill`, and [`MovieError`].
 pub(crate) fn write(
     place: &Place,
     container: Container,
     movie: Movie,
     fill: impl FnOnce(Push<'_>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Written> {
+    Ok(encode(place, container, movie, None, fill)?.keep(place)?)
+}
+
+/// An animation that is complete, but not yet in its place.
+pub(super) struct Encoded {
+    written: Written,
+    sink: Sink,
+}
+
+impl Encoded {
+    /// Puts it into its place.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(super) fn keep(self, place: &Place) -> Result<Written, MovieError> {
+        self.sink.finish(place)?;
+        Ok(self.written)
+    }
+}
+
+/// Encodes an animation as [`write`] does, but puts it nowhere. It fails with [`MovieError::Full`] if it has more than
+/// `limit` bytes.
+///
+/// # Errors
+/// The errors of [`write`].
+pub(super) fn encode(
+    place: &Place,
+    container: Container,
+    movie: Movie,
+    limit: Option<u64>,
+    fill: impl FnOnce(Push<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<Encoded> {
     let failed = |source| error_at(place, source);
-    let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place)?);
+    let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place, container, limit)?);
     let mut frames = 0;
-    let dropped = {
+    let (dropped, length) = {
         let mut encoding = Encoding::begin(&mut out, container, movie).map_err(|error| error.at(place))?;
-        fill(&mut |frame| {
+        fill(&mut |frame, seconds| {
             frames += 1;
-            encoding.push(frame).map_err(|error| error.at(place))
+            encoding.push(frame, seconds).map_err(|error| error.at(place))
         })?;
         encoding.finish().map_err(|error| error.at(place))?
     };
-    let sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
+    let mut sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
     let bytes = sink.bytes;
-    sink.finish()?;
-    Ok(Written { frames: frames - dropped, container, dropped, size: movie.size, bytes })
+    if let Some(length) = length {
+        sink.set_length(length).map_err(failed)?;
+    }
+    let written = Written { frames: frames - dropped, container, dropped, size: movie.size, bytes };
+    Ok(Encoded { written, sink })
 }
 
 /// Says what was written.
@@ -91,7 +138,8 @@ pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, c
     ));
     if written.dropped > 0 {
         let most = match written.container {
-            Container::Apng => format!("browsers show at most {MOST_FPS} frames of an APNG a second"),
+            Container::Apng => format!("browsers show at most {MAX_FPS} frames of an APNG a second"),
+            Container::Webp => format!("browsers show at most {MAX_FPS} frames of a WebP a second"),
             Container::Gif | Container::Y4m => "a GIF shows at most 50 frames a second".into(),
         };
         console.note(format_args!("{} left out: {most}, not {fps}", number(written.dropped, "frame")));
@@ -101,6 +149,7 @@ pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, c
 enum Encoding<W: Write> {
     Gif(Box<Encoder<W>>),
     Apng(Box<Apng<W>>),
+    WebP(Box<WebP<W>>),
     Y4m(Y4m<W>),
 }
 
@@ -113,30 +162,39 @@ enum Failure {
 impl<W: Write> Encoding<W> {
     fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Failure> {
         let Movie { size, fps, plays, last_delay_cs, exact, .. } = movie;
+        let settings = Settings { fps, plays, last_delay_cs, exact, ..Settings::default() };
         Ok(match container {
-            Container::Gif => {
-                Self::Gif(Box::new(Encoder::new(out, Settings { fps, plays, last_delay_cs, exact })?))
-            }
+            Container::Gif => Self::Gif(Box::new(Encoder::new(out, settings)?)),
             Container::Apng => Self::Apng(Box::new(Apng::new(out, movie)?)),
+            Container::Webp => Self::WebP(Box::new(WebP::new(out, movie)?)),
             Container::Y4m => Self::Y4m(Y4m::new(out, size, fps)?),
         })
     }
 
-    fn push(&mut self, frame: RgbImage) -> Result<(), Failure> {
-        match self {
-            Self::Gif(encoder) => Ok(encoder.push(frame)?),
-            Self::Apng(encoder) => Ok(encoder.push(frame)?),
-            Self::Y4m(encoder) => Ok(encoder.push(&frame)?),
+    fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> Result<(), Failure> {
+        match (self, seconds) {
+            (Self::Gif(encoder), None) => Ok(encoder.push(frame)?),
+            // The conversion saturates.
+            (Self::Gif(encoder), Some(seconds)) => {
+                Ok(encoder.push_for(frame, (100.0 * seconds).round() as u16)?)
+            }
+            (Self::Apng(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
+            (Self::WebP(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
+            (Self::Y4m(encoder), _) => Ok(encoder.push(&frame)?),
         }
     }
 
-    /// Returns how many frames were left out.
-    fn finish(self) -> Result<u64, Failure> {
-        match self {
-            Self::Gif(encoder) => Ok(encoder.finish()?.dropped),
-            Self::Apng(encoder) => Ok(encoder.finish()?),
-            Self::Y4m(encoder) => Ok(encoder.finish().map(|()| 0)?),
-        }
+    /// Returns how many frames were left out, and a length that is to be written where the file says it.
+    fn finish(self) -> Result<(u64, Option<Length>), Failure> {
+        Ok(match self {
+            Self::Gif(encoder) => (encoder.finish()?.dropped, None),
+            Self::Apng(encoder) => (encoder.finish()?, None),
+            Self::WebP(encoder) => {
+                let (dropped, length) = encoder.finish()?;
+                (dropped, Some(length))
+            }
+            Self::Y4m(encoder) => (encoder.finish().map(|()| 0)?, None),
+        })
     }
 }
 
@@ -166,6 +224,7 @@ impl Failure {
 
 fn error_at(place: &Place, source: io::Error) -> MovieError {
     match place {
+        _ if source.get_ref().is_some_and(|error| error.is::<TooLarge>()) => MovieError::Full,
         Place::File(path) => rayfold_files::Error::Io { path: path.clone(), source }.into(),
         Place::StandardOutput if source.kind() == io::ErrorKind::BrokenPipe => MovieError::Closed,
         Place::StandardOutput => MovieError::StandardOutput(source),
@@ -176,15 +235,18 @@ fn error_at(place: &Place, source: io::Error) -> MovieError {
 struct Sink {
     to: To,
     bytes: u64,
+    limit: u64,
 }
 
 enum To {
     File(OutputFile),
     StandardOutput,
+    /// Standard output gets all at once, because the beginning is known last.
+    Memory(Vec<u8>),
 }
 
 impl Sink {
-    fn open(place: &Place) -> anyhow::Result<Self> {
+    fn open(place: &Place, container: Container, limit: Option<u64>) -> anyhow::Result<Self> {
         let to = match place {
             Place::File(path) => To::File(OutputFile::create(path)?),
             Place::StandardOutput if io::stdout().is_terminal() => {
@@ -192,17 +254,39 @@ impl Sink {
                 return Err(Usage(message.into()).into());
             }
             Place::StandardOutput if is_closed() => return Err(MovieError::NoStandardOutput.into()),
+            Place::StandardOutput if container == Container::Webp || limit.is_some() => {
+                To::Memory(Vec::new())
+            }
             Place::StandardOutput => To::StandardOutput,
         };
-        Ok(Self { to, bytes: 0 })
+        Ok(Self { to, bytes: 0, limit: limit.unwrap_or(u64::MAX) })
     }
 
-    fn finish(self) -> Result<(), rayfold_files::Error> {
-        match self.to {
-            To::File(file) => file.finish(true),
+    /// Writes a length to where it belongs.
+    fn set_length(&mut self, (at, length): Length) -> io::Result<()> {
+        match &mut self.to {
+            To::File(file) => file.overwrite(at, &length),
             To::StandardOutput => Ok(()),
+            To::Memory(bytes) => {
+                bytes[at as usize..][..length.len()].copy_from_slice(&length);
+                Ok(())
+            }
         }
     }
+
+    fn finish(self, place: &Place) -> Result<(), MovieError> {
+        match self.to {
+            To::File(file) => Ok(file.finish(true)?),
+            To::StandardOutput => Ok(()),
+            To::Memory(bytes) => print(bytes).map_err(|source| error_at(place, source)),
+        }
+    }
+}
+
+/// Writes to standard output, whose reader may take its time for ever.
+fn print(bytes: Vec<u8>) -> io::Result<()> {
+    let mut out = io::stdout();
+    interrupt::wait_for(move || out.write_all(&bytes).and_then(|()| out.flush())).map_err(io::Error::other)?
 }
 
 /// Says whether the program was started without a standard output, as by `>&-`. The language's runtime then puts
@@ -227,16 +311,16 @@ fn is_closed() -> bool {
 
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.bytes.saturating_add(bytes.len() as u64) > self.limit {
+            return Err(io::Error::other(TooLarge));
+        }
         let written = match &mut self.to {
             To::File(file) => file.write(bytes)?,
             To::StandardOutput => {
-                let piece = bytes.to_vec();
-                let mut out = io::stdout();
-                // A reader may take its time for ever.
-                interrupt::wait_for(move || out.write_all(&piece).and_then(|()| out.flush()))
-                    .map_err(io::Error::other)??;
+                print(bytes.to_vec())?;
                 bytes.len()
             }
+            To::Memory(collected) => collected.write(bytes)?,
         };
         self.bytes += written as u64;
         Ok(written)
@@ -245,7 +329,7 @@ impl Write for Sink {
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.to {
             To::File(file) => file.flush(),
-            To::StandardOutput => Ok(()),
+            To::StandardOutput | To::Memory(_) => Ok(()),
         }
     }
 }

@@ -1,8 +1,9 @@
-//! Where the picture goes: what OUT means by its ending.
+//! The destination of a picture, from the ending of OUT.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use clap::ValueEnum;
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
 use rayfold_files::probe;
 use rayfold_gif::Plays;
@@ -11,49 +12,63 @@ use crate::console::Console;
 use crate::outcome::Usage;
 use crate::wording::number;
 
-/// What OUT asks for.
+/// The kind of output that OUT stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
-    /// All frames as one animation.
+    /// One animation of all frames.
     Animation(Container, Place),
     /// One frame.
     Image(PathBuf, Format),
-    /// Each frame as a file.
+    /// A file for each frame.
     Images(Pattern, Format),
 }
 
-/// How an animation is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The file format of an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Container {
     Gif,
     Apng,
+    Webp,
     Y4m,
 }
 
-/// Where an animation goes.
+impl Container {
+    /// Returns the ending of its files.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            Self::Gif => "gif",
+            Self::Apng => "apng",
+            Self::Webp => "webp",
+            Self::Y4m => "y4m",
+        }
+    }
+}
+
+/// The destination of an animation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
     File(PathBuf),
     StandardOutput,
 }
 
-/// What is known of an animation before its first frame.
+/// The properties of an animation that are known before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Movie {
-    /// Columns and rows.
+    /// The columns and rows.
     pub(crate) size: (u32, u32),
-    /// How many frames there will be.
-    pub(crate) frames: u64,
-    /// Frames a second.
+    /// The number of frames, each counted as often as it is shown; `None` for a video that is read, where it is not
+    /// known.
+    pub(crate) frames: Option<u64>,
+    /// The frames per second.
     pub(crate) fps: f64,
     pub(crate) plays: Plays,
-    /// How long the last frame is shown, if not as long as the others.
+    /// The duration of the last frame, if it differs from that of the others.
     pub(crate) last_delay_cs: Option<u16>,
     /// Whether a GIF keeps frames of at most 256 colours exactly, whatever that takes.
     pub(crate) exact: bool,
 }
 
-/// How a single image is written.
+/// The file format of a single image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Png,
@@ -70,22 +85,36 @@ pub(crate) struct Pattern {
 }
 
 impl Target {
+    /// Returns the target for a name; `format` overrides the ending. Standard output is a .y4m without a `format`.
+    ///
     /// # Errors
-    /// When the ending is none of ours or the pattern is not one.
-    pub(crate) fn parse(out: &Path) -> Result<Self, Usage> {
+    /// When the ending is unknown or the pattern is invalid.
+    pub(crate) fn parse(out: &Path, format: Option<Container>) -> Result<Self, Usage> {
         let shown = out.display();
         if out.as_os_str() == "-" {
-            return Ok(Self::Animation(Container::Y4m, Place::StandardOutput));
+            return Ok(Self::Animation(format.unwrap_or(Container::Y4m), Place::StandardOutput));
         }
-        let container = match ending(out).as_deref() {
+        let container = match format
+            .map(Container::ending)
+            .map(str::to_owned)
+            .or_else(|| ending(out))
+            .as_deref()
+        {
             Some("gif") => Container::Gif,
             Some("apng") => Container::Apng,
+            Some("webp") => Container::Webp,
             Some("y4m") => Container::Y4m,
             Some("png") => return Self::image(out, Format::Png),
             Some("tif" | "tiff") => return Self::image(out, Format::Tiff),
+            Some(video @ ("mp4" | "m4v" | "mov" | "mkv" | "webm" | "avi" | "mpg" | "mpeg")) => {
+                return Err(Usage(format!(
+                    "rayfold writes no .{video}, but ffmpeg does: rayfold ... -o - --format y4m | ffmpeg -i - -pix_fmt yuv420p \
+                     {shown} (docs/video.md has more)"
+                )));
+            }
             _ => {
                 return Err(Usage(format!(
-                    "cannot tell from its ending what {shown} should be: expected .gif, .apng or .y4m for an animation, \
+                    "cannot tell from its ending what {shown} should be: expected .gif, .apng, .webp or .y4m for an animation, \
                      .png, .tif or .tiff for one frame, or a pattern such as frames/%04d.png for many"
                 )));
             }
@@ -106,16 +135,17 @@ impl Target {
     }
 }
 
-/// For those who write a GIF and nothing else.
+/// Checks the name of the output of a command that only writes a GIF.
 ///
 /// # Errors
-/// When the name does not end so, or stands for many files.
+/// When the name does not end in .gif, or stands for many files.
+#[cfg(feature = "network")]
 pub(crate) fn must_be_gif(out: &Path) -> Result<(), Usage> {
     let shown = out.display();
     if ending(out).as_deref() != Some("gif") {
         return Err(Usage(format!("cannot write {shown}: expected a name that ends in .gif")));
     }
-    Target::parse(out).map(drop)
+    Target::parse(out, None).map(drop)
 }
 
 fn ending(out: &Path) -> Option<String> {
@@ -123,7 +153,7 @@ fn ending(out: &Path) -> Option<String> {
 }
 
 impl Pattern {
-    /// `None` when `path` has no place for a number.
+    /// Returns `None` when `path` has no place for a number.
     fn parse(path: &Path) -> Result<Option<Self>, Usage> {
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return Ok(None) };
         let Some((before, digits, after)) = split(name) else { return Ok(None) };
@@ -138,37 +168,44 @@ impl Pattern {
         Ok(Some(Self { folder, before: before.into(), digits, after: after.into() }))
     }
 
-    /// Says now what [`make_folder`](Self::make_folder) and writing a file would say later; makes nothing.
+    /// Returns early the error that [`make_folder`](Self::make_folder) or writing a file would return later. Makes
+    /// nothing.
     ///
     /// # Errors
     /// When no file can be written there.
     pub(crate) fn probe(&self, number: u64) -> anyhow::Result<()> {
         let is_there = |folder: &&Path| folder.as_os_str().is_empty() || folder.symlink_metadata().is_ok();
         match self.folder.ancestors().find(is_there) {
-            // The folders in between are made, so that only the nearest one must take something.
+            // The folders in between are made later, so that only the nearest existing one must be writable.
             Some(nearest) if nearest != self.folder => {
                 let path = self.path(number);
                 let name = path.file_name().unwrap_or_default();
-                Ok(probe(&nearest.join(name)).map_err(|error| error.about(path))?)
+                probe(&nearest.join(name)).map_err(|error| match error {
+                    rayfold_files::Error::Io { source, .. } => self.not_made(source),
+                    other => other.about(path).into(),
+                })
             }
             _ => Ok(probe(&self.path(number))?),
         }
     }
 
-    /// Makes the folder of the files if it is not there.
+    /// Makes the folder of the files if it does not exist.
     ///
     /// # Errors
-    /// The system's.
+    /// The system's errors.
     pub(crate) fn make_folder(&self) -> anyhow::Result<()> {
         let folder = &self.folder;
         if folder.as_os_str().is_empty() {
             return Ok(());
         }
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))
+        std::fs::create_dir_all(folder).map_err(|source| self.not_made(source))
     }
 
-    /// The files of frames `first` to `last`, for people.
+    fn not_made(&self, source: std::io::Error) -> anyhow::Error {
+        anyhow::Error::new(source).context(format!("cannot make the folder {}", self.folder.display()))
+    }
+
+    /// Returns a description of the files of frames `first` to `last`, for messages.
     pub(crate) fn range(&self, first: u64, last: u64) -> String {
         let (from, to) = (self.path(first), self.path(last));
         if first == last {
@@ -178,7 +215,7 @@ impl Pattern {
         }
     }
 
-    /// The numbers of files that are there of frames behind the last one, in order: an earlier run had more.
+    /// Returns the numbers of existing files of frames after the last one, in order: an earlier run had more frames.
     pub(crate) fn beyond(&self, last: u64) -> Vec<u64> {
         let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
         let names = folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.file_name());
@@ -193,7 +230,20 @@ impl Pattern {
         numbers
     }
 
-    /// Warns of files that an earlier run has left of frames behind the last one.
+    /// Returns whether a file may be that of a frame.
+    pub(crate) fn names(&self, file: &Path) -> bool {
+        let folder = |folder: &Path| {
+            let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+            folder.canonicalize().ok()
+        };
+        let number = file.file_name().and_then(|name| {
+            name.to_str()?.strip_prefix(&self.before)?.strip_suffix(&self.after)?.parse().ok()
+        });
+        number.is_some_and(|number| self.path(number).file_name() == file.file_name())
+            && file.parent().and_then(folder).is_some_and(|parent| folder(&self.folder) == Some(parent))
+    }
+
+    /// Warns of files of frames after the last one, which an earlier run has left.
     pub(crate) fn warn_of_older(&self, last: u64, console: &Console) {
         let older = self.beyond(last);
         if let (Some(&first), Some(&end)) = (older.first(), older.last()) {
@@ -205,13 +255,13 @@ impl Pattern {
         }
     }
 
-    /// The file of frame `number`, counted from 1.
+    /// Returns the path of frame `number`, counted from 1.
     pub(crate) fn path(&self, number: u64) -> PathBuf {
         self.folder.join(format!("{}{number:0width$}{}", self.before, self.after, width = self.digits))
     }
 }
 
-/// `a%04d.png` is `a`, `04`, `.png`.
+/// Splits a pattern: `a%04d.png` becomes `a`, `04`, `.png`.
 fn split(name: &str) -> Option<(&str, &str, &str)> {
     name.match_indices('%').find_map(|(at, _)| {
         let rest = &name[at + 1..];
@@ -222,7 +272,7 @@ fn split(name: &str) -> Option<(&str, &str, &str)> {
 }
 
 impl Format {
-    /// The image in a file of this format; `None` when it is not whole.
+    /// Decodes the image in a file of this format; `None` when the file is not whole.
     pub(crate) fn decode(self, file: &[u8]) -> Option<RgbImage> {
         let format = match self {
             Self::Png => ImageFormat::Png,
@@ -231,10 +281,10 @@ impl Format {
         Some(image::load_from_memory_with_format(file, format).ok()?.into_rgb8())
     }
 
-    /// The image's file.
+    /// Encodes an image as a file of this format.
     ///
     /// # Errors
-    /// When the image is beyond what the format can hold.
+    /// When the image exceeds the limits of the format.
     pub(crate) fn encode(self, image: &RgbImage) -> anyhow::Result<Vec<u8>> {
         use image::codecs::{png, tiff};
         let mut file = Vec::new();
@@ -260,7 +310,7 @@ mod tests {
     use super::*;
 
     fn images(out: &str) -> Pattern {
-        match Target::parse(Path::new(out)) {
+        match Target::parse(Path::new(out), None) {
             Ok(Target::Images(pattern, _)) => pattern,
             other => panic!("{out}: {other:?}"),
         }
@@ -272,15 +322,24 @@ mod tests {
         for (name, container) in
             [("a.GIF", Container::Gif), ("a.apng", Container::Apng), ("a.y4m", Container::Y4m)]
         {
-            assert_eq!(Target::parse(Path::new(name)).unwrap(), animation(name, container));
+            assert_eq!(Target::parse(Path::new(name), None).unwrap(), animation(name, container));
         }
         let piped = Target::Animation(Container::Y4m, Place::StandardOutput);
-        assert_eq!(Target::parse(Path::new("-")).unwrap(), piped);
-        assert_eq!(Target::parse(Path::new("a.png")).unwrap(), Target::Image("a.png".into(), Format::Png));
-        assert_eq!(Target::parse(Path::new("a.tif")).unwrap(), Target::Image("a.tif".into(), Format::Tiff));
-        assert_eq!(Target::parse(Path::new("a.tiff")).unwrap(), Target::Image("a.tiff".into(), Format::Tiff));
+        assert_eq!(Target::parse(Path::new("-"), None).unwrap(), piped);
+        assert_eq!(
+            Target::parse(Path::new("a.png"), None).unwrap(),
+            Target::Image("a.png".into(), Format::Png)
+        );
+        assert_eq!(
+            Target::parse(Path::new("a.tif"), None).unwrap(),
+            Target::Image("a.tif".into(), Format::Tiff)
+        );
+        assert_eq!(
+            Target::parse(Path::new("a.tiff"), None).unwrap(),
+            Target::Image("a.tiff".into(), Format::Tiff)
+        );
         for unknown in ["a", "a.jpg", ".gif", "a.gif/", "gif", ""] {
-            let target = Target::parse(Path::new(unknown));
+            let target = Target::parse(Path::new(unknown), None);
             assert!(target.is_err() || unknown == "a.gif/", "{unknown}: {target:?}");
         }
     }
@@ -301,7 +360,7 @@ mod tests {
     #[test]
     fn a_percent_sign_alone_is_part_of_the_name() {
         for name in ["100%.png", "a%20b.png", "%x.png", "%.png"] {
-            assert!(matches!(Target::parse(Path::new(name)), Ok(Target::Image(..))), "{name}");
+            assert!(matches!(Target::parse(Path::new(name), None), Ok(Target::Image(..))), "{name}");
         }
         assert_eq!(images("100%-%d.png").path(7), Path::new("100%-7.png"));
     }
@@ -309,11 +368,12 @@ mod tests {
     #[test]
     fn senseless_patterns_are_refused() {
         for name in ["%d-%d.png", "%04d.gif", "%99999d.png"] {
-            assert!(Target::parse(Path::new(name)).is_err(), "{name}");
+            assert!(Target::parse(Path::new(name), None).is_err(), "{name}");
         }
     }
 
     #[test]
+    #[cfg(feature = "network")]
     fn only_a_gif_is_a_gif() {
         assert!(must_be_gif(Path::new("a/b.gif")).is_ok());
         for name in ["a.mp4", "a.png", "a", "%d.gif", "-"] {

@@ -8,6 +8,8 @@ use std::io::{self, Write};
 
 use image::RgbImage;
 
+use super::rate::fraction;
+
 /// Parts that a fixed-point number has of 1.
 const ONE: i32 = 1 << 16;
 
@@ -15,9 +17,6 @@ const ONE: i32 = 1 << 16;
 /// and .114, scaled to 219 and 224 levels.
 const MATRIX: [([i32; 3], i32); 3] =
     [([16_829, 33_039, 6_416], 16), ([-9_714, -19_071, 28_785], 128), ([28_784, -24_103, -4_681], 128)];
-
-/// The most parts of a second that a frame's time is counted in.
-const PARTS: f64 = 1e6;
 
 /// Frames on their way.
 #[derive(Debug)]
@@ -62,24 +61,15 @@ fn level((weights, black): &([i32; 3], i32), rgb: [u8; 3]) -> u8 {
     (black + ((sum + ONE / 2) >> 16)).clamp(0, 255) as u8
 }
 
-/// A rate as frames in so many seconds, both whole.
-fn fraction(fps: f64) -> (u64, u64) {
-    let (frames, seconds) = ((fps * PARTS).round() as u64, PARTS as u64);
-    let (mut a, mut b) = (frames, seconds);
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    (frames / a, seconds / a)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn rates_are_fractions() {
-        let rates = [25.0, 12.5, 29.97, 0.01].map(fraction);
-        assert_eq!(rates, [(25, 1), (25, 2), (2_997, 100), (1, 100)]);
+        let mut header = Vec::new();
+        Y4m::new(&mut header, (4, 3), 30_000.0 / 1_001.0).unwrap();
+        assert!(header.starts_with(b"YUV4MPEG2 W4 H3 F30000:1001 "));
     }
 
     /// ITU-R BT.601 gives black, white, and the primary colours at full saturation so.

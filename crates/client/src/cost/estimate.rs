@@ -17,9 +17,18 @@ const ASSEMBLE_MEMORY_MB: f64 = 3008.0;
 /// The minutes between two sweeps.
 const SWEEP_MINUTES: f64 = 15.0;
 
-/// The time that an invocation waits for requests and pauses, in milliseconds, which Lambda bills. Measured at these
-/// numbers of frames (`docs/reports/simulation.md`), and interpolated linearly in between.
-const WAITING_MS: [(f64, f64); 2] = [(50.0, 258.0), (1_000.0, 427.0)];
+/// The time that an invocation waits for requests and pauses, in milliseconds, which Lambda bills, if the frames are drawn one
+/// after the other. Simulated: 147 to 209, the most for few frames (`docs/reports/scale.md`).
+const WAITING_MS: f64 = 210.0;
+
+/// The time of `WAITING_MS` if all frames are drawn at once. Simulated: 208 to 235.
+const WAITING_AT_ONCE_MS: f64 = 240.0;
+
+/// The places of an account, unless it asks for more.
+const PLACES: u64 = 1_000;
+
+/// An animation of fewer frames takes more requests for each.
+const FEW_FRAMES: u64 = 50;
 
 /// The size of a frame's PNG in bytes per pixel: about twice that of `scenes/hello`.
 const FRAME_BYTES_A_PIXEL: f64 = 0.15;
@@ -32,12 +41,15 @@ const GIF_BYTES_A_PIXEL: f64 = 0.06;
 const ASSEMBLE_NS_A_PIXEL: f64 = 30.0;
 
 /// The requests per frame that are billed as PUT, COPY, POST or LIST: the upload, the check for a result, the result,
-/// and a share of the listings, manifests and claims of a fold. Measured with the upload, at 50 frames and more: 3.5
-/// to 5.2 (`docs/reports/simulation.md`, `pipeline.md`).
+/// and a share of the listings, manifests and claims of a fold. Simulated with the upload, at 50 frames and more: 4.2
+/// to 5.3 (`docs/reports/simulation.md`).
 const PUTS_AND_LISTS_A_FRAME: f64 = 6.0;
 
-/// The requests per frame that are billed as GET: the script, the manifest before and after the pause, and the
-/// assembler's read of the frame. Measured: 4.2 to 4.7.
+/// The requests per frame billed as PUT or LIST for an animation of few frames. Simulated for 10: 6.6 to 7.5.
+const PUTS_AND_LISTS_OF_FEW: f64 = 8.0;
+
+/// The requests per frame that are billed as GET: the script, the manifest, the other frame's script, and the
+/// assembler's read of the frame. Simulated: 4.0 to 5.3.
 const GETS_A_FRAME: f64 = 5.0;
 
 /// The number of keys in a page of a listing.
@@ -73,6 +85,9 @@ pub struct Workload {
     pub frames: u64,
     /// The time of the render function per frame, in milliseconds.
     pub ms: f64,
+    /// The number of invocations of the render function at once, if it was said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub places: Option<u64>,
     /// The width of a frame in pixels.
     pub width: usize,
     /// The height of a frame in pixels.
@@ -103,6 +118,7 @@ impl Workload {
         Self {
             frames,
             ms,
+            places: None,
             width: size.width() as usize,
             height: size.height() as usize,
             memory_mb: PROCESSOR_MB,
@@ -114,6 +130,12 @@ impl Workload {
             sweep_minutes: SWEEP_MINUTES,
             customer_managed_key: false,
         }
+    }
+
+    /// Returns the time until all frames are drawn, in seconds.
+    pub fn rendering_s(&self) -> f64 {
+        let places = self.places.unwrap_or(PLACES).max(1);
+        self.frames.div_ceil(places) as f64 * self.ms / 1e3
     }
 
     /// Returns the running time of the assemble function, in seconds.
@@ -153,17 +175,17 @@ impl Section {
     }
 }
 
-/// Returns the time that an invocation waits for requests and pauses, in milliseconds, for an
-/// animation of `frames` frames.
-pub fn waiting_ms(frames: u64) -> f64 {
-    let [(few, short), (many, long)] = WAITING_MS;
-    short + (long - short) * ((frames as f64 - few) / (many - few)).clamp(0.0, 1.0)
+/// Returns the time that an invocation waits for requests and pauses, in milliseconds, for an animation of `frames`
+/// frames on so many places, or on those of an account.
+pub fn waiting_ms(frames: u64, places: Option<u64>) -> f64 {
+    let is_at_once = places.unwrap_or(PLACES).saturating_mul(2) > frames;
+    if is_at_once { WAITING_AT_ONCE_MS } else { WAITING_MS }
 }
 
-/// Returns the milliseconds that the render function takes per frame of an animation of `frames` frames, if drawing a
-/// frame takes `drawing_ms` on one processor and the function has `memory_mb`.
-pub fn render_ms(frames: u64, drawing_ms: f64, memory_mb: f64) -> f64 {
-    drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms(frames)
+/// Returns the milliseconds that the render function takes per frame of an animation of `frames` frames on so many
+/// places, if drawing a frame takes `drawing_ms` on one processor and the function has `memory_mb`.
+pub fn render_ms(frames: u64, places: Option<u64>, drawing_ms: f64, memory_mb: f64) -> f64 {
+    drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms(frames, places)
 }
 
 /// Estimates all sections: making the animation, keeping it, and the stack.
@@ -189,6 +211,8 @@ fn making(work: &Workload, prices: &Prices) -> Section {
     let compute = gb_second(work, prices);
     let uploads = (work.gif_mb / UPLOAD_PART_MB).ceil() + 2.0;
     let invocations = frames + 1.0;
+    let is_of_few = work.frames < FEW_FRAMES;
+    let puts_and_lists = if is_of_few { PUTS_AND_LISTS_OF_FEW } else { PUTS_AND_LISTS_A_FRAME };
     Section::new(
         "Making it, once",
         vec![
@@ -200,12 +224,7 @@ fn making(work: &Workload, prices: &Prices) -> Section {
                 "GB-s",
                 compute,
             ),
-            line(
-                "S3: puts and lists",
-                frames * PUTS_AND_LISTS_A_FRAME + uploads,
-                "",
-                prices.s3.put_copy_post_list,
-            ),
+            line("S3: puts and lists", frames * puts_and_lists + uploads, "", prices.s3.put_copy_post_list),
             line("S3: gets", frames * GETS_A_FRAME, "", prices.s3.get_and_other),
             line("Logs", invocations * LOG_BYTES / 1e9, "GB", prices.cloudwatch.log_gb),
             line("Traces", invocations * TRACED, "", prices.xray_trace),
@@ -269,6 +288,7 @@ mod tests {
         Workload {
             frames,
             ms,
+            places: None,
             width: 512,
             height: 512,
             memory_mb: 1024.0,
@@ -318,6 +338,8 @@ mod tests {
         let small = making(&work(100, 1.0), &prices());
         near(find(&small, "S3: puts and lists").amount, 100.0 * PUTS_AND_LISTS_A_FRAME + 4.0);
         near(find(&small, "S3: gets").amount, 100.0 * GETS_A_FRAME);
+        let few = making(&work(49, 1.0), &prices());
+        near(find(&few, "S3: puts and lists").amount, 49.0 * PUTS_AND_LISTS_OF_FEW + 4.0);
     }
 
     /// By hand: 2,880 sweeps per month. Each lists its 2 pages of scripts and 2 of frames, and its share of the
@@ -346,8 +368,23 @@ mod tests {
 
     #[test]
     fn waiting_is_what_was_measured_and_between() {
-        assert_eq!([1, 50, 525, 1_000, 1_000_000].map(waiting_ms), [258.0, 258.0, 342.5, 427.0, 427.0]);
-        assert_eq!(render_ms(50, 10.0, 2.0 * PROCESSOR_MB), 263.0);
+        for (frames, places, expected) in [
+            (1, None, 240.0),
+            (10, Some(1), 210.0),
+            (300, Some(4), 210.0),
+            (300, Some(300), 240.0),
+            (1_000_000, None, 210.0),
+        ] {
+            assert_eq!(waiting_ms(frames, places), expected, "{frames} {places:?}");
+        }
+        assert_eq!(render_ms(50, None, 10.0, 2.0 * PROCESSOR_MB), 245.0);
+    }
+
+    /// By hand: 100 frames on 8 places are 13 rounds of 2 s.
+    #[test]
+    fn the_time_of_all_frames_is_that_of_the_fullest_place() {
+        assert_eq!(Workload { places: Some(8), ..work(100, 2_000.0) }.rendering_s(), 26.0);
+        assert_eq!(work(1_000, 2_000.0).rendering_s(), 2.0);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! From the store's webhook to the functions' queues, by the shared routes.
+//! From the store's webhook, or a listing of the bucket, to the functions' queues, by the shared routes.
 //!
 //! Events are forwarded as the store writes them; the functions read AWS's shape and MinIO's. Chaos lives here: an event may
 //! be lost, doubled, late, or one of a bunch that is delivered newest first.
@@ -11,7 +11,8 @@ use http_body_util::BodyExt;
 use hyper::body::Incoming;
 use hyper::header::AUTHORIZATION;
 use hyper::{Method, Request, Response, StatusCode};
-use percent_encoding::percent_decode_str;
+use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
+use rayfold_pipeline::store::ETag;
 use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
@@ -22,6 +23,7 @@ use super::chaos::Dice;
 use super::queue::{Job, Pending, Pool};
 use crate::http::{Body, Server, json};
 use crate::observation::{Observer, Seen};
+use crate::region::REGION;
 use crate::routes::{Function, Routes};
 
 /// The pools by function.
@@ -45,34 +47,58 @@ struct Event {
     payload: Bytes,
 }
 
-/// Hears events that carry `token` on `listener`, and delivers them.
+/// The way of an event from the store to the functions' queues.
+#[derive(Clone)]
+pub(crate) struct Delivery {
+    sender: mpsc::UnboundedSender<Event>,
+    routes: Arc<Routes>,
+    observer: Observer,
+    pending: Pending,
+}
+
+impl Delivery {
+    pub(crate) fn start(
+        pools: Pools,
+        dice: Arc<Dice>,
+        observer: Observer,
+        pending: Pending,
+        tasks: &mut JoinSet<()>,
+    ) -> Self {
+        let (sender, events) = mpsc::unbounded_channel();
+        tasks.spawn(deliver(events, pools, dice, pending.clone()));
+        Self { sender, routes: Arc::new(Routes::shared()), observer, pending }
+    }
+
+    /// Takes the event of this name on an object.
+    pub(crate) fn take(&self, name: &str, key: &str, payload: Bytes) {
+        let function = self.routes.function(key, name);
+        self.observer.see(Seen::Event { function, name: name.to_owned(), key: key.to_owned() });
+        if let Some(function) = function {
+            self.pending.add();
+            if self.sender.send(Event { function, payload }).is_err() {
+                self.pending.remove();
+            }
+        }
+    }
+}
+
+/// Receives events that carry `token` on `listener`: their names, keys and payloads.
 pub(crate) fn receive(
     listener: TcpListener,
     token: &str,
-    pools: Pools,
-    dice: Arc<Dice>,
-    observer: Observer,
-    pending: Pending,
-    tasks: &mut JoinSet<()>,
+    hear: impl Fn(&str, &str, Bytes) + Clone + Send + Sync + 'static,
 ) -> Server {
-    let (sender, events) = mpsc::unbounded_channel();
-    tasks.spawn(deliver(events, pools, dice, pending.clone()));
-    let routes = Arc::new(Routes::shared());
     let expected: Arc<str> = format!("Bearer {token}").into();
     Server::start(listener, move |request| {
-        let (sender, observer, pending) = (sender.clone(), observer.clone(), pending.clone());
-        let (routes, expected) = (routes.clone(), expected.clone());
-        async move { Some(take(request, &expected, &routes, &observer, &pending, &sender).await) }
+        let (expected, hear) = (expected.clone(), hear.clone());
+        async move { Some(take(request, &expected, &hear).await) }
     })
 }
 
 async fn take(
     request: Request<Incoming>,
     expected: &str,
-    routes: &Routes,
-    observer: &Observer,
-    pending: &Pending,
-    sender: &mpsc::UnboundedSender<Event>,
+    hear: &impl Fn(&str, &str, Bytes),
 ) -> Response<Body> {
     let known =
         request.headers().get(AUTHORIZATION).is_some_and(|sent| sent.as_bytes() == expected.as_bytes());
@@ -88,16 +114,31 @@ async fn take(
     let payload = body.to_bytes();
     // The stores write one record an event; the first one names the function.
     if let Some((name, key)) = described(&payload) {
-        let function = routes.function(&key, &name);
-        observer.see(Seen::Event { function, name, key });
-        if let Some(function) = function {
-            pending.add();
-            if sender.send(Event { function, payload }).is_err() {
-                pending.remove();
-            }
-        }
+        hear(&name, &key, payload);
     }
     json(StatusCode::OK, &json!({}))
+}
+
+/// An event of a store that sends none, in AWS's shape. An object that was put has its entity tag, by which a failure
+/// names the version that failed.
+pub(crate) fn written(bucket: &str, name: &str, key: &str, etag: Option<&ETag>) -> Bytes {
+    let key = utf8_percent_encode(key, NON_ALPHANUMERIC).to_string();
+    let mut object = json!({ "key": key });
+    if let Some(etag) = etag {
+        object["eTag"] = etag.as_str().into();
+    }
+    let record = json!({
+        "eventVersion": "2.1",
+        "eventSource": "aws:s3",
+        "awsRegion": REGION,
+        "eventTime": "1970-01-01T00:00:00.000Z",
+        "eventName": name,
+        "userIdentity": {},
+        "requestParameters": {},
+        "responseElements": {},
+        "s3": { "bucket": { "name": bucket }, "object": object },
+    });
+    json!({ "Records": [record] }).to_string().into()
 }
 
 /// The event's name and the object's key, decoded.
@@ -158,5 +199,12 @@ mod tests {
         let (name, key) = described(payload.to_string().as_bytes()).unwrap();
         assert_eq!((name.as_str(), key.as_str()), ("s3:ObjectCreated:Put", "scripts/a b+ü/1.txt"));
         assert!(described(b"{}").is_none());
+    }
+
+    #[test]
+    fn a_written_event_is_read_back() {
+        let key = "scripts/a b+ü/1%.txt";
+        let payload = written("bucket", "ObjectRemoved:Delete", key, None);
+        assert_eq!(described(&payload), Some(("ObjectRemoved:Delete".into(), key.into())));
     }
 }

@@ -24,7 +24,7 @@ pub(crate) struct Sandbox {
     function: Function,
     child: Child,
     api: RuntimeApi,
-    meter: Meter,
+    meter: Option<Meter>,
     started: Instant,
     init: Option<Duration>,
     pub(crate) idle_since: Instant,
@@ -43,7 +43,10 @@ pub(crate) struct End {
 impl Sandbox {
     pub(crate) async fn start(function: Function, settings: &Settings, observer: &Observer) -> Result<Self> {
         let api = RuntimeApi::start().await?;
-        let meter = Meter::start(settings.store, settings.fates.clone(), observer.clone()).await?;
+        let meter = match settings.store {
+            Some(store) => Some(Meter::start(store, settings.fates.clone(), observer.clone()).await?),
+            None => None,
+        };
         let program = settings.functions.path(function);
         let name = format!("rayfold-{function}");
         let started = Instant::now();
@@ -51,7 +54,7 @@ impl Sandbox {
             .env_clear()
             .envs(settings.environment.iter().cloned())
             .envs(settings.environment_of.get(&function).into_iter().flatten().cloned())
-            .env("AWS_ENDPOINT_URL", meter.endpoint())
+            .envs(meter.as_ref().map(|meter| ("AWS_ENDPOINT_URL", meter.endpoint())))
             .env("AWS_LAMBDA_RUNTIME_API", api.endpoint())
             .env("AWS_LAMBDA_FUNCTION_NAME", &name)
             .env("AWS_LAMBDA_FUNCTION_MEMORY_SIZE", settings.memory_mb.to_string())
@@ -94,7 +97,9 @@ impl Sandbox {
         };
         let timeout = handout.timeout;
         let is_cold = self.init.is_none();
-        self.meter.begin(attempt.clone());
+        if let Some(meter) = &self.meter {
+            meter.begin(attempt.clone());
+        }
         observer.see(Seen::Started(attempt.clone()));
         self.api.hand_out(handout);
         let mut began = Instant::now();
@@ -120,7 +125,7 @@ impl Sandbox {
                     let status = status.map_or_else(|e| e.to_string(), |status| status.to_string());
                     break (Outcome::Crashed(status), false);
                 }
-                () = self.meter.killed() => {
+                () = killed(self.meter.as_ref()) => {
                     self.kill().await;
                     break (Outcome::Crashed("killed at a request".into()), false);
                 }
@@ -139,7 +144,7 @@ impl Sandbox {
             outcome,
             took: began.elapsed(),
             init: self.init.filter(|_| is_cold),
-            requests: self.meter.requests(),
+            requests: self.meter.as_ref().map(Meter::requests).unwrap_or_default(),
             is_reusable,
         };
         observer.see(Seen::Finished {
@@ -155,6 +160,13 @@ impl Sandbox {
     async fn kill(&mut self) {
         // One that is gone already needs no killing.
         let _ = self.child.kill().await;
+    }
+}
+
+async fn killed(meter: Option<&Meter>) {
+    match meter {
+        Some(meter) => meter.killed().await,
+        None => std::future::pending().await,
     }
 }
 

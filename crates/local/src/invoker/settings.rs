@@ -1,53 +1,63 @@
-//! What an invoker is told: what to run, on which terms, and what is to go wrong.
+//! The settings of an invoker: the functions, their limits, and the faults to inject.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::Duration;
+
+use rayfold_pipeline::store::S3Store;
 
 use super::chaos::{Chaos, Fates};
 use super::ramp::Ramp;
 use crate::functions::Functions;
 use crate::routes::Function;
 
-/// What an invoker needs to know.
+/// The settings of an invoker.
 #[derive(Clone)]
 pub struct Settings {
-    /// The binaries.
+    /// The binaries of the functions.
     pub functions: Functions,
-    /// The processes' environment, beyond what Lambda sets.
+    /// The environment of the processes, besides the variables that Lambda sets.
     pub environment: Vec<(String, String)>,
-    /// What differs by function, such as credentials of its own.
+    /// The environment of single functions, such as credentials of their own.
     pub environment_of: BTreeMap<Function, Vec<(String, String)>>,
-    /// The store's S3 endpoint.
-    pub store: SocketAddr,
-    /// Where to listen for events.
+    /// The store's S3 endpoint, which the processes reach through proxies that count their requests. Without it they reach the
+    /// endpoint that their environment names.
+    pub store: Option<SocketAddr>,
+    /// The address at which to listen for events.
     pub webhook: SocketAddr,
-    /// What events have to carry.
+    /// The token that events must contain.
     pub webhook_token: String,
-    /// Processes of a function at once.
+    /// The largest number of processes of a function at once.
     pub concurrency: usize,
-    /// How fast new ones may start.
+    /// The rate at which new processes may start.
     pub ramp: Ramp,
-    /// What the processes are told of their memory.
+    /// The memory size that the processes see, in MB.
     pub memory_mb: u32,
-    /// From the handing out to the kill.
+    /// The time from the delivery of an event until its process is killed.
     pub timeout: Duration,
-    /// Before each further try of an event that failed; Lambda's are one and two minutes.
+    /// The pauses before each further attempt at a failed event; Lambda's are one and two minutes.
     pub retry_pauses: Vec<Duration>,
     /// How soon the store delivers what it has kept while nobody listened; nothing when it keeps no events. The sweep at
     /// the start waits for these: what they wake needs no waking.
     pub kept_events: Option<Duration>,
-    /// Between the sweeps after the one at the start.
+    /// The listings of the bucket from which events come, if the store sends none.
+    pub listing: Option<Listing>,
+    /// The interval of the sweeps after the one at the start.
     pub sweep_every: Option<Duration>,
-    /// What goes wrong on purpose with events and processes.
+    /// The faults to inject into events and processes.
     pub chaos: Chaos,
-    /// What goes wrong on purpose with requests to the store.
+    /// The faults to inject into requests to the store.
     pub fates: Option<Fates>,
 }
 
 impl Settings {
     /// Those of a laptop.
-    pub fn new(functions: Functions, store: SocketAddr, webhook: SocketAddr, webhook_token: String) -> Self {
+    pub fn new(
+        functions: Functions,
+        store: Option<SocketAddr>,
+        webhook: SocketAddr,
+        webhook_token: String,
+    ) -> Self {
         Self {
             functions,
             environment: Vec::new(),
@@ -61,9 +71,28 @@ impl Settings {
             timeout: Duration::from_secs(300),
             retry_pauses: vec![Duration::from_millis(500), Duration::from_secs(1)],
             kept_events: None,
+            listing: None,
             sweep_every: Some(Duration::from_secs(30)),
             chaos: Chaos::default(),
             fates: None,
         }
+    }
+}
+
+/// The listing by which an invoker finds changes in a bucket, and the invoker's share of them.
+#[derive(Clone)]
+pub struct Listing {
+    /// The bucket.
+    pub store: S3Store,
+    /// The invoker's name, without slashes. Of two invokers on a bucket with one name, each believes to be alone.
+    pub name: String,
+    /// The interval between two listings.
+    pub every: Duration,
+}
+
+impl Listing {
+    /// Returns a listing every second.
+    pub fn new(store: S3Store, name: &str) -> Self {
+        Self { store, name: name.to_owned(), every: Duration::from_secs(1) }
     }
 }

@@ -117,8 +117,11 @@ fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
 #[test]
 fn leases_are_no_receipts() {
     check("frames/a/b/@assembler.json", Key::Lease { animation: animation("a/b") });
-    rejects("frames/@assembler.json", "not a key of the pipeline");
-    rejects("frames/a/x@assembler.json", "not a key of the pipeline");
+    check("frames/a/b/@sweep.json", Key::SweepLease { animation: animation("a/b") });
+    for file in ["@assembler.json", "@sweep.json"] {
+        rejects(&format!("frames/{file}"), "not a key of the pipeline");
+        rejects(&format!("frames/a/x{file}"), "not a key of the pipeline");
+    }
 }
 
 #[test]

@@ -18,10 +18,10 @@ const FRAMES: &str = "\"frames\":[\n";
 
 /// The most frames to come that a large manifest tells at its beginning, if they take no more than an eighth of what a
 /// reader begins with.
-const MOST_AWAITED: usize = 32;
+const MAX_AWAITED: usize = 32;
 
 /// The most places that a manifest tells: with them its head does not grow with the number of frames.
-const MOST_PLACES: usize = 200;
+const MAX_PLACES: usize = 200;
 
 /// The last revision that every reader of JSON counts to. At a thousand a second it is 285,000 years away.
 const LAST_REVISION: u64 = 1 << 53;
@@ -83,13 +83,13 @@ impl Manifest {
             lines.push_str(&serde_json::to_string(frame).map_err(malformed)?);
         }
         let length = lines.len() as u64;
-        let apart = (glimpse / 8).max(length / MOST_PLACES as u64 + 1);
+        let apart = (glimpse / 8).max(length / MAX_PLACES as u64 + 1);
         let (mut places, mut awaited): (Vec<Place>, Vec<&Frame>) = Default::default();
         if length > glimpse / 2 {
             let ends = starts.iter().skip(1).chain([&length]);
             let lines = self.frames.iter().zip(starts.iter().zip(ends));
             let pending: Vec<_> = lines.filter(|(frame, _)| frame.state == FrameState::Pending).collect();
-            let (step, mut bytes) = (pending.len().div_ceil(MOST_AWAITED).max(1), 0);
+            let (step, mut bytes) = (pending.len().div_ceil(MAX_AWAITED).max(1), 0);
             for (frame, (start, end)) in pending.into_iter().step_by(step) {
                 bytes += end - start;
                 if bytes <= glimpse / 8 {
@@ -264,7 +264,7 @@ mod tests {
             let body = manifest.encode(glimpse).unwrap();
             let size = body.len() as u64;
             let beginning = Beginning::decode(animation, &body).unwrap().unwrap();
-            assert!(beginning.places.len() <= MOST_PLACES + 1, "{}", beginning.places.len());
+            assert!(beginning.places.len() <= MAX_PLACES + 1, "{}", beginning.places.len());
             for frame in &manifest.frames {
                 let lines = beginning.lines_of(&frame.script, frame.part, size);
                 let lines = lines.start as usize..lines.end as usize;
@@ -330,7 +330,7 @@ mod tests {
             let body = manifest.encode(glimpse).unwrap();
             let places = Beginning::decode(&manifest.head.animation, &body).unwrap().unwrap().places;
             assert_eq!(places.is_empty(), glimpse / 2 >= length, "{glimpse} of {length}");
-            let apart = (glimpse / 8).max(length / MOST_PLACES as u64 + 1);
+            let apart = (glimpse / 8).max(length / MAX_PLACES as u64 + 1);
             let mut expected = Vec::new();
             for (number, frame) in manifest.frames.iter().enumerate() {
                 let at = starts(&lines[..number]);

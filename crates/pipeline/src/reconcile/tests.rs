@@ -229,5 +229,5 @@ fn above_a_page_of_scripts_every_thousandth_name_is_marked() {
     names.sort();
     let marked: Vec<String> = marks(2_500).iter().map(ToString::to_string).collect();
     assert_eq!(marked, [names[999].clone(), names[1_999].clone()]);
-    assert!(marks(MARK_EVERY * MOST_MARKS + 5_000).len() <= MOST_MARKS);
+    assert!(marks(MARK_EVERY * MAX_MARKS + 5_000).len() <= MAX_MARKS);
 }

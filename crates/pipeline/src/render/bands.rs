@@ -22,13 +22,13 @@ use super::{Outcome, Renderer, Script, Stages, Subject};
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::{Band, Key, Part, Receipt, Tag};
 use crate::manifest::{Fact, Reason};
-use crate::observe::standing;
+use crate::observe::version_result;
 use crate::reconcile::ReceiptFound;
 use crate::store::Store;
 use crate::{Clock, Error, Result};
 
 /// A frame being put together: bands in from the top, the frame's file out.
-pub trait Joining: Send {
+pub trait BandJoiner: Send {
     /// Adds the next band, as it was drawn.
     ///
     /// # Errors
@@ -156,7 +156,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             let receipt = Receipt::Band { name: name.clone(), tag, part: *part, band };
             self.put_receipt(&animation.receipt(&receipt), image, "image/png").await?;
             let receipts = self.receipts_of(animation, name, version, *part).await?;
-            if let Some(standing) = standing(&receipts, *part) {
+            if let Some(standing) = version_result(&receipts, *part) {
                 let fact = standing.fact(name.clone(), script.version, *part);
                 return Ok((Outcome::Present, Some(fact)));
             }
@@ -195,7 +195,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stages: &mut Stages,
     ) -> Result<Came> {
         let Subject { animation, name, part, .. } = subject;
-        self.goes_on_with(&(animation, name, part, &script.version, count));
+        self.forget_history_before(&(animation, name, part, &script.version, count));
         let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
         let frame = match self.join(renderer, subject, &script, (&tag, count), stages).await? {
             Ok(frame) => frame,

@@ -99,7 +99,18 @@ impl S3Store {
         Ok(Self::new(aws_sdk_s3::config::Builder::from(&sdk), endpoint.as_deref(), bucket))
     }
 
-    /// The bucket at an endpoint.
+    /// The bucket at an endpoint, as the standard AWS environment reaches it; us-east-1 if that names no region.
+    pub async fn from_environment_at(endpoint: &str, bucket: &str) -> Self {
+        let loader = aws_config::defaults(BehaviorVersion::latest()).http_client(https_client());
+        let sdk = loader.load().await;
+        let mut config = aws_sdk_s3::config::Builder::from(&sdk).endpoint_url(endpoint);
+        if sdk.region().is_none() {
+            config = config.region(Region::from_static("us-east-1"));
+        }
+        Self::new(config, Some(endpoint), bucket)
+    }
+
+    /// The bucket at an endpoint, with these credentials.
     pub fn at(connection: &Connection, bucket: &str) -> Self {
         let Connection { endpoint, region, access_key, secret_key, session_token } = connection;
         let config = aws_sdk_s3::Config::builder()
@@ -138,6 +149,11 @@ impl S3Store {
             .response_checksum_validation(ResponseChecksumValidation::WhenRequired)
             .build();
         Self { client: Client::from_conf(config), bucket: bucket.to_owned() }
+    }
+
+    /// The region that requests are signed for.
+    pub fn region(&self) -> Option<&str> {
+        self.client.config().region().map(Region::as_ref)
     }
 
     /// The bucket's name.

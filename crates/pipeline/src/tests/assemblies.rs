@@ -1,7 +1,7 @@
 //! What an assembler builds, waits for, leaves to the next one, refuses and takes away.
 
 use super::*;
-use crate::simulation::acting::film;
+use crate::fakes::film;
 
 pub(super) const GIF: &str = "animations/film.gif";
 pub(super) const LEASE: &str = "frames/film/@assembler.json";

@@ -254,8 +254,9 @@ async fn no_frame_is_put_together_without_a_band_that_is_gone() {
         }
     });
     let key = woken(&version, "3-of-3", 0);
-    let rendering =
-        world.with(async |invocation| render_frame(invocation, &Drawer { bands: BANDS }, &key).await).await;
+    let rendering = world
+        .with(async |invocation| render_frame(invocation, &InstantRenderer { bands: BANDS }, &key).await)
+        .await;
     assert!(rendering.unwrap_err().is_retryable());
     assert_eq!(world.frame(&version), None);
 }
@@ -382,7 +383,7 @@ async fn many_bands_are_put_together_from_the_top() {
     let world = World::new();
     let key = format!("scripts/film/{NAME}.txt");
     let version = world.put(&key, "big frame 1");
-    let drawer = Drawer { bands: NonZeroU64::new(12).unwrap() };
+    let drawer = InstantRenderer { bands: NonZeroU64::new(12).unwrap() };
     let render = async |key: &str| {
         world.with(async |invocation| render_frame(invocation, &drawer, key).await.unwrap().outcome).await
     };

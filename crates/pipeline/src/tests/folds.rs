@@ -89,7 +89,8 @@ async fn lines_of_another_manifest_show_nothing() {
         world.fold(&Fact::Fold, Age::Old).await;
         let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
         let fact = Fact::Version(name(), version);
-        let glimpse = world.with(async |invocation| invocation.glimpse(&World::film()).await).await.unwrap();
+        let glimpse =
+            world.with(async |invocation| invocation.read_prefix(&World::film()).await).await.unwrap();
         if is_replaced {
             write_next(&mut world.store.bucket.lock().unwrap(), world.store.clock.now());
         }
@@ -246,14 +247,9 @@ async fn one_of_three() -> World {
 #[tokio::test]
 async fn a_finisher_leaves_while_another_frame_is_to_come_and_the_last_one_lists() {
     let world = one_of_three().await;
-    let version = world.put("scripts/film/3.txt", "frame 3");
     let (folded, requests) = finishes(&world).await;
     assert_eq!(folded, Folded::Awaited);
-    let looks = [
-        "get manifests/film.json".to_owned(),
-        "head scripts/film/3.txt".to_owned(),
-        format!("list frames/film/3@{version}-p"),
-    ];
+    let looks = ["get manifests/film.json", "list frames/film/", "head scripts/film/3.txt"];
     assert_eq!(requests[3..], looks);
     assert_eq!((world.manifest().head.done, world.manifest().head.revision), (1, 1));
     assert_eq!(world.try_render("scripts/film/3.txt").await.unwrap().folded, Folded::Claimed);
@@ -396,4 +392,145 @@ async fn a_request_is_sent_five_times_before_it_fails() {
         assert_eq!(paused > Duration::ZERO, sent > 1, "{failures}: {paused:?}");
         assert!(paused <= Duration::from_millis(50 + 100 + 200 + 400), "{failures}: {paused:?}");
     }
+}
+
+/// So many scripts, of which the first ones after the second are drawn, and no manifest.
+fn drawn_without_a_manifest(scripts: usize, drawn: usize) -> World {
+    let world = World::new();
+    for number in 1..=scripts {
+        let version = world.put(&format!("scripts/film/{number}.txt"), &format!("frame {number}"));
+        if (3..3 + drawn).contains(&number) {
+            world.put(&format!("frames/film/{number}@{version}-p1.png"), "drawn");
+        }
+    }
+    world
+}
+
+/// The others would write the same, one after the other.
+#[tokio::test]
+async fn of_those_who_find_no_manifest_the_first_one_writes_it_and_few_others() {
+    for (drawn, writers) in [(0, 30..=30), (1, 10..=20), (5, 1..=9)] {
+        let mut wrote = 0;
+        for request in 0..30 {
+            let world = drawn_without_a_manifest(10, drawn);
+            world.requests.store(request, Ordering::Relaxed);
+            let (folded, requests) = finishes(&world).await;
+            if folded == Folded::Awaited {
+                let looks = ["get manifests/film.json", "list frames/film/", "list scripts/film/"];
+                assert_eq!(requests[3..], looks, "{drawn}");
+                assert_eq!(world.keys("manifests/"), [""; 0]);
+            } else {
+                assert_eq!(world.manifest().head.done, drawn as u64 + 1);
+                wrote += 1;
+            }
+        }
+        assert!(writers.contains(&wrote), "{drawn}: {wrote}");
+    }
+}
+
+#[tokio::test]
+async fn the_last_one_writes_the_manifest_whatever_the_lot_says() {
+    for request in 0..10 {
+        let world = drawn_without_a_manifest(10, 8);
+        let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
+        world.put(&format!("frames/film/1@{version}-p1.error.json"), r#"{"message":"why"}"#);
+        world.requests.store(request, Ordering::Relaxed);
+        assert_eq!(finishes(&world).await.0, Folded::Claimed);
+    }
+}
+
+/// With many finishers one listing should serve all; with few there is nobody to wait for.
+#[tokio::test]
+async fn a_finisher_pauses_before_it_lists_only_in_a_crowd() {
+    for (others, looks) in [(0, 1), (7, 1), (8, 2)] {
+        let world = World::new();
+        world.put(SCRIPT, "hang 1");
+        world.put("scripts/film/2.txt", "frame 2");
+        world.fold(&Fact::Fold, Age::Old).await;
+        for number in 1..=others {
+            let version = ETag::new(&format!("older{number}"));
+            world.put(&format!("frames/film/1@{version}-p1.png"), "drawn");
+        }
+        // Nobody draws the first one's new version, so that there is none to leave for.
+        world.put(SCRIPT, "hang 2");
+        let (folded, requests) = finishes(&world).await;
+        assert_eq!(folded, Folded::Committed);
+        let counted = requests.iter().take_while(|request| !request.starts_with("put manifests/"));
+        let counted = counted.filter(|request| *request == "get manifests/film.json").count();
+        assert_eq!(counted, looks, "{others}: {requests:?}");
+    }
+}
+
+/// A listing from before the manifest was read again would overwrite newer results.
+#[tokio::test]
+async fn a_page_is_written_down_only_over_the_manifest_that_was_read_before_it() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.put("scripts/film/2.txt", "frame 2");
+    world.fold(&Fact::Fold, Age::Old).await;
+    let frame = format!("frames/film/1@{version}-p1.png");
+    world.put(&frame, "drawn");
+    let mut done = false;
+    world.meddle(move |request, bucket, now| {
+        if request == "put manifests/film.json" && !std::mem::replace(&mut done, true) {
+            // The frame goes, and someone else writes.
+            bucket.delete(&frame);
+            write_next(bucket, now);
+        }
+    });
+    assert_eq!(finishes(&world).await.0, Folded::Committed);
+    // With the page of before it would have been another revision, and one more that mends it.
+    let head = world.manifest().head;
+    assert_eq!((head.done, head.revision), (1, 3));
+}
+
+/// Of so many receipts a page does not show all.
+#[tokio::test]
+async fn a_finisher_looks_at_one_frame_where_there_is_more_than_a_page() {
+    let world = one_of_three().await;
+    for number in 0..crate::store::PAGE {
+        world.put(&format!("frames/film/old@{number}-p1.png"), "drawn");
+    }
+    let version = world.put("scripts/film/3.txt", "frame 3");
+    let (folded, requests) = finishes(&world).await;
+    assert_eq!(folded, Folded::Awaited);
+    let looks = [
+        "get manifests/film.json".to_owned(),
+        "list frames/film/".to_owned(),
+        format!("list frames/film/3@{version}-p"),
+        "head scripts/film/3.txt".to_owned(),
+    ];
+    assert_eq!(requests[3..], looks);
+}
+
+/// Half of a thousand finishers find that the frame is drawn which they look at first.
+#[tokio::test]
+async fn of_a_crowd_that_finds_its_first_frame_drawn_few_list() {
+    let (mut left_at_once, mut left_by_the_page, mut listed) = (0, 0, 0);
+    for request in 0..30 {
+        let world = World::new();
+        for number in 1..=600 {
+            world.put(&format!("scripts/film/{number}.txt"), "frame 1");
+        }
+        world.fold(&Fact::Fold, Age::Old).await;
+        let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
+        for number in (3..=600).step_by(2) {
+            world.put(&format!("frames/film/{number}@{version}-p1.png"), "drawn");
+        }
+        world.requests.store(request, Ordering::Relaxed);
+        let (folded, requests) = finishes(&world).await;
+        match folded {
+            Folded::Awaited if requests.len() == 6 => left_at_once += 1,
+            Folded::Awaited => {
+                assert_eq!(requests[5], "list frames/film/");
+                assert_eq!(requests.len(), 7, "{requests:?}");
+                left_by_the_page += 1;
+            }
+            _ => listed += 1,
+        }
+    }
+    assert!(
+        left_at_once > 5 && left_by_the_page > 5 && listed < 5,
+        "{left_at_once} {left_by_the_page} {listed}"
+    );
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::fold::fold;
 use crate::keys::{Receipt, Tag};
-use crate::observe::{Standing, standing};
+use crate::observe::{VersionResult, version_result};
 use crate::reconcile::ReceiptFound;
 
 const SETTINGS: &str = "scripts/film/animation.json";
@@ -192,20 +192,20 @@ fn a_version_has_come_to_the_strongest_of_what_there_is_of_it() {
         let attempt = NonZeroU64::MIN;
         found(Receipt::Begun { name: name(), tag: tag(1), part: None, attempt }, "b")
     };
-    let is_split = || Some(Standing::Split { tag: tag(1), count });
-    let is_faulty = || Some(Standing::Faulty(ETag::new("e")));
+    let is_split = || Some(VersionResult::Split { tag: tag(1), count });
+    let is_faulty = || Some(VersionResult::Faulty(ETag::new("e")));
     for (receipts, whole, first) in [
         (vec![], None, None),
         (vec![begun()], None, None),
         (vec![fault(None)], is_faulty(), None),
-        (vec![frame(1, None), fault(None)], Some(Standing::Drawn(1)), None),
-        (vec![frame(2, None), frame(1, None)], Some(Standing::Drawn(2)), None),
+        (vec![frame(1, None), fault(None)], Some(VersionResult::Drawn(1)), None),
+        (vec![frame(2, None), frame(1, None)], Some(VersionResult::Drawn(2)), None),
         (vec![split(), frame(1, None)], is_split(), None),
-        (vec![split(), frame(2, one), fault(one)], is_split(), Some(Standing::Drawn(2))),
+        (vec![split(), frame(2, one), fault(one)], is_split(), Some(VersionResult::Drawn(2))),
         (vec![fault(one), frame(1, two)], None, is_faulty()),
     ] {
-        assert_eq!(standing(&receipts, None), whole, "{receipts:?}");
-        assert_eq!(standing(&receipts, one), first, "{receipts:?}");
+        assert_eq!(version_result(&receipts, None), whole, "{receipts:?}");
+        assert_eq!(version_result(&receipts, one), first, "{receipts:?}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::fold::Folded;
-use crate::lease::Held;
+use crate::lease::HeldLease;
 
 /// Each of the errors after which a conditional put may succeed when all is looked at anew.
 fn passing() -> [Error; 5] {
@@ -81,8 +81,8 @@ async fn a_left_lease_that_was_taken_without_an_answer_is_ones_own() {
             bucket.put(now, LEASE, TAKEN.into(), PutOptions::always()).unwrap();
         }
     });
-    let taken = world.with(async |invocation| invocation.take_left_lease(&World::film()).await).await;
-    assert_eq!(taken.unwrap(), Some(Held { has_checkpoint: true }));
+    let taken = world.with(async |invocation| invocation.reclaim_lease(&World::film()).await).await;
+    assert_eq!(taken.unwrap(), Some(HeldLease { has_checkpoint: true }));
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, TAKEN);
 }
 

@@ -338,6 +338,9 @@ async fn what_a_sweep_could_not_delete_the_next_one_does() {
     let visited = world.with(async |invocation| visit(invocation, &World::film()).await).await;
     assert!(matches!(visited, Err(Error::Refused { .. })), "{visited:?}");
     world.refuse(|_| None);
+    // Until its time is up another one leaves the results alone.
+    assert_eq!(world.visit().await.deleted, 0);
+    world.later(17 * MINUTE).await;
     world.visit().await;
     let left = world.left(&["frames/", "parts/"]);
     assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
@@ -527,4 +530,47 @@ async fn a_claim_is_put_where_the_manifest_does_not_show_that_the_set_is_refused
     world.assemble(&world.joiner(), &claim).await.unwrap();
     refusals(&world, r#"{"message":"why"}"#);
     assert!(world.visit().await.claimed);
+}
+
+impl World {
+    /// A sweep deletes what has come of the script that is `text` again by then, and dies before its next request.
+    async fn dies_deleting(&self, text: &'static str, request_id: &str) {
+        let (bucket, clock, mut has_deleted) = (self.store.bucket.clone(), self.store.clock.clone(), false);
+        self.refuse(move |request| {
+            let deletes = request.starts_with("delete frames/film/1@");
+            if deletes && !std::mem::replace(&mut has_deleted, true) {
+                let mut bucket = bucket.lock().unwrap();
+                bucket.put(clock.now(), SCRIPT, text.into(), PutOptions::always()).unwrap();
+            }
+            let is_dead = has_deleted && !deletes;
+            is_dead.then(|| Error::Refused { key: "k".into(), source: "dead".into() })
+        });
+        assert!(matches!(self.visit_as(request_id).await, Err(Error::Refused { .. })), "{text}");
+        self.refuse(|_| None);
+    }
+
+    async fn visit_as(&self, request_id: &str) -> Result<Visit> {
+        let (store, policy) = (&self.store, &self.policy);
+        let invocation = Invocation::new(store, &store.clock, &self.random, policy, request_id);
+        visit(&invocation, &World::film()).await
+    }
+}
+
+/// Its script was too new to be taken for stuck, and the frame stayed pending until a later sweep.
+#[tokio::test]
+async fn what_comes_back_while_a_sweep_dies_over_its_results_the_next_attempt_wakes() {
+    for text in ["frame 1", "bad 1", "split 2 1", "big frame 1"] {
+        let world = World::new();
+        world.upload("1.txt", text).await;
+        world.upload("1.txt", "frame 2").await;
+        world.later(8 * DAY).await;
+        world.dies_deleting(text, "sweep").await;
+        // Another frame is to come: which ones were deleted, nobody knows.
+        world.put("scripts/film/2.txt", "hang 1");
+        let other = world.visit_as("other").await.unwrap();
+        assert_eq!((other.woken, other.deleted), (0, 0), "{text}: a sweep is at it");
+        assert_eq!(world.visit_as("sweep").await.unwrap().woken, 2, "{text}");
+        assert!(world.keys("frames/film/@").is_empty(), "{text}: the lease is given back");
+        assert_eq!(world.visit_as("sweep").await.unwrap().woken, 0, "{text}");
+    }
 }

@@ -214,6 +214,10 @@ pub enum Parameter {
     FrameCount,
     /// The number of frames per second.
     FrameRate,
+    /// A frame of `durations`, in the settings.
+    FrameOfDuration,
+    /// A time of `durations`, in the settings.
+    Duration,
 }
 
 impl fmt::Display for Parameter {
@@ -269,6 +273,8 @@ impl fmt::Display for Parameter {
             Self::LastFrame => "the last frame b",
             Self::FrameCount => "`frames`",
             Self::FrameRate => "`fps`",
+            Self::FrameOfDuration => "a frame of `durations`",
+            Self::Duration => "a time of `durations`",
         })
     }
 }

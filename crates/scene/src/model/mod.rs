@@ -14,7 +14,7 @@ mod look;
 mod material;
 mod sampling;
 mod screen;
-mod shapes;
+pub mod shapes;
 mod surface;
 mod vector;
 
@@ -29,14 +29,14 @@ pub use look::Look;
 pub use material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
 pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
-pub use shapes::{Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle};
+pub use shapes::{Instance, Object, Placement};
 pub use vector::unit;
 
 pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
-pub(crate) use shapes::USE;
+pub(crate) use shapes::{USE, with_shapes};
 pub(crate) use vector::PARALLEL;
 
 use crate::shared_slice::SharedSlice;

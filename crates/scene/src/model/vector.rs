@@ -50,6 +50,17 @@ pub(super) fn cross(a: DVec3, b: DVec3) -> DVec3 {
     DVec3::new(difference(a.y, b.z, a.z, b.y), difference(a.z, b.x, a.x, b.z), difference(a.x, b.y, a.y, b.x))
 }
 
+/// Returns the maximum of p·`direction` over some points.
+pub(super) fn furthest(points: &[DVec3], direction: DVec3) -> f64 {
+    points.iter().map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Returns the maximum of p·`direction` over a disc of radius 1 around the origin, perpendicular to `axis`.
+pub(super) fn across(axis: DVec3, direction: DVec3) -> f64 {
+    let axis = axis.normalize_or_zero();
+    (direction - direction.dot(axis) * axis).length()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -22,6 +22,10 @@ pub(super) enum CurveFault {
     Stray(String),
     /// A frame has no `:` and value.
     NoValue,
+    /// Four numbers do not follow `bezier`.
+    FewNumbers,
+    /// A number of `bezier` that must be 0 to 1 is not: its name and its value.
+    OutsideShare(&'static str, f64),
     /// A frame or a value is no number.
     BadNumber(NumberFault, &'static str, String),
     /// A frame is not greater than the one before it.
@@ -79,15 +83,12 @@ fn read(text: &str, span: Range<usize>) -> Result<Curve, (Range<usize>, CurveFau
                     return Err((word, CurveFault::MisplacedMode(word_text.to_owned())));
                 }
                 None => cycle = true,
+                Some(Mode::Bezier(_)) => mode = Some(Mode::Bezier(read_points(text, bytes, word, &mut at)?)),
                 Some(known) => mode = Some(known),
             }
             continue;
         }
-        let read = |word: Range<usize>, name| {
-            let word_text = &text[word.clone()];
-            number::parse(word_text)
-                .map_err(|fault| (word, CurveFault::BadNumber(fault, name, word_text.to_owned())))
-        };
+        let read = |word, name| read_number(text, word, name);
         let frame = read(word.clone(), "frame")?;
         let colon = next_word(bytes, &mut at);
         if colon.is_none_or(|colon| &text[colon] != ":") {
@@ -118,6 +119,40 @@ fn read(text: &str, span: Range<usize>) -> Result<Curve, (Range<usize>, CurveFau
     }
 }
 
+fn read_number(
+    text: &str,
+    word: Range<usize>,
+    name: &'static str,
+) -> Result<f64, (Range<usize>, CurveFault)> {
+    let word_text = &text[word.clone()];
+    number::parse(word_text).map_err(|fault| (word, CurveFault::BadNumber(fault, name, word_text.to_owned())))
+}
+
+/// Reads the four numbers after `bezier`, which is at `mode`.
+fn read_points(
+    text: &str,
+    bytes: &[u8],
+    mode: Range<usize>,
+    at: &mut usize,
+) -> Result<[f64; 4], (Range<usize>, CurveFault)> {
+    let is_mark = |word: &Range<usize>| matches!(&text[word.clone()], "(" | ")" | ":");
+    let mut points = [0.0; 4];
+    for (point, name) in points.iter_mut().zip(["a", "b", "c", "d"]) {
+        let Some(word) = next_word(bytes, at).filter(|word| !is_mark(word)) else {
+            return Err((mode, CurveFault::FewNumbers));
+        };
+        // A number before a colon is the frame of a key.
+        if next_word(bytes, &mut at.clone()).is_some_and(|next| &text[next] == ":") {
+            return Err((mode, CurveFault::FewNumbers));
+        }
+        *point = read_number(text, word.clone(), name)?;
+        if matches!(name, "a" | "c") && !(0.0..=1.0).contains(point) {
+            return Err((word, CurveFault::OutsideShare(name, *point)));
+        }
+    }
+    Ok(points)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,6 +172,10 @@ mod tests {
         check("(cycle Smooth -1e3:.5\t7:1e-9)", "(smooth cycle -1000:0.5 7:1e-9)");
         check("(step Cycle 1:0 2:3 4:-0)", "(step cycle 1:0 2:3 4:-0)");
         check("(5:3)", "3");
+        check("(InOut 1:0 2:3)", "(inout 1:0 2:3)");
+        check("(bezier .25 -1 .25 2.5 cycle 1:0 2:3)", "(bezier 0.25 -1 0.25 2.5 cycle 1:0 2:3)");
+        check("(cycle bezier 0,0,1,1,1:0 2:3)", "(bezier 0 0 1 1 cycle 1:0 2:3)");
+        check("(bezier 0 0 1 1 5:3)", "3");
         check("(smooth 5:3)", "3");
     }
 
@@ -162,6 +201,17 @@ mod tests {
         check("(smooth step 1:0)", "step", CurveFault::MisplacedMode("step".into()));
         check("(cycle cycle 1:0)", "cycle", CurveFault::MisplacedMode("cycle".into()));
         check("(1:0 smooth 2:1)", "smooth", CurveFault::MisplacedMode("smooth".into()));
+        check("(bezier 1:0 2:1)", "bezier", CurveFault::FewNumbers);
+        check("(bezier .1 .2 .3 1:0 2:1)", "bezier", CurveFault::FewNumbers);
+        check("(bezier .1 .2 .3)", "bezier", CurveFault::FewNumbers);
+        check("(bezier .1 (1:0 2:1) .3 1 1:0)", "bezier", CurveFault::FewNumbers);
+        check("(bezier .1 .2 1.5 1 1:0 2:1)", "1.5", CurveFault::OutsideShare("c", 1.5));
+        check(
+            "(bezier .1 x .5 1 1:0 2:1)",
+            "x",
+            CurveFault::BadNumber(NumberFault::Malformed, "b", "x".into()),
+        );
+        check("(back elastic 1:0)", "elastic", CurveFault::MisplacedMode("elastic".into()));
         check("(1:0 (2:1)", "(", CurveFault::Stray("(".into()));
         check("(1:0 :1)", ":", CurveFault::Stray(":".into()));
         check("(1:0 2)", "2", CurveFault::NoValue);

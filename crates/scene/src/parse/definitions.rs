@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::doubts::Looks;
 use super::line::Statement;
 use super::text::{is_name, parameters};
 use super::visibility::{Animated, Origin, Suffix, VisibleSpan, join};
@@ -19,6 +20,7 @@ pub(super) struct MaterialInfo {
     pub(super) still: Option<Material>,
     /// Whether it has only coefficients.
     is_plain: bool,
+    pub(super) looks: Looks,
     /// The material of its pattern.
     other: Option<usize>,
     /// The lines of its clauses with curves, as indices of all lines with curves.
@@ -32,6 +34,8 @@ pub(super) struct GroupInfo {
     pub(super) drawn: usize,
     /// The largest number of groups that drawing it draws.
     pub(super) uses: usize,
+    /// Whether an object has a colour that needs light.
+    pub(super) needs_light: bool,
     pub(super) reach: Reach,
     contents: Contents,
     visible_span: Option<VisibleSpan>,
@@ -61,6 +65,7 @@ pub(super) struct OpenGroup<'a> {
     pub(super) recorder: GroupRecorder,
     pub(super) drawn: usize,
     pub(super) uses: usize,
+    pub(super) needs_light: bool,
     reach: Reach,
     contents: Contents,
 }
@@ -196,6 +201,7 @@ impl<'a> Parser<'a> {
             && other.is_none_or(|other| {
                 self.materials.get(other).value.as_ref().is_some_and(|info| info.still.is_some())
             });
+        let other_looks = other.and_then(|other| Some(self.materials.get(other).value.as_ref()?.looks));
         let mut named = NamedMaterial { name: name.into(), clauses, still: None };
         if is_constant && is_good {
             let coefficients = |other: usize| {
@@ -207,6 +213,7 @@ impl<'a> Parser<'a> {
         let info = MaterialInfo {
             still: named.still.clone(),
             is_plain: named.clauses.iter().all(is_plain),
+            looks: Looks::of(&named.clauses, other_looks),
             other,
             moving,
             visible_span: None,
@@ -259,6 +266,12 @@ impl<'a> Parser<'a> {
                 None => Some(None),
             };
             if let (Some(row), Some(other)) = (row, other) {
+                self.doubt_colors(
+                    s,
+                    clause.form(),
+                    |i| row.largest(i),
+                    |numbers| spans[numbers.start].start..spans[numbers.end - 1].end,
+                );
                 if row.is_constant() {
                     self.check_clause(s, clause, &row, &spans);
                 } else {
@@ -298,7 +311,9 @@ impl<'a> Parser<'a> {
                 Err(_) if is_next => {
                     let end = words[..*next].last().map_or(place.end, |word| word.end);
                     let found = spans.len();
-                    self.report.error(s.line, end..end, || wording::clause_too_short(clause, name, found));
+                    let color = s.text.find('#').and_then(|at| wording::color_at(&s.text[at..]));
+                    self.report
+                        .error(s.line, end..end, || wording::clause_too_short(clause, name, found, color));
                     return (None, spans);
                 }
                 Err((span, fault)) => {
@@ -366,6 +381,7 @@ impl<'a> Parser<'a> {
             recorder: GroupRecorder::default(),
             drawn: 0,
             uses: 0,
+            needs_light: false,
             reach: Reach::NONE,
             contents: Contents::default(),
         });
@@ -407,8 +423,9 @@ impl<'a> Parser<'a> {
 
     pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
-        let OpenGroup { name, line, subject, recorder, drawn, uses, reach, contents, .. } = group;
-        let info = GroupInfo { drawn, uses, reach, contents, visible_span: None };
+        let OpenGroup { name, line, subject, recorder, drawn, uses, needs_light, reach, contents, .. } =
+            group;
+        let info = GroupInfo { drawn, uses, needs_light, reach, contents, visible_span: None };
         if self.groups.define(name, line, subject, Some(info)).is_ok() {
             self.record(|script| script.add_group(recorder.finish(name, drawn)));
         }

@@ -55,7 +55,7 @@ impl<'a> Statement<'a, '_> {
 
 /// Returns the first parameter that was probably written with a decimal comma: `1,5`, in a line that would have the
 /// right number of numbers if only spaces separated them.
-fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
+pub(super) fn decimal_comma(text: &str, command: Command, words: &Words) -> Option<Range<usize>> {
     // Most lines have no comma, which this test finds quickly.
     if !text.contains(',') {
         return None;
@@ -81,7 +81,12 @@ impl<'a> Parser<'a> {
     pub(super) fn line(&mut self, line: Line<'a>, words: &mut Words) {
         let mut values = [0.0; MAX_NUMBERS];
         if let Some(statement) = self.statement(line, words, &mut values) {
+            self.read += 1;
+            let errors_before = self.report.error_count();
             self.run(&statement);
+            if self.report.error_count() == errors_before {
+                self.doubt_line(&statement);
+            }
         }
     }
 
@@ -197,6 +202,7 @@ impl<'a> Parser<'a> {
         // This search takes longer than parsing a line.
         let nearest = if self.report.describes_next() { Command::nearest(name) } else { None };
         self.report.error(line, words.command.clone(), || wording::unknown_command(name, nearest));
+        self.unknown += 1;
         if let Some(command) = nearest {
             let subject = words.take_first().filter(|span| is_name(&text[span.clone()]));
             self.faulty_line(line, text, command, subject, words);
@@ -283,6 +289,7 @@ impl<'a> Parser<'a> {
                     command,
                     words,
                     decimal_comma(text, command, words).map(|comma| &text[comma]),
+                    text.find('#').and_then(|at| wording::color_at(&text[at..])),
                 )
             });
         }

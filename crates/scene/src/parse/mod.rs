@@ -10,6 +10,8 @@
 
 mod curve;
 mod definitions;
+mod doubts;
+mod foreign;
 mod line;
 mod names;
 mod number;
@@ -31,6 +33,7 @@ use crate::report::{Line, Report};
 use crate::script::{Drawn, Recorder, Script, Template, Value};
 pub use curve::parse_curve;
 use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
+use doubts::{Doubts, looks_in, looks_of};
 use line::Statement;
 use names::Names;
 use picture::Picture;
@@ -57,6 +60,8 @@ pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
         }
     } else if let Some(mark @ (b"\xff\xfe" | b"\xfe\xff")) = bytes.get(..2) {
         report.error(Line { number: 1, offset: 0, bytes: mark }, 0..2, wording::utf16);
+    } else if let Some(what) = foreign::not_text(bytes) {
+        report.error(Line { number: 1, offset: 0, bytes: &[] }, 0..0, || wording::not_text(what));
     } else {
         return Parser::new(limits, report).text(bytes);
     }
@@ -69,6 +74,10 @@ struct Parser<'a> {
     recorder: Recorder,
     screen: ScreenState,
     picture: Picture<'a>,
+    doubts: Doubts<'a>,
+    /// The number of lines that could be read, and of those with an unknown command.
+    read: usize,
+    unknown: usize,
     /// The number of objects that the current scene draws.
     objects: usize,
     /// The number of groups that the current scene draws, each as often as it is drawn.
@@ -128,6 +137,9 @@ impl<'a> Parser<'a> {
             recorder: Recorder::default(),
             screen: ScreenState::Unset,
             picture: Picture::default(),
+            doubts: Doubts::default(),
+            read: 0,
+            unknown: 0,
             objects: 0,
             uses: 0,
             lights: 0,
@@ -176,6 +188,10 @@ impl<'a> Parser<'a> {
         self.settle_all();
         visibility::check(&self.moving, &self.exposures, &mut self.report);
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
+        // Of a file in another language, the first errors say all.
+        if self.unknown > self.read {
+            self.report.describe_at_most(foreign::DESCRIBED);
+        }
         Parsed { script, diagnostics: self.report.finish() }
     }
 
@@ -229,7 +245,10 @@ impl<'a> Parser<'a> {
             Effect::Samples => {
                 self.set(s, |recorder, samples| recorder.samples = samples);
             }
-            Effect::Shutter => self.set(s, |recorder, shutter| recorder.shutter = shutter),
+            Effect::Shutter => {
+                self.set(s, |recorder, shutter| recorder.shutter = shutter);
+                self.doubt_shutter(s);
+            }
             Effect::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
             Effect::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
             Effect::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
@@ -295,6 +314,7 @@ impl<'a> Parser<'a> {
             return;
         };
         self.picture.camera_set(s, &camera);
+        self.doubt_camera(s, &camera);
         let old = self.pending.camera.replace((moving, self.exposures.len()));
         self.settle(old);
         self.record(|recorder| recorder.set_camera(camera));
@@ -303,7 +323,9 @@ impl<'a> Parser<'a> {
     fn lens(&mut self, s: &Statement<'a, '_>) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
         let Some((lens, moving)) = self.read_value(s, Lens::read) else { return };
-        self.picture.lens_set(s, &lens);
+        let is_point = matches!(&lens, Value::Constant(lens) if lens.radius() == 0.0);
+        self.picture.lens_set(s, is_point);
+        self.doubt_lens(s, is_point);
         let old = self.pending.lens.replace((moving, self.exposures.len()));
         self.settle(old);
         self.record(|recorder| recorder.set_lens(lens));
@@ -342,6 +364,7 @@ impl<'a> Parser<'a> {
         };
         let moves = matches!(material, Some(None));
         let is_constant = s.row.is_none() && !moves;
+        let named_looks = number.and_then(|number| Some(self.materials.get(number).value.as_ref()?.looks));
         let drawn = if is_constant {
             let material = material.flatten().or(number.map(|_| Material::default()));
             let Some(object) = self.read(s, material.as_ref(), read) else { return };
@@ -349,6 +372,7 @@ impl<'a> Parser<'a> {
                 let place = s.command.form().place(|_, parameter| parameter == lint.parameter());
                 self.report.warning(s.line, s.words.span(place), || wording::lint_fault(lint));
             }
+            self.doubt_object(s, named_looks.unwrap_or_else(|| looks_of(object.material())));
             Err(object)
         } else {
             let row = match &s.row {
@@ -361,6 +385,7 @@ impl<'a> Parser<'a> {
                     s.still_row()
                 }
             };
+            self.doubt_object(s, named_looks.unwrap_or_else(|| looks_in(s.command.form(), &row)));
             let template = Template { command: s.command, row: row.clone() };
             if s.row.is_some() {
                 let spans = s.words.parameters().to_vec();
@@ -389,6 +414,7 @@ impl<'a> Parser<'a> {
         if let Some(moving) = moving {
             self.see_moving(moving);
         }
+        self.doubt_light(s, &light);
         self.lights += 1;
         let (count, limit) = (self.lights, self.limits.max_lights);
         self.check_limit(s, count - 1, count, limit, "lights in a scene");
@@ -397,6 +423,7 @@ impl<'a> Parser<'a> {
 
     fn clear(&mut self) {
         (self.objects, self.uses, self.lights) = (0, 0, 0);
+        self.doubt_no_more_of_scene();
         if let Some((line, span)) = self.unseen.removable.take() {
             self.report.warning(line, span, wording::cleared);
         }
@@ -425,6 +452,7 @@ impl<'a> Parser<'a> {
         match self.screen {
             ScreenState::Set(screen) => {
                 self.picture.check(screen, &mut self.report);
+                self.doubt_picture(s);
                 let drawn = self.objects;
                 self.record(|recorder| recorder.trace(screen, drawn));
             }
@@ -458,6 +486,7 @@ impl<'a> Parser<'a> {
         let row = s.row.clone().unwrap_or_else(|| s.still_row());
         let Some(info) = self.groups.get(number).value.as_ref() else { return };
         let (reach, scale) = info.reach.placed(&row);
+        let needs_light = info.needs_light && still != Some(None);
         let is_hidden = still == Some(None) || info.drawn == 0;
         let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };
         if !is_hidden && !(4.0 * reach).is_finite() || !scale.is_finite() {
@@ -466,6 +495,7 @@ impl<'a> Parser<'a> {
             self.report.error(s.line, span, wording::too_far);
         }
         self.see_group(number, reach, scale);
+        self.doubt_group(needs_light);
         self.count_drawn(s, drawn, uses);
         let drawn = Drawn::Use { group: number, row };
         match &mut self.group {

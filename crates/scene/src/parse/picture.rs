@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::line::Statement;
 use super::wording;
 use crate::command::Command;
-use crate::model::{Camera, Lens, Screen, unsquashed};
+use crate::model::{Camera, Screen, unsquashed};
 use crate::report::{Line, Report};
 use crate::row::Number;
 use crate::script::Value;
@@ -54,14 +54,18 @@ impl<'a> Picture<'a> {
         self.window = corners.map(|corners| (s.line, s.words.span(10..14), corners));
     }
 
-    pub(super) fn lens_set(&mut self, s: &Statement<'a, '_>, lens: &Value<Lens>) {
-        let is_point = matches!(lens, Value::Constant(lens) if lens.radius() == 0.0);
+    /// Returns whether a lens has an effect with the current camera.
+    pub(super) fn has_lens_effect(&self) -> bool {
+        self.has_camera && !self.is_orthographic
+    }
+
+    pub(super) fn lens_set(&mut self, s: &Statement<'a, '_>, is_point: bool) {
         self.lens = (!is_point).then(|| s.place());
     }
 
     /// Reports warnings about the picture that is rendered now, each only once.
     pub(super) fn check(&mut self, screen: Screen, report: &mut Report<'a>) {
-        if (self.is_orthographic || !self.has_camera)
+        if !self.has_lens_effect()
             && let Some((line, span)) = self.lens.take()
         {
             report.warning(line, span, wording::lens_without_effect);

@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
 use crate::form::{Field, Form, Kind, Names, Unit, Values};
-use crate::model::{Clause, InvalidValue, Lint, Screen};
+use crate::model::{Clause, InvalidValue, Lint, Parameter, Screen};
 use crate::report::Fault;
 use crate::shown::{grouped, nearest, quoted};
 
@@ -25,6 +25,14 @@ pub(super) fn utf16() -> Fault {
     Fault::new(Code::NotUtf8, "the script is UTF-16 text")
         .expected("expected UTF-8")
         .help("save the script as UTF-8")
+}
+
+pub(super) fn not_text(what: &str) -> Fault {
+    if what == super::foreign::UTF_16 {
+        return utf16();
+    }
+    Fault::new(Code::NotText, format!("this is {what}, not a scene script"))
+        .expected("expected a text file with commands such as `Screen 640 480`")
 }
 
 pub(super) fn lone_carriage_return() -> Fault {
@@ -91,9 +99,21 @@ fn hint(word: &str) -> Option<String> {
 }
 
 /// Describes missing parameters. `comma` is a parameter that was probably written with a decimal comma.
-pub(super) fn too_few(command: Command, words: &Words, comma: Option<&str>) -> Fault {
+///
+/// `color` is that of a comment, which is a colour in other languages.
+pub(super) fn too_few(
+    command: Command,
+    words: &Words,
+    comma: Option<&str>,
+    color: Option<[f64; 3]>,
+) -> Fault {
     let (missing, _) = command.form().number(words.count());
-    miscounted(Code::TooFewParameters, command, words, comma).expected(format!("expected `{missing}` here"))
+    let fault = miscounted(Code::TooFewParameters, command, words, comma)
+        .expected(format!("expected `{missing}` here"));
+    match color {
+        Some(color) => fault.help(format!("`#` begins a comment; {}", color_help(color))),
+        None => fault,
+    }
 }
 
 /// Describes extra parameters. `first` is the first of them, and `comma` a parameter that was probably written
@@ -162,7 +182,29 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str
         return Fault::new(Code::InvalidValue, format!("{parameter} must be {values}"))
             .expected(format!("expected a number {values}"));
     }
-    Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault))
+    let is_hidden = number::parse(word) == Ok(0.0);
+    vanishing(
+        Fault::new(Code::InvalidValue, fault.to_string()).expected(expectation(fault)),
+        field,
+        is_hidden,
+    )
+}
+
+/// Adds to a fault of a size how an object vanishes.
+fn vanishing(fault: Fault, field: &Field, is_hidden: bool) -> Fault {
+    if is_hidden
+        && field.kind == Kind::Length
+        && field.values == Values::Positive
+        && is_of_shape(field.parameter)
+    {
+        fault.help("to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0")
+    } else {
+        fault
+    }
+}
+
+fn is_of_shape(parameter: Parameter) -> bool {
+    matches!(parameter, Parameter::Radius | Parameter::Thickness)
 }
 
 /// Describes a value of a line with curves that is invalid at a time.
@@ -236,7 +278,16 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
             .expected("expected a key such as `25:3`, or `)`"),
         CurveFault::NoValue => malformed("a key lacks its value".into())
             .expected(format!("expected `:` and `{parameter}` after this frame")),
-        CurveFault::BadNumber(fault, "frame", word) => bad_number(fault, "frame", &word, false),
+        CurveFault::FewNumbers => malformed("`bezier` lacks its four numbers".into())
+            .expected("expected four numbers after this, then the keys")
+            .help("as CSS's cubic-bezier: `(bezier .25 .1 .25 1  1:0 25:3)`"),
+        CurveFault::OutsideShare(name, value) => {
+            malformed(format!("`{name}` of `bezier` must not be {value}"))
+                .expected(format!("expected `{name}`, 0 to 1: the time of a control point"))
+        }
+        CurveFault::BadNumber(fault, name @ ("frame" | "a" | "b" | "c" | "d"), word) => {
+            bad_number(fault, name, &word, false)
+        }
         CurveFault::BadNumber(fault, _, word) => bad_number(fault, parameter, &word, false),
         CurveFault::OutOfOrder(last, frame) => {
             malformed(format!("frame {frame} must be greater than frame {last}"))
@@ -275,8 +326,9 @@ pub(super) fn wrong_at(field: &Field, moment: Moment, from: f64, to: f64) -> Fau
         | Values::OneOf(_) => field.values.to_string(),
     };
     let when = if from == to { format!("at frame {from}") } else { format!("from frame {from} to {to}") };
-    Fault::new(Code::InvalidValue, format!("{} is {value} at frame {frame}", field.parameter))
-        .expected(format!("expected {takes} {when}"))
+    let fault = Fault::new(Code::InvalidValue, format!("{} is {value} at frame {frame}", field.parameter))
+        .expected(format!("expected {takes} {when}"));
+    vanishing(fault, field, true)
 }
 
 /// Reports that checking the constraints of a line with curves would take too long.
@@ -384,13 +436,16 @@ pub(super) fn clause_twice(clause: Clause, first: Clause) -> Fault {
     Fault::new(Code::DuplicateClause, message).expected("expected another clause")
 }
 
-/// Describes a clause with `found` numbers, of which the one called `name` is missing.
-pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize) -> Fault {
+/// Describes a clause with `found` numbers, of which the one called `name` is missing. `color` is that of a comment.
+pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize, color: Option<[f64; 3]>) -> Fault {
     let found = if found == 0 { "none".to_string() } else { found.to_string() };
     let takes = counts_of(clause.form());
     Fault::new(Code::TooFewParameters, format!("`{}` takes {takes}, found {found}", clause.name()))
         .expected(format!("expected `{name}` here"))
-        .help(format!("write `{}`", clause.form()))
+        .help(match color {
+            Some(color) => format!("`#` begins a comment; {}", color_help(color)),
+            None => format!("write `{}`", clause.form()),
+        })
 }
 
 pub(super) fn no_pattern_material(clause: Clause) -> Fault {
@@ -430,6 +485,73 @@ pub(super) fn too_far() -> Fault {
 pub(super) fn lens_without_effect() -> Fault {
     Fault::new(Code::Unused, "the lens has no effect with `Orthocamera`")
         .expected("expected a `Look` or `Camera` beside this")
+}
+
+/// Describes a setting without effect at one ray per pixel.
+pub(super) fn needs_samples(what: &str) -> Fault {
+    Fault::new(Code::NeedsSamples, format!("{what} has no effect: there is one ray per pixel"))
+        .expected("expected `Samples` before the `Trace`")
+        .help("write for example `Samples 64`")
+}
+
+pub(super) fn no_light() -> Fault {
+    Fault::new(Code::NoLight, "there is no light: diffuse colours are black")
+        .expected("expected an `Ilight` or `Plight` before this")
+        .help("write for example `Ilight 1 1 1  -1 -2 -1`")
+}
+
+pub(super) fn glass_panes() -> Fault {
+    Fault::new(
+        Code::GlassPanes,
+        "triangles of glass do not refract: each is a thin pane, also where they close a body",
+    )
+    .expected("expected a shape with an inside")
+    .help("`Sphere`, `Box`, `Cylinder`, `Cone` and `Torus` refract; the index 1 says that panes are meant")
+}
+
+pub(super) fn narrow_view(angle: f64) -> Fault {
+    let degrees = short(angle.to_degrees());
+    Fault::new(Code::NarrowView, "a very narrow field of view: the angle is in degrees")
+        .expected("expected an angle such as 40")
+        .help(format!("if {} is in radians, it is {degrees} degrees", short(angle)))
+}
+
+/// Describes a colour that is probably written as levels.
+pub(super) fn far_above_one(written: &str) -> Fault {
+    let fault = Fault::new(Code::FarAboveOne, "this is far above 1, which is full brightness")
+        .expected("expected numbers from 0 to 1");
+    let levels: Option<Vec<f64>> = written
+        .split([' ', '\t', ','])
+        .filter(|word| !word.is_empty())
+        .map(|word| word.parse().ok())
+        .collect();
+    match levels.filter(|levels| levels.iter().all(|level| (0.0..=255.0).contains(level))) {
+        Some(levels) => {
+            let shares: Vec<_> = levels.iter().map(|level| share(level / 255.0)).collect();
+            fault.help(format!("levels from 0 to 255 are divided by 255: `{}`", shares.join(" ")))
+        }
+        None => fault,
+    }
+}
+
+/// Describes a `#` that is glued to a word. `color` is what it is in other languages.
+pub(super) fn glued_comment(color: Option<[f64; 3]>) -> Fault {
+    let fault = Fault::new(Code::GluedComment, "`#` begins a comment: nothing from here on counts");
+    match color {
+        Some(color) => {
+            fault.expected("expected three numbers from 0 to 1 for a colour").help(color_help(color))
+        }
+        None => fault.expected("expected a blank before the comment"),
+    }
+}
+
+fn color_help(color: [f64; 3]) -> String {
+    format!("as numbers, this colour is `{}`", color.map(share).join(" "))
+}
+
+/// Formats a share with three digits.
+fn share(x: f64) -> String {
+    format!("{x:.3}").parse::<f64>().unwrap_or(x).to_string()
 }
 
 /// Warns of pixels that are not square. `better` is a window with square pixels.
@@ -509,4 +631,26 @@ pub(super) fn unused() -> Fault {
     Fault::new(Code::Unused, "this has no effect: no `Trace` follows")
         .expected("expected a `Trace` after this")
         .help(TRACE_HELP)
+}
+
+/// Returns the colour for a comment that is a colour in other languages: `#ff8000` or `#f80`.
+pub(super) fn color_at(comment: &str) -> Option<[f64; 3]> {
+    let digits = comment.strip_prefix('#')?.split([' ', '\t', ',']).next()?;
+    if !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return None;
+    }
+    let level = |i: usize, length: usize| {
+        let digits = &digits[i * length..(i + 1) * length];
+        let level = u32::from_str_radix(digits, 16).unwrap_or_default();
+        f64::from(if length == 1 { 17 * level } else { level }) / 255.0
+    };
+    let is_number = digits.bytes().any(|b| b.is_ascii_digit());
+    let is_one_letter = || digits.bytes().all(|b| digits.as_bytes()[0].eq_ignore_ascii_case(&b));
+    match digits.len() {
+        // Words such as `add` are comments.
+        _ if !is_number && !is_one_letter() => None,
+        3 => Some([0, 1, 2].map(|i| level(i, 1))),
+        6 | 8 => Some([0, 1, 2].map(|i| level(i, 2))),
+        _ => None,
+    }
 }

@@ -43,14 +43,7 @@ impl Namer {
     fn add(&mut self, object: &Object) {
         match object {
             Object::Instance(instance) => self.add_instance(instance),
-            Object::Sphere(_)
-            | Object::Triangle(_)
-            | Object::Cuboid(_)
-            | Object::Plane(_)
-            | Object::Disc(_)
-            | Object::Cylinder(_)
-            | Object::Cone(_)
-            | Object::Torus(_) => {
+            _ => {
                 let surface = self.surface(object.material());
                 self.recorder.add_object(object.clone(), surface);
             }
@@ -150,7 +143,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::model::{Camera, Screen, Sphere};
+    use crate::model::shapes::Sphere;
+    use crate::model::{Camera, Screen};
     use crate::shared_slice::SharedSlice;
 
     #[test]

@@ -7,10 +7,10 @@
 
 mod offer;
 mod routes;
-mod sending;
+pub(crate) mod sending;
 #[cfg(test)]
 mod tests;
-mod updates;
+pub(crate) mod updates;
 
 use std::fmt;
 use std::sync::{Arc, Mutex};
@@ -21,23 +21,31 @@ use rayfold_pipeline::store::Store;
 use crate::project::Project;
 
 /// A bucket for the page, or none.
-pub struct Cloud(Box<dyn FnOnce(Arc<Mutex<Project>>) -> Router + Send>);
+pub struct Cloud {
+    routes: Box<dyn FnOnce(Arc<Mutex<Project>>) -> Router + Send>,
+    has_bucket: bool,
+}
 
 impl Cloud {
     /// Makes a page without bucket, which explains how to name one.
     pub fn none() -> Self {
-        Self(Box::new(|_| routes::without_bucket()))
+        Self { routes: Box::new(|_| routes::without_bucket()), has_bucket: false }
     }
 
     /// Makes a page with the bucket of this name in this store.
     pub fn new(name: impl Into<String>, store: impl Store + 'static) -> Self {
         let name = name.into();
-        Self(Box::new(move |project| routes::with_bucket(name, store, project)))
+        Self { routes: Box::new(move |project| routes::with_bucket(name, store, project)), has_bucket: true }
+    }
+
+    /// Returns whether there is a bucket to submit to.
+    pub(crate) fn has_bucket(&self) -> bool {
+        self.has_bucket
     }
 
     /// Returns the routes that answer the page.
     pub(crate) fn router(self, project: Arc<Mutex<Project>>) -> Router {
-        (self.0)(project)
+        (self.routes)(project)
     }
 }
 

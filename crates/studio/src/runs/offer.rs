@@ -166,7 +166,7 @@ impl Ready {
         let drawn = f64::from(drawn.max(1));
         let drawing_ms = 1e3 * seconds / drawn;
         let mut work = Workload::new(self.frames, self.size, 0.0);
-        work.ms = render_ms(self.frames, drawing_ms, work.memory_mb);
+        work.ms = render_ms(self.frames, None, drawing_ms, work.memory_mb);
         work.frame_kb = bytes as f64 / drawn / 1e3;
         Ok(Estimate {
             frames: self.frames,

@@ -15,8 +15,9 @@ const KNOWN: usize = 64;
 
 /// The progress of an upload.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "is")]
-pub(super) enum UploadProgress {
+pub(crate) enum UploadProgress {
     /// The upload is running.
     Uploading {
         /// The number of uploaded scripts.

@@ -15,90 +15,101 @@ const FAULTS: usize = 100;
 
 /// A run in a list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Summary {
+pub(crate) struct Summary {
     /// The name of the run, which is its address.
-    pub(super) run: String,
+    pub(crate) run: String,
     /// A word: the status of the manifest, or the reason why there is none.
-    pub(super) status: String,
+    pub(crate) status: String,
     /// The number of rendered frames.
-    pub(super) done: u64,
+    pub(crate) done: u64,
     /// The number of frames that failed.
-    pub(super) failed: u64,
+    pub(crate) failed: u64,
     /// The number of all frames.
-    pub(super) total: u64,
+    pub(crate) total: u64,
     /// There are scripts that the functions have not seen.
-    pub(super) behind: bool,
+    pub(crate) behind: bool,
     /// Nothing more will happen unless a script changes.
-    pub(super) settled: bool,
+    pub(crate) settled: bool,
     /// The existing GIF, if there is one.
-    pub(super) gif: Option<GifInfo>,
+    pub(crate) gif: Option<GifInfo>,
 }
 
 /// A GIF in the bucket.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct GifInfo {
+pub(crate) struct GifInfo {
     /// The size of the file.
-    pub(super) bytes: u64,
+    pub(crate) bytes: u64,
     /// The version, so that another GIF has another address.
-    pub(super) version: String,
+    pub(crate) version: String,
     /// The GIF shows the newest scripts.
-    pub(super) current: bool,
+    pub(crate) current: bool,
 }
 
 /// An update of a run. Contains only the frames that changed since the last update.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct RunUpdate {
+pub(crate) struct RunUpdate {
     #[serde(flatten)]
-    pub(super) state: RunState,
+    pub(crate) state: RunState,
     /// All frames, in the first update.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) frames: Option<Vec<FrameUpdate>>,
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) frames: Option<Vec<FrameUpdate>>,
     /// The changed frames with their indices from 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) changed: Vec<(usize, FrameUpdate)>,
+    #[cfg_attr(test, ts(as = "Option<_>", optional))]
+    pub(crate) changed: Vec<(usize, FrameUpdate)>,
 }
 
 /// The state of a run without its frames.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct RunState {
+pub(crate) struct RunState {
     #[serde(flatten)]
-    pub(super) summary: Summary,
+    pub(crate) summary: Summary,
     /// The errors that keep it from being done.
-    pub(super) faults: Vec<FaultInfo>,
+    pub(crate) faults: Vec<FaultInfo>,
     /// The number of errors that are not listed.
-    pub(super) more_faults: usize,
+    pub(crate) more_faults: usize,
     /// The progress of the upload, if this program uploads it.
-    pub(super) sending: Option<UploadProgress>,
+    pub(crate) sending: Option<UploadProgress>,
     /// The reason why nothing newer is known.
-    pub(super) problem: Option<String>,
+    pub(crate) problem: Option<String>,
 }
 
 /// The state of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FrameUpdate {
+pub(crate) struct FrameUpdate {
     /// The name of its script.
-    pub(super) script: ScriptName,
+    #[cfg_attr(test, ts(as = "String"))]
+    pub(crate) script: ScriptName,
     /// The version of the script.
-    pub(super) version: String,
+    pub(crate) version: String,
     /// The number of the frame within the script.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) part: Part,
+    #[cfg_attr(test, ts(as = "Option<u32>", optional))]
+    pub(crate) part: Part,
     /// The status of the frame.
-    pub(super) state: FrameStatus,
+    pub(crate) state: FrameStatus,
     /// The pixel version of the renderer, if the frame is rendered.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) pixels: Option<u32>,
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) pixels: Option<u32>,
 }
 
 /// The status of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum FrameStatus {
+pub(crate) enum FrameStatus {
     /// The frame is awaited.
     Pending,
     /// The frame is rendered.
@@ -109,27 +120,31 @@ pub(super) enum FrameStatus {
 
 /// An error that keeps a run from being done.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(super) struct FaultInfo {
+pub(crate) struct FaultInfo {
     /// The faulty object, for messages.
-    pub(super) what: String,
+    pub(crate) what: String,
     /// The script, if the object is a frame.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) script: Option<ScriptName>,
+    #[cfg_attr(test, ts(as = "Option<String>", optional))]
+    pub(crate) script: Option<ScriptName>,
     /// The number of the frame within the script.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) part: Part,
+    #[cfg_attr(test, ts(as = "Option<u32>", optional))]
+    pub(crate) part: Part,
     /// Line and column from 1, if a line has an error.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) place: Option<(usize, usize)>,
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) place: Option<(usize, usize)>,
     /// The description of the problem.
-    pub(super) message: String,
+    pub(crate) message: String,
     /// The correction that would help.
-    pub(super) help: String,
+    pub(crate) help: String,
 }
 
 /// Returns the summary of a run as of the last poll.
-pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
+pub(crate) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
     let gif = watch.gif().map(|gif| GifInfo {
         bytes: gif.size,
         version: gif.etag.to_string(),
@@ -156,7 +171,7 @@ pub(super) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
 }
 
 /// Returns the listed errors that keep a run from being done, and the number of the others.
-pub(super) fn faults(manifest: &Manifest) -> (Vec<FaultInfo>, usize) {
+pub(crate) fn faults(manifest: &Manifest) -> (Vec<FaultInfo>, usize) {
     let mut all: Vec<FaultInfo> = manifest
         .head
         .rejected
@@ -216,7 +231,7 @@ impl FaultInfo {
 }
 
 impl FrameUpdate {
-    pub(super) fn of(frame: &Frame) -> Self {
+    pub(crate) fn of(frame: &Frame) -> Self {
         let (state, pixels) = match frame.state {
             FrameState::Pending => (FrameStatus::Pending, None),
             FrameState::Done { pixels } => (FrameStatus::Done, Some(pixels)),
@@ -229,7 +244,7 @@ impl FrameUpdate {
 
 impl RunUpdate {
     /// Returns the changes since the last update, or `None` if there are none.
-    pub(super) fn since(
+    pub(crate) fn since(
         last: &mut Option<(RunState, Vec<FrameUpdate>)>,
         state: RunState,
         frames: Vec<FrameUpdate>,

@@ -7,10 +7,15 @@ use super::Session;
 use crate::document::Splice;
 use crate::edits;
 use crate::groups;
+use crate::materials;
+use crate::names;
 use crate::project::Project;
 use crate::protocol::ServerMessage;
 use crate::tables::{Role, role};
 use crate::view::Projection;
+
+/// The number of frames of a new animation.
+const FRAMES: u32 = 50;
 
 impl Session {
     /// Changes the shown file, as one step.
@@ -32,6 +37,7 @@ impl Session {
         // Several splices are one step even without a gesture.
         let gesture = gesture.unwrap_or_else(|| self.next_gesture());
         let done = project.files[file].apply(splices, Some(gesture));
+        self.keep_file(project);
         self.send_splices(done, tell);
     }
 
@@ -48,15 +54,27 @@ impl Session {
         at: Option<DVec2>,
         tell: &mut ServerMessage,
     ) {
+        let (name, subject) = name.split_once(' ').unwrap_or((name, ""));
         let Some(command) = Command::from_name(name) else { return };
         match role(command) {
             Role::Object | Role::Light => {}
+            Role::Use if names::is_name(subject) => {}
             Role::Camera => {
                 self.aim(project, at);
-                self.keep_camera(project, tell);
+                self.keep_camera(project, None, tell);
                 return;
             }
-            Role::Use | Role::Group | Role::Material | Role::Setting => return,
+            Role::Setting if !command.form().fields.is_empty() => {
+                self.add_setting(project, command, tell);
+                return;
+            }
+            Role::Material => {
+                let (splices, place) = materials::new(self.file_lines(project), &self.selection);
+                self.edit(project, splices, None, tell);
+                self.select(project, vec![place]);
+                return;
+            }
+            Role::Use | Role::Group | Role::Setting => return,
         }
         let shown = self.shown(project);
         let source_map = &shown.source_map;
@@ -64,31 +82,59 @@ impl Session {
         if let Some(scene) = self.scene(project) {
             let projection = Projection::new(&scene);
             let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+            let dropped = at.is_some();
             let at = at.unwrap_or(DVec2::new(0.5 * width, 0.6 * height));
             let bounds = self.bounds(project);
             let (origin, direction) = projection.ray(at);
             let below = bounds.low.y.min(0.0);
             let distance = (below - origin.y) / direction.y;
             let hit = self.pick(project, at.x, at.y).map(|(_, point)| point);
+            let is_endless = command == Command::Plane;
             let on_ground = || {
                 let near =
                     distance > 0.0 && distance < 20.0 * bounds.radius() + origin.distance(bounds.center());
                 near.then_some(origin + distance * direction)
             };
+            let hit = hit.filter(|_| dropped);
             ground = hit.or_else(on_ground).unwrap_or(bounds.center());
             size = projection.pixel_at(ground) * height * 0.07;
             let step = 10f64.powi(size.log10().floor() as i32);
             size = (size / step).round() * step;
+            if is_endless {
+                ground = DVec3::ZERO;
+            } else if !dropped {
+                ground = edits::free_place(&scene.objects, ground, size);
+            }
         }
         if !(size.is_normal() && ground.is_finite()) {
             (ground, size) = (DVec3::ZERO, 1.0);
         }
         let count = source_map.objects.len() + source_map.lights.len();
-        let line = edits::new_line(command, ground, size, count);
+        let line = if command == Command::Use {
+            groups::use_line(subject, ground)
+        } else {
+            edits::new_line(command, ground, size, count)
+        };
         let (splices, place) = edits::add(self.file_lines(project), source_map, line);
         self.edit(project, splices, None, tell);
         self.select(project, vec![place]);
         self.outline(project, tell);
+    }
+
+    /// Adds the line of a setting, unless the frame has one.
+    fn add_setting(&mut self, project: &mut Project, command: Command, tell: &mut ServerMessage) {
+        let shown = self.shown(project);
+        let source_map = &shown.source_map;
+        let splices = match command {
+            _ if source_map.setting(command).is_some() => return,
+            Command::Frames => edits::set_frames(self.file_lines(project), source_map, FRAMES),
+            _ => vec![Splice {
+                at: source_map.start(),
+                removed: 0,
+                inserted: vec![edits::new_setting(command)],
+            }],
+        };
+        self.edit(project, splices, None, tell);
     }
 
     /// Makes a group of lines and selects it.

@@ -26,10 +26,10 @@ impl HeldKeys {
         Self { numbers, lines, keys, gesture }
     }
 
-    /// Returns the changes of the lines if the keys are moved by this many frames.
-    pub(super) fn moved(&self, by: f64) -> Vec<Splice> {
+    /// Returns the changes of the lines if the keys are moved by this many frames and by this value.
+    pub(super) fn moved(&self, by: f64, value: f64) -> Vec<Splice> {
         let mut lines = self.lines.clone();
-        for (at, line) in tracks::moved(&self.lines, &self.keys, by) {
+        for (at, line) in tracks::moved(&self.lines, &self.keys, by, value) {
             lines[at] = line;
         }
         self.numbers.iter().zip(lines).map(|(&at, line)| edits::set(at, line)).collect()

@@ -8,15 +8,19 @@ use crate::edits;
 use crate::handles::{Drag, DragOptions, HandleKind};
 use crate::project::Project;
 use crate::protocol::{Navigation, ServerMessage};
+use crate::values::Keying;
 use crate::view::Projection;
+
+/// The pixels by which the pointer moves in a click.
+const CLICK: f64 = 4.0;
 
 /// The object that the pointer holds.
 #[derive(Debug)]
 pub(super) enum Held {
     /// Lines, with the point where the drag started.
     Drag(Drag, DVec2),
-    /// The free camera, with the last position of the pointer.
-    Turn(DVec2),
+    /// The free camera, with the last position of the pointer, and the selection if this is a click.
+    Turn(DVec2, Option<Vec<usize>>),
     /// Keys of the timeline.
     Keys(HeldKeys),
 }
@@ -39,11 +43,15 @@ impl Session {
                 (grip, None)
             }
             None => {
-                let Some((line, point)) = self.pick(project, at.x, at.y) else {
-                    if !extend {
-                        self.selection.clear();
-                    }
-                    self.held = Some(Held::Turn(at));
+                let picked = self.pick(project, at.x, at.y);
+                let Some((line, point)) = picked.filter(|&(line, _)| !self.is_endless(project, line)) else {
+                    // The background and a floor turn the view. A click selects.
+                    let clicked = match picked {
+                        Some((line, _)) if extend => Some([&self.selection[..], &[line]].concat()),
+                        Some((line, _)) => Some(vec![line]),
+                        None => (!extend).then(Vec::new),
+                    };
+                    self.held = Some(Held::Turn(at, clicked));
                     return;
                 };
                 let mut selection = if extend || self.selection.contains(&line) {
@@ -63,8 +71,17 @@ impl Session {
         let lines =
             lines.filter(|&line| !shown.source_map.is_in_group(line) && !self.is_locked(project, line));
         let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
-        let keying = self.keying(project);
+        let keying = match (grip, self.keying(project)) {
+            (HandleKind::Key { frame }, keying) => Keying { time: frame.into(), auto: true, ..keying },
+            (_, keying) => keying,
+        };
         self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));
+    }
+
+    pub(super) fn release(&mut self, project: &Project) {
+        if let Some(Held::Turn(_, Some(clicked))) = self.held.take() {
+            self.select(project, clicked);
+        }
     }
 
     pub(super) fn drag(
@@ -77,7 +94,11 @@ impl Session {
         let Some(scene) = self.scene(project) else { return Change::Nothing };
         match &mut self.held {
             None | Some(Held::Keys(_)) => Change::Nothing,
-            Some(Held::Turn(last)) => {
+            Some(Held::Turn(last, clicked)) => {
+                if clicked.is_some() && at.distance(*last) < CLICK {
+                    return Change::Nothing;
+                }
+                *clicked = None;
                 let moved = (at - *last) / f64::from(scene.screen.height());
                 *last = at;
                 self.navigate(project, Navigation::Turn, moved);

@@ -29,12 +29,14 @@ impl Session {
         match new {
             None => {
                 let splices = project.files[file].replace(&text);
+                self.keep_file(project);
                 self.send_splices(splices, tell);
                 self.select(project, Vec::new());
             }
             Some(name) => match project.create(name, &text) {
                 Ok(file) => {
                     self.selection.clear();
+                    (0..project.files.len()).for_each(|file| self.text_changed(file));
                     // Other files have other indices now, so the whole state is sent again.
                     self.shown_file = usize::MAX;
                     let first = project.first_frame(file);

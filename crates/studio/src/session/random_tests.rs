@@ -7,6 +7,7 @@ use super::tests::Desk;
 use super::*;
 use crate::handles::DragOptions;
 use crate::protocol::{LineState, Navigation, Source, Switch, TimelineEdit, ViewPreset};
+use crate::text_edit::TextChange;
 use crate::tracks::KeyPlace;
 
 /// Lines of all kinds, with both line ends, a byte-order mark, and no end of the last line.
@@ -62,7 +63,7 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
         (at(), prop::collection::vec(0..8usize, 0..3))
             .prop_map(|(line, numbers)| TimelineEdit::Toggle { line, numbers }),
         keys().prop_map(|keys| TimelineEdit::Grab { keys }),
-        number().prop_map(|by| TimelineEdit::Move { by }),
+        (number(), number()).prop_map(|(by, value)| TimelineEdit::Move { by, value }),
         keys().prop_map(|keys| TimelineEdit::Remove { keys }),
         keys().prop_map(|keys| TimelineEdit::Copy { keys }),
         Just(TimelineEdit::Paste),
@@ -74,9 +75,10 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
     let changes = prop_oneof![
         (at(), 0..12usize, prop::collection::vec(number(), 0..4), prop::option::of(0..3u64))
             .prop_map(|(line, first, values, gesture)| ClientMessage::Set { line, first, values, gesture }),
-        (at(), prop::collection::vec(line(), 1..3))
-            .prop_map(|(line, text)| ClientMessage::Text { line, text: text.join("\n") }),
-        (at(), line()).prop_map(|(at, text)| ClientMessage::Insert { at, text }),
+        // The version is set when it is sent.
+        (at(), 1..3usize, prop::collection::vec(line(), 1..3)).prop_map(|(at, removed, lines)| {
+            ClientMessage::Edit { file: 0, version: 0, changes: vec![TextChange { at, removed, lines }] }
+        }),
         lines().prop_map(|lines| ClientMessage::Remove { lines }),
         lines().prop_map(|lines| ClientMessage::Duplicate { lines }),
         (at(), any::<bool>()).prop_map(|(line, down)| ClientMessage::Reorder { line, down }),
@@ -144,7 +146,10 @@ fn ten_thousand_wishes_and_undos_end_in_the_same_bytes() {
             let mut page: Vec<LineState> = desk.session.lines(&desk.project);
             desk.ask(ClientMessage::Size { width: 48, height: 27 });
             let mut changes = 0;
-            for wish in wishes {
+            for mut wish in wishes {
+                if let ClientMessage::Edit { version, .. } = &mut wish {
+                    *version = desk.session.text_state(&desk.project).version;
+                }
                 let before = desk.text();
                 let shown = format!("{wish:?}");
                 let tell = desk.ask(wish).tell;

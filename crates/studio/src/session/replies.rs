@@ -1,9 +1,9 @@
 //! The replies to the page: the state, and the changed lines.
 
-use rayfold_scene::{Command, Scene};
+use rayfold_scene::{Code, Command, Scene};
 
 use super::hold::Held;
-use super::viewport::grid_path;
+use super::viewport::{frustum_path, grid_path};
 use super::{Answer, Change, Session};
 use crate::document::Splice;
 use crate::edits;
@@ -51,6 +51,9 @@ impl Session {
             // The outline of the object under the pointer may have changed.
             self.hovered = None;
         }
+        if tell.lines.is_some() || !tell.splices.is_empty() {
+            tell.text = Some(self.text_state(project));
+        }
         tell.tracks = self.new_tracks(project);
         tell.state = Some(self.state(project, scene.as_ref()));
         Answer { tell, picture, shown: false, output: None }
@@ -61,25 +64,36 @@ impl Session {
         let file = &project.files[place.file];
         let lines = file.document.lines();
         let mut shown = Vec::new();
-        let mut grid = String::new();
+        let (mut grid, mut frustum) = (String::new(), String::new());
+        let mut axes = [[0.0; 2]; 3];
         let (mut way, mut marks) = (String::new(), String::new());
         let now = self.shown(project);
         if let Some(scene) = scene {
             let projection = Projection::new(scene);
             let around = self.around(project);
-            if !matches!(self.held, Some(Held::Turn(_)))
+            if !matches!(self.held, Some(Held::Turn(..)))
                 && let Some(&line) = self.selection.last()
                 && let Some(values) = lines.get(line).and_then(|text| Values::of(text, now.time))
                 && !now.source_map.is_in_group(line)
                 && !self.is_locked(project, line)
             {
-                shown = handles(line, &values, &projection, around);
+                let size = self.drawn_size(project, line);
+                shown = handles(line, &values, &projection, around, size);
             }
-            (way, marks) = self.motion_path(project, &projection, &now.source_map);
+            let (right, up, _) = projection.axes();
+            axes = [0, 1, 2].map(|axis| [right[axis], -up[axis]]);
+            let keys;
+            (way, marks, keys) = self.motion_path(project, &projection, &now.source_map);
+            shown.extend(keys.into_iter().filter(|handle| !self.is_locked(project, handle.line)));
             if self.free.is_some() {
-                grid = grid_path(&projection, self.bounds(project));
+                let bounds = self.bounds(project);
+                grid = grid_path(&projection, bounds);
+                frustum =
+                    now.scene.as_ref().map_or_else(String::new, |of| frustum_path(&projection, of, bounds));
             }
         }
+        let settings = Command::ALL.iter().filter_map(|&command| now.source_map.setting(command));
+        let settings = settings.filter_map(|line| self.inspected(project, line)).collect();
         let inspected = self.selection.last().and_then(|&line| self.inspected(project, line));
         let faults = file
             .diagnostics
@@ -89,6 +103,7 @@ impl Session {
                 column: fault.column - 1,
                 length: fault.excerpt.text.get(fault.excerpt.marked.clone()).map_or(0, |t| t.chars().count()),
                 error: fault.is_error(),
+                needs_samples: fault.code == Code::NeedsSamples,
                 message: fault.message.clone(),
                 help: fault.help.clone().or_else(|| fault.expected.clone()).unwrap_or_default(),
             })
@@ -106,6 +121,10 @@ impl Session {
             can_redo: file.document.can_redo(),
             selection: self.selection.clone(),
             inspected,
+            settings,
+            axes,
+            camera: now.source_map.camera,
+            frustum,
             faults,
             handles: shown,
             grid,
@@ -122,16 +141,32 @@ impl Session {
         self.file_lines(project).iter().map(line_state).collect()
     }
 
-    /// Adds changes of lines to the reply. Moves the selection, the locks and the copied keys along with their lines.
+    /// Adds changes of the shown lines to the reply, which the page's editor has not made.
     pub(super) fn send_splices(&mut self, splices: Vec<Splice>, tell: &mut ServerMessage) {
-        let file = self.shown_file;
+        if !splices.is_empty() {
+            self.text_changed(self.shown_file);
+        }
+        self.follow(self.shown_file, splices, tell);
+    }
+
+    /// Moves the selection, the locks and the copied keys along with their lines. Adds the changes to the reply if the
+    /// file is shown.
+    pub(super) fn follow(&mut self, file: usize, splices: Vec<Splice>, tell: &mut ServerMessage) {
+        let is_shown = file == self.shown_file;
         if splices.iter().any(|splice| splice.removed != splice.inserted.len())
-            && !matches!(self.held, Some(Held::Turn(_)))
+            && !matches!(self.held, Some(Held::Turn(..)))
         {
             // The held object may have another line now.
             self.held = None;
         }
         for splice in &splices {
+            if !is_shown {
+                self.locked.retain_mut(|(of, line)| {
+                    let moved = if *of == file { after(splice, *line) } else { Some(*line) };
+                    moved.map(|moved| *line = moved).is_some()
+                });
+                continue;
+            }
             self.selection = self.selection.iter().filter_map(|&line| after(splice, line)).collect();
             let locked = self
                 .locked
@@ -145,6 +180,9 @@ impl Session {
                 }
                 None => false,
             });
+        }
+        if !is_shown {
+            return;
         }
         tell.splices.extend(splices.into_iter().map(|splice| LinesChanged {
             at: splice.at,

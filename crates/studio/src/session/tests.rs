@@ -7,6 +7,7 @@ use super::viewport::PIXELS;
 use super::*;
 use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::protocol::{Source, State};
+use crate::text_edit::TextChange;
 use crate::view::Projection;
 
 /// A page and its open script.
@@ -30,6 +31,13 @@ impl Desk {
 
     pub(super) fn ask(&mut self, ask: ClientMessage) -> Answer {
         self.session.ask(&mut self.project, ask)
+    }
+
+    /// Replaces lines as the page's editor does.
+    pub(super) fn edit(&mut self, at: usize, removed: usize, text: &str) -> Answer {
+        let version = self.session.text_state(&self.project).version;
+        let lines = text.split('\n').map(str::to_owned).collect();
+        self.ask(ClientMessage::Edit { file: 0, version, changes: vec![TextChange { at, removed, lines }] })
     }
 
     pub(super) fn text(&self) -> String {
@@ -104,10 +112,7 @@ fn an_outline_is_that_of_the_picture_also_in_another_size_and_with_other_numbers
     let done = ClientMessage::Set { line: 4, first: 0, values: vec![], gesture: None };
     let thinner = desk.ask(done).tell.outline.unwrap();
     assert!(thinner.starts_with('M') && thinner != large);
-    assert_ne!(
-        desk.ask(ClientMessage::Text { line: 4, text: "Sphere 2 0 1 0 0 0 0 1 1 1".into() }).tell.outline,
-        Some(thinner)
-    );
+    assert_ne!(desk.edit(4, 1, "Sphere 2 0 1 0 0 0 0 1 1 1").tell.outline, Some(thinner));
 }
 
 #[test]
@@ -178,7 +183,7 @@ fn five_objects_from_an_empty_page() {
 #[test]
 fn a_script_with_an_error_keeps_its_last_picture_and_tells_the_place() {
     let mut desk = Desk::new(TEXT);
-    let answer = desk.ask(ClientMessage::Text { line: 4, text: "Spere 1".into() });
+    let answer = desk.edit(4, 1, "Spere 1");
     assert!(answer.picture.is_some());
     let state = answer.tell.state.unwrap();
     assert_eq!((state.faults[0].line, state.faults[0].column, state.faults[0].length), (4, 0, 5));
@@ -191,11 +196,72 @@ fn a_script_with_an_error_keeps_its_last_picture_and_tells_the_place() {
 fn what_is_typed_in_a_line_is_one_step() {
     let mut desk = Desk::new(TEXT);
     for text in ["T", "Tr", "# Trace"] {
-        desk.ask(ClientMessage::Text { line: 6, text: text.into() });
+        desk.edit(6, 1, text);
         desk.ask(ClientMessage::Hover { x: 1.0, y: 1.0 });
     }
     desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), TEXT);
+}
+
+#[test]
+fn a_change_of_a_text_that_has_changed_meanwhile_is_refused() {
+    let mut desk = Desk::new(TEXT);
+    let edit = |version| {
+        let changes = vec![TextChange { at: 0, removed: 1, lines: vec!["# one".into(), "# two".into()] }];
+        ClientMessage::Edit { file: 0, version, changes }
+    };
+    let old = desk.session.text_state(&desk.project).version;
+    // Its own changes do not change the version, so it need not wait for replies.
+    for _ in 0..2 {
+        let tell = desk.ask(edit(old)).tell;
+        assert_eq!((tell.accepted, tell.text.unwrap().version), (Some(true), old));
+    }
+    let text = desk.text();
+    let tell = desk.ask(ClientMessage::Remove { lines: vec![6] }).tell;
+    assert!(tell.accepted.is_none() && tell.text.unwrap().version != old);
+    let tell = desk.ask(edit(old)).tell;
+    assert!(tell.accepted == Some(false) && tell.splices.is_empty());
+    desk.ask(ClientMessage::Undo);
+    assert_eq!(desk.text(), text);
+    // A change of lines that are not there brings the text that is there.
+    let version = desk.session.text_state(&desk.project).version;
+    let changes = vec![TextChange { at: 99, removed: 1, lines: vec!["x".into()] }];
+    let tell = desk.ask(ClientMessage::Edit { file: 0, version, changes }).tell;
+    assert!(tell.accepted == Some(false) && tell.lines.is_some() && desk.text() == text);
+}
+
+#[test]
+fn a_change_of_a_script_that_is_no_longer_shown_reaches_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.txt", "b.txt"] {
+        fs::write(folder.path().join(name), TEXT).unwrap();
+    }
+    let mut project = Project::open(folder.path()).unwrap();
+    let (mut session, first) = Session::open(&project);
+    let version = first.tell.text.unwrap().version;
+    session.ask(&mut project, ClientMessage::Frame { frame: 1, moving: true });
+    let changes = vec![TextChange { at: 0, removed: 1, lines: vec!["# a".into()] }];
+    let tell = session.ask(&mut project, ClientMessage::Edit { file: 0, version, changes }).tell;
+    assert!(tell.accepted == Some(true) && tell.splices.is_empty());
+    project.save(true);
+    assert!(fs::read_to_string(folder.path().join("a.txt")).unwrap().starts_with("# a\r\n"));
+    assert_eq!(fs::read_to_string(folder.path().join("b.txt")).unwrap(), TEXT);
+}
+
+#[test]
+fn a_script_that_loses_its_frames_stays_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.txt", "b.txt"] {
+        fs::write(folder.path().join(name), "Screen 4 3\nFrames 5\nTrace\n").unwrap();
+    }
+    let mut project = Project::open(folder.path()).unwrap();
+    let (mut session, first) = Session::open(&project);
+    let version = first.tell.text.unwrap().version;
+    session.ask(&mut project, ClientMessage::Frame { frame: 4, moving: false });
+    let changes = vec![TextChange { at: 1, removed: 1, lines: vec!["Frames 2".into()] }];
+    let tell = session.ask(&mut project, ClientMessage::Edit { file: 0, version, changes }).tell;
+    let state = tell.state.unwrap();
+    assert_eq!((state.file, state.frame, tell.lines), (0, 1, None));
 }
 
 #[test]
@@ -211,7 +277,7 @@ fn a_parameter_that_was_left_out_comes_whole() {
 fn the_selection_stays_with_its_lines() {
     let mut desk = Desk::new(TEXT);
     desk.ask(ClientMessage::Select { lines: vec![4, 5] });
-    desk.ask(ClientMessage::Insert { at: 0, text: "# one\n# two".into() });
+    desk.edit(0, 1, &format!("# one\n# two\n{}", desk.text().lines().next().unwrap()));
     assert_eq!(desk.state().selection, [6, 7]);
     desk.ask(ClientMessage::Remove { lines: vec![6] });
     desk.ask(ClientMessage::Undo);
@@ -323,7 +389,12 @@ fn a_copy_under_a_new_name_is_shown_and_the_old_one_stays() {
     assert_eq!(answer.tell.lines.unwrap().len(), TEXT.split('\n').count(), "the reply has its lines");
     assert_eq!(answer.tell.files.unwrap().len(), 3);
     assert_eq!(fs::read_to_string(folder.path().join("b.txt")).unwrap(), TEXT);
-    session.ask(&mut project, ClientMessage::Text { line: 0, text: "# b".into() });
+    let version = answer.tell.text.unwrap().version;
+    let edit = |file, version| {
+        let changes = vec![TextChange { at: 0, removed: 1, lines: vec!["# b".into()] }];
+        ClientMessage::Edit { file, version, changes }
+    };
+    assert_eq!(session.ask(&mut project, edit(1, version)).tell.accepted, Some(true));
     project.save(true);
     assert_eq!(fs::read_to_string(folder.path().join("c.txt")).unwrap(), TEXT);
     assert!(fs::read_to_string(folder.path().join("b.txt")).unwrap().starts_with("# b\r\n"));

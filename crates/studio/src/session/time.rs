@@ -11,7 +11,9 @@ use super::{Change, Session};
 use crate::edits;
 use crate::error::words;
 use crate::frame::Frame;
+use crate::handles::{Handle, HandleKind};
 use crate::line::Line;
+use crate::materials;
 use crate::project::Project;
 use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, TimelineEdit};
 use crate::silhouette::View;
@@ -89,12 +91,12 @@ impl Session {
                 self.held = Some(Held::Keys(HeldKeys::new(self.file_lines(project), &keys, gesture)));
                 return Change::Nothing;
             }
-            TimelineEdit::Move { by } => {
+            TimelineEdit::Move { by, value } => {
                 let Some(Held::Keys(held)) = &self.held else { return Change::Nothing };
-                if !by.is_finite() {
+                if !(by.is_finite() && value.is_finite()) {
                     return Change::Nothing;
                 }
-                let (splices, gesture) = (held.moved(by.round()), held.gesture);
+                let (splices, gesture) = (held.moved(by.round(), value), held.gesture);
                 self.edit(project, splices, Some(gesture), tell);
                 tell.outline = Some(String::new());
                 return Change::Moving;
@@ -165,22 +167,33 @@ impl Session {
             .collect();
         let has_key = |curve: &rayfold_scene::Curve| curve.key_at(time).is_some();
         let keyed = curves.iter().filter(|(_, curve)| has_key(curve)).map(|(number, _)| *number).collect();
+        let curves: Vec<_> = curves.into_iter().map(|(number, _)| number).collect();
         let form = values.command.form();
         let is_named = |at: usize| {
             words.parameters.len() == at + 1 && values.written().get(at).copied().flatten().is_none()
         };
-        let surface =
-            form.surface().filter(|&at| is_named(at) && !curves.iter().any(|(number, _)| *number == at));
+        let surface = form.surface().filter(|&at| is_named(at) && !curves.contains(&at));
         Some(Inspected {
             line: at,
             command: values.command.name(),
             values: values.written().to_vec(),
             keyed,
-            curves: curves.into_iter().map(|(number, _)| number).collect(),
             can_key: form.curves,
             material: surface.map(|at| line.word(&words.parameters[at]).to_owned()),
             subject: line.subject().unwrap_or_default().to_owned(),
-            fields: if values.command == Command::Material { clause_fields(line) } else { Vec::new() },
+            fields: if values.command == Command::Material {
+                clause_fields(line, &materials::plain_names(self.file_lines(project), at))
+            } else {
+                Vec::new()
+            },
+            words: words
+                .parameters
+                .iter()
+                .enumerate()
+                .filter(|(number, word)| line.number(word).is_none() && !curves.contains(number))
+                .map(|(number, word)| (number, line.word(word).to_owned()))
+                .collect(),
+            curves,
         })
     }
 
@@ -190,8 +203,8 @@ impl Session {
         project: &Project,
         projection: &Projection,
         source_map: &SourceMap,
-    ) -> (String, String) {
-        let nothing = (String::new(), String::new());
+    ) -> (String, String, Vec<Handle>) {
+        let nothing = (String::new(), String::new(), Vec::new());
         let Some(&at) = self.selection.last().filter(|line| self.path && !source_map.is_in_group(**line))
         else {
             return nothing;
@@ -226,10 +239,19 @@ impl Session {
             of_line.tracks.iter().flat_map(|track| &track.keys).map(|key| key.0).collect();
         frames.sort_by(f64::total_cmp);
         frames.dedup();
-        for at in frames.into_iter().take(PLACES).filter_map(|frame| projection.point(place(frame)?)) {
-            let _ = write!(marks, "M{:.1} {:.1}h0", at.x, at.y);
+        let mut handles = Vec::new();
+        for frame in frames.into_iter().take(PLACES) {
+            let Some(seen) = place(frame).and_then(|place| projection.point(place)) else { continue };
+            let _ = write!(marks, "M{:.1} {:.1}h0", seen.x, seen.y);
+            // The object itself is at the shown frame.
+            if frame.fract() == 0.0 && frame != self.time(project) {
+                let (grip, label) =
+                    (HandleKind::Key { frame: frame as u32 }, format!("place at frame {frame}"));
+                let (seen, way) = (seen.into(), String::new());
+                handles.push(Handle { grip, line: at, label, at: seen, from: seen, way });
+            }
         }
-        (way, marks)
+        (way, marks, handles)
     }
 
     /// Returns outlines of the selection at other frames, in the current view.
@@ -266,11 +288,16 @@ impl Session {
 }
 
 /// Returns the parameters of a material's clauses, in the order of its line.
-fn clause_fields(line: &Line) -> Vec<FieldTable> {
+fn clause_fields(line: &Line, others: &[String]) -> Vec<FieldTable> {
     let mut fields: Vec<FieldTable> = Vec::new();
     for slot in tracks::slots(line) {
         if fields.last().is_none_or(|last| last.first != slot.first) {
             fields.push(FieldTable::new(slot.first, slot.field));
+        }
+    }
+    for (clause, span) in materials::clauses(line) {
+        if clause.form().ends_with.is_some() {
+            fields.push(FieldTable::of_material(span.end - 1, others.to_vec()));
         }
     }
     fields

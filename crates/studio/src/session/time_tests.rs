@@ -85,11 +85,11 @@ fn a_key_by_button_then_a_drag_elsewhere_moves_it_there() {
 fn keys_are_dragged_as_one_step_and_back_is_as_before() {
     let mut desk = small();
     let start = TEXT.replace("1.0  0 1 0", "1.0  (1:0 9:2.50 20:1) 1 0");
-    desk.ask(ClientMessage::Text { line: BALL, text: start.split('\n').nth(BALL).unwrap().into() });
+    desk.edit(BALL, 1, start.split('\n').nth(BALL).unwrap());
     let held = vec![key(BALL, 1, 9.0), key(BALL, 1, 20.0)];
     time(&mut desk, TimelineEdit::Grab { keys: held.clone() });
     for by in [1.0, 30.0, 11.0, -4.0] {
-        let answer = time(&mut desk, TimelineEdit::Move { by });
+        let answer = time(&mut desk, TimelineEdit::Move { by, value: 0.0 });
         assert!(answer.picture.is_some_and(|picture| picture.moving));
     }
     desk.ask(ClientMessage::Release);
@@ -98,8 +98,8 @@ fn keys_are_dragged_as_one_step_and_back_is_as_before() {
     desk.ask(ClientMessage::Undo);
     assert_eq!(desk.text(), start);
     time(&mut desk, TimelineEdit::Grab { keys: held });
-    time(&mut desk, TimelineEdit::Move { by: 3.0 });
-    time(&mut desk, TimelineEdit::Move { by: 0.0 });
+    time(&mut desk, TimelineEdit::Move { by: 3.0, value: 0.0 });
+    time(&mut desk, TimelineEdit::Move { by: 0.0, value: 0.0 });
     desk.ask(ClientMessage::Release);
     assert_eq!(desk.text(), start);
 }
@@ -108,7 +108,7 @@ fn keys_are_dragged_as_one_step_and_back_is_as_before() {
 fn copied_keys_stay_with_their_lines() {
     let mut desk = small();
     time(&mut desk, TimelineEdit::Copy { keys: vec![key(4, 3, 50.0)] });
-    desk.ask(ClientMessage::Insert { at: 0, text: "# one\n# two".into() });
+    desk.edit(0, 1, &format!("# one\n# two\n{}", desk.text().lines().next().unwrap()));
     show(&mut desk, 30);
     time(&mut desk, TimelineEdit::Paste);
     assert!(desk.text().contains("Material grey diffuse .5 .5 (1:0.5 30:0.2 50:0.2)\n"), "{}", desk.text());
@@ -179,7 +179,7 @@ fn what_is_locked_is_not_taken_hold_of_and_the_script_says_nothing_of_it() {
     let mut desk = small();
     let at = desk.seen(BALL);
     desk.ask(ClientMessage::Lock { lines: vec![BALL] });
-    desk.ask(ClientMessage::Insert { at: 0, text: "# one".into() });
+    desk.edit(0, 1, &format!("# one\n{}", desk.text().lines().next().unwrap()));
     assert_eq!(desk.state().locked, [BALL + 1]);
     desk.drag(at, at + DVec2::new(9.0, 0.0));
     assert_eq!(desk.text(), format!("# one\r\n{TEXT}"));
@@ -210,10 +210,7 @@ fn hovering_outlines_what_is_under_the_pointer_once() {
 #[test]
 fn ghosts_are_where_it_is_at_other_frames() {
     let mut desk = small();
-    desk.ask(ClientMessage::Text {
-        line: BALL,
-        text: "Sphere 1.0  (1:-3 50:3) 1 0  .1 .1 .1 .9 .2 .2   # ball".into(),
-    });
+    desk.edit(BALL, 1, "Sphere 1.0  (1:-3 50:3) 1 0  .1 .1 .1 .9 .2 .2   # ball");
     desk.ask(ClientMessage::Select { lines: vec![BALL] });
     time(&mut desk, TimelineEdit::Switch { what: Switch::Onion, on: true });
     let tell = desk.ask(ClientMessage::Frame { frame: 24, moving: false }).tell;

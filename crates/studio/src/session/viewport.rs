@@ -23,6 +23,9 @@ pub(super) const PIXELS: u64 = 8 << 20;
 /// The number of grid lines in each direction from the middle.
 const GRID: i32 = 10;
 
+/// The depth of the drawn camera, in radii of the scene.
+const FRUSTUM: f64 = 0.4;
+
 /// The number of pieces of the whole horizon.
 const HORIZON: i32 = 72;
 
@@ -92,6 +95,23 @@ impl Session {
         objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
     }
 
+    /// Returns the radius of what a `Use` draws, which is not in its numbers.
+    pub(super) fn drawn_size(&self, project: &Project, line: usize) -> Option<f64> {
+        self.line(project, line).filter(|line| line.command() == Some(Command::Use))?;
+        let (shown, scene) = (self.shown(project), self.sound_scene(project)?);
+        let own = scene.objects.iter().enumerate();
+        let own = own.filter(|(at, _)| shown.source_map.line_of(*at) == Some(line));
+        extent::bounds(own.map(|(_, object)| object)).map(|bounds| bounds.radius())
+    }
+
+    /// Returns whether a line draws a single object without an end, such as a floor.
+    pub(super) fn is_endless(&self, project: &Project, line: usize) -> bool {
+        let (shown, scene) = (self.shown(project), self.sound_scene(project));
+        let objects = scene.iter().flat_map(|scene| scene.objects.iter().enumerate());
+        let mut own = objects.filter(|(at, _)| shown.source_map.line_of(*at) == Some(line));
+        own.any(|(_, object)| extent::bounds([object]).is_none())
+    }
+
     /// Returns the selected lines as a set.
     pub(super) fn chosen(&self) -> HashSet<usize> {
         self.selection.iter().copied().collect()
@@ -121,6 +141,38 @@ impl Session {
         let (origin, direction) = Projection::new(&scene).ray(DVec2::new(column + 0.5, row + 0.5));
         let line = shown.source_map.line_of(found.object)?;
         (!self.is_locked(project, line)).then(|| (line, origin + found.distance * direction))
+    }
+
+    /// Returns the lines that are drawn and have an end, each with its box.
+    pub(super) fn boxes(&self, project: &Project, is_in: impl Fn(usize) -> bool) -> Vec<(usize, Bounds)> {
+        let (shown, Some(scene)) = (self.shown(project), self.sound_scene(project)) else {
+            return Vec::new();
+        };
+        let mut boxes: Vec<(usize, Bounds)> = Vec::new();
+        for (at, object) in scene.objects.iter().enumerate() {
+            let (Some(line), Some(bounds)) = (shown.source_map.line_of(at), extent::bounds([object])) else {
+                continue;
+            };
+            match boxes.last_mut() {
+                Some((last, all)) if *last == line => *all = all.with(bounds),
+                _ if is_in(line) => boxes.push((line, bounds)),
+                _ => {}
+            }
+        }
+        boxes
+    }
+
+    /// Selects the objects whose middles are in a rectangle, besides those that are selected if `extend`.
+    pub(super) fn select_box(&mut self, project: &Project, from: DVec2, to: DVec2, extend: bool) {
+        let Some(scene) = self.scene(project) else { return };
+        let (low, high) = (from.min(to), from.max(to));
+        let projection = Projection::new(&scene);
+        let is_inside = |at: DVec2| at.cmpge(low).all() && at.cmple(high).all();
+        let found = self.boxes(project, |line| !self.is_locked(project, line));
+        let found = found.into_iter().filter(|(_, of)| projection.point(of.center()).is_some_and(is_inside));
+        let mut lines = if extend { self.selection.clone() } else { Vec::new() };
+        lines.extend(found.map(|(line, _)| line));
+        self.select(project, lines);
     }
 
     /// Returns the outline of the objects of some lines.
@@ -199,21 +251,35 @@ impl Session {
         });
     }
 
-    pub(super) fn keep_camera(&mut self, project: &mut Project, tell: &mut ServerMessage) -> Change {
+    /// Writes the view into the script as its camera, of this kind or of the present one.
+    pub(super) fn keep_camera(
+        &mut self,
+        project: &mut Project,
+        kind: Option<Command>,
+        tell: &mut ServerMessage,
+    ) -> Change {
         let shown = self.shown(project);
-        let Some(scene) = &shown.scene else { return Change::Nothing };
+        let (Some(scene), Some(orbit)) = (&shown.scene, self.orbit(project)) else { return Change::Nothing };
         let aspect = f64::from(scene.screen.width()) / f64::from(scene.screen.height());
-        let Some(Ok(camera)) = self.free.map(|orbit| orbit.camera(aspect)) else { return Change::Nothing };
-        let source_map = &shown.source_map;
         let lines = self.file_lines(project);
-        let numbers = camera_numbers(&camera, self.step(project));
-        let old = source_map.camera.filter(|&at| lines[at].command() == Some(Command::Camera));
-        let splice = match old {
+        let old = shown.source_map.camera;
+        let had = old.and_then(|at| lines[at].command()).filter(|&command| command != Command::Orthocamera);
+        let kind = kind.or(had).unwrap_or(Command::Camera);
+        let numbers = match (kind, orbit.camera(aspect)) {
+            (Command::Orthocamera, _) => Vec::new(),
+            (Command::Look, _) => look_numbers(&orbit, self.step(project)),
+            (_, Ok(camera)) => camera_numbers(&camera, self.step(project)),
+            (_, Err(_)) => return Change::Nothing,
+        };
+        let splice = match old.filter(|&at| lines[at].command() == Some(kind)) {
             Some(at) => lines[at].with_numbers(0, &numbers).map(|line| edits::set(at, line)),
             None => {
-                let line = Line::new(Command::Camera.name()).with_numbers(0, &numbers);
-                let at = source_map.camera.or(source_map.screen).map_or(0, |at| at + 1);
-                line.map(|line| Splice { at, removed: 0, inserted: vec![line] })
+                let name = old.and_then(|at| lines[at].name()).unwrap_or_default();
+                let line =
+                    Line::new(kind.name()).with_numbers(0, &numbers).and_then(|line| line.named(&name));
+                let at = old.unwrap_or_else(|| shown.source_map.start());
+                let removed = usize::from(old.is_some());
+                line.map(|line| Splice { at, removed, inserted: vec![line] })
             }
         };
         self.edit(project, splice.into_iter().collect(), None, tell);
@@ -234,10 +300,24 @@ fn fitted(width: f64, height: f64) -> Option<Screen> {
     Screen::new(side(width), side(height)).ok()
 }
 
+/// Returns the number of decimals of a position that a pixel of this size shows.
+fn decimals(step: f64) -> usize {
+    (-step.log10()).ceil().clamp(0.0, 12.0) as usize
+}
+
+fn round(x: f64, decimals: usize) -> f64 {
+    format!("{x:.decimals$}").parse().unwrap_or(x)
+}
+
+/// Returns the numbers of `Look` but for its `up`, rounded to a visible precision.
+fn look_numbers(orbit: &Orbit, step: f64) -> Vec<f64> {
+    let places = decimals(step);
+    let positions = [orbit.eye(), orbit.target].into_iter().flat_map(|at| at.to_array());
+    positions.map(|x| round(x, places)).chain([round(2.0 * orbit.half_fov.to_degrees(), 2)]).collect()
+}
+
 /// Returns the numbers of `Camera`, rounded to a visible precision.
 fn camera_numbers(camera: &Pinhole, step: f64) -> Vec<f64> {
-    let decimals = |step: f64| (-step.log10()).ceil().clamp(0.0, 12.0) as usize;
-    let round = |x: f64, decimals: usize| format!("{x:.decimals$}").parse().unwrap_or(x);
     let places = decimals(step);
     let mut numbers: Vec<f64> = camera.eye().to_array().map(|x| round(x, places)).into();
     for direction in [camera.gaze(), camera.up()] {
@@ -278,6 +358,29 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
         if let (Some(a), Some(b)) = (far(turn), far(turn + 1)) {
             path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
         }
+    }
+    path
+}
+
+/// Returns the edges of what a scene's camera sees, from its eye.
+pub(super) fn frustum_path(projection: &Projection, scene: &Scene, bounds: Bounds) -> String {
+    let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+    let own = Projection::new(scene);
+    let (_, _, back) = own.axes();
+    let reach = FRUSTUM * bounds.radius();
+    let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)].map(|(x, y)| {
+        let (eye, way) = own.ray(DVec2::new(x, y));
+        (eye, eye + way * (reach / way.dot(-back)))
+    });
+    let mut path = String::new();
+    let mut line = |from: DVec3, to: DVec3| {
+        if let (Some(a), Some(b)) = (projection.point(from), projection.point(to)) {
+            path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
+        }
+    };
+    for (at, (eye, corner)) in corners.into_iter().enumerate() {
+        line(eye, corner);
+        line(corner, corners[(at + 1) % corners.len()].1);
     }
     path
 }

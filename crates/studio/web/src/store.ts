@@ -3,27 +3,32 @@
 
 import { batch, computed, signal } from "@preact/signals";
 
-import type { Ask, Command, FileState, Ghost, Line, Output, State, Tell, Tracks } from "./protocol";
+import type { ClientMessage, CommandTable, FileState, Ghost, Language, LineState, OutputState, State, ServerMessage, Tracks } from "./protocol";
 
 export const connected = signal(true);
-export const tables = signal<readonly Command[]>([]);
+export const language = signal<Language | null>(null);
+export const tables = signal<readonly CommandTable[]>([]);
 /** The names of the example scenes. */
 export const examples = signal<readonly string[]>([]);
 /** Whether scripts can be added. */
 export const canCreate = signal(false);
+/** Whether the studio was started with a bucket. */
+export const canSubmit = signal(false);
 /** The names of the starter materials. */
 export const presets = signal<readonly string[]>([]);
 export const files = signal<readonly FileState[]>([]);
-export const lines = signal<readonly Line[]>([]);
+export const lines = signal<readonly LineState[]>([]);
 export const state = signal<State | null>(null);
 export const hovered = signal<number | null>(null);
 export const outline = signal("");
 export const hoverOutline = signal("");
 export const ghosts = signal<readonly Ghost[]>([]);
 export const tracks = signal<Tracks>({ tracks: [], more: false });
-export const output = signal<Output | null>(null);
+export const output = signal<OutputState | null>(null);
 export const notice = signal("");
 export const playing = signal(false);
+/** Whether the search is open. */
+export const searching = signal(false);
 /** Whether the list of keys is open. */
 export const help = signal(false);
 
@@ -36,8 +41,11 @@ type Show = (picture: ArrayBuffer) => void;
 
 let socket: WebSocket | null = null;
 let show: Show = () => {};
+/** The messages that came before the editor. */
+const early: ServerMessage[] = [];
+let hearText: (tell: ServerMessage) => void = (tell) => void early.push(tell);
 let hovering = false;
-let nextHover: Ask | null = null;
+let nextHover: ClientMessage | null = null;
 let gestures = 0;
 /** The number of messages sent. */
 let sent = 0;
@@ -48,13 +56,19 @@ export function onPicture(take: Show): void {
   show = take;
 }
 
+/** Receives each message after it has changed the state. */
+export function onText(take: (tell: ServerMessage) => void): void {
+  hearText = take;
+  early.splice(0).forEach(take);
+}
+
 /** Returns the number of a new gesture. All changes with the same number are one undo step. */
 export function gesture(): number {
   gestures += 1;
   return gestures;
 }
 
-export function ask(wish: Ask): void {
+export function ask(wish: ClientMessage): void {
   if (socket?.readyState !== WebSocket.OPEN) return;
   sent += 1;
   socket.send(JSON.stringify(wish));
@@ -69,7 +83,7 @@ export function select(lines: readonly number[]): void {
 
 /** Requests the object under the pointer. While a reply is awaited, only the newest request is kept. */
 export function hover(x: number, y: number): void {
-  const wish: Ask = { ask: "hover", x, y };
+  const wish: ClientMessage = { ask: "hover", x, y };
   if (hovering) {
     nextHover = wish;
   } else {
@@ -90,7 +104,7 @@ export function connect(): void {
     dispatchEvent(new Event("resize"));
   };
   opened.onmessage = (message: MessageEvent<string | ArrayBuffer>) => {
-    if (typeof message.data === "string") hear(JSON.parse(message.data) as Tell);
+    if (typeof message.data === "string") hear(JSON.parse(message.data) as ServerMessage);
     else show(message.data);
   };
   opened.onclose = () => {
@@ -100,11 +114,13 @@ export function connect(): void {
   socket = opened;
 }
 
-function hear(tell: Tell): void {
+function hear(tell: ServerMessage): void {
   batch(() => {
+    if (tell.language) language.value = tell.language;
     if (tell.tables) tables.value = tell.tables;
     if (tell.examples) examples.value = tell.examples;
     if (tell.canCreate !== undefined) canCreate.value = tell.canCreate;
+    if (tell.canSubmit !== undefined) canSubmit.value = tell.canSubmit;
     if (tell.presets) presets.value = tell.presets;
     if (tell.files) files.value = tell.files;
     if (tell.lines) lines.value = tell.lines;
@@ -113,6 +129,7 @@ function hear(tell: Tell): void {
       for (const splice of tell.splices) all.splice(splice.at, splice.removed, ...splice.lines);
       lines.value = all;
     }
+    hearText(tell);
     if (tell.state) {
       // A state that was sent before the server received the last selection does not undo it.
       const isOld = chosen !== null && tell.state.asked < chosen.sent;

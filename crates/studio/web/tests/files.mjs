@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, open, program, scenes, shot, until } from "./stage.mjs";
+import { audit, open, output, program, scenes, setLine, shot, until } from "./stage.mjs";
 
 const text = "Screen 320 180\nCamera 0 1 8  0 0 -1  0 1 0  1  -.8 -.45  .8 .45\nIlight 1 1 1 1 -1 -1\nSphere 1 0 1 0 .1 .1 .1 .8 .2 .2\nTrace\n";
 
@@ -65,9 +65,9 @@ test("a new name goes into the folder that was opened, over no other file and to
     await page.getByRole("button", { name: "Close" }).click();
   }
   await saveAs("f2");
-  await page.getByText("frame 2 of 3").waitFor();
+  await page.locator("output", { hasText: "frame 2 of 3" }).waitFor();
   assert.equal(readFileSync(join(path, "f2.txt"), "utf8"), text);
-  await page.getByLabel("Line 4", { exact: true }).fill("# gone");
+  await setLine(page, 4, "# gone");
   await until(() => readFileSync(join(path, "f2.txt"), "utf8").includes("# gone"));
   for (const name of ["f1.txt", "f10.txt"]) assert.equal(readFileSync(join(path, name), "utf8"), text);
   assert.equal(readFileSync(join(path, "theirs.txt"), "utf8"), "# theirs\n");
@@ -81,7 +81,7 @@ test("all frames and all scripts come as zip files", async (t) => {
   for (let frame = 1; frame <= 12; frame += 1) writeFileSync(join(from, `f${frame}.txt`), text);
   const { page, check } = await open(t, { from, name: "film" });
   for (const [name, first] of [["Frames", "frame01.png"], ["Scripts", "f1.txt"]]) {
-    const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name, exact: true }).click()]);
+    const [download] = await Promise.all([page.waitForEvent("download"), (await output(page, name)).click()]);
     const bytes = readFileSync(await download.path());
     assert.equal(bytes.readUInt16LE(bytes.lastIndexOf(Buffer.from([0x50, 0x4b, 5, 6])) + 10), 12, name);
     assert.ok(bytes.includes(first), first);
@@ -101,7 +101,7 @@ test("a GIF that is being made can be given up, and is made anew", async (t) => 
   await page.getByRole("button", { name: "Render GIF" }).waitFor();
   assert.equal(await page.getByRole("link", { name: /Download GIF/ }).count(), 0, "half of one is none");
   writeFileSync(path, film("96 64", 4, 5));
-  await page.getByText("frame 1 of 5").waitFor();
+  await page.locator("output", { hasText: "frame 1 of 5" }).waitFor();
   await page.getByRole("button", { name: "Render GIF" }).click();
   const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: /Download GIF/ }).click()]);
   const run = spawnSync(program, ["render", path, "-o", join(folder, "expected.gif")]);

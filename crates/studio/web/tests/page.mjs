@@ -9,7 +9,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, drag, isDrawn, open, over, program, row, scenes, shot, until } from "./stage.mjs";
+import { audit, caret, drag, goLine, isDrawn, open, over, program, row, scenes, seenLines, selectLine, setLine, shot, until } from "./stage.mjs";
 
 test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
@@ -91,7 +91,8 @@ test("five objects from an empty page without a number, and the GIF is that of t
   const at = await handle.boundingBox();
   const middle = [at.x + at.width / 2, at.y + at.height / 2];
   await drag(page, middle, [middle[0] + 60, middle[1]]);
-  await page.getByLabel("diffuse coefficient: rr, slider").press("ArrowRight");
+  await page.getByRole("button", { name: "Channels of colour" }).click();
+  await page.getByLabel("colour: red, slider").press("ArrowRight");
   const text = await studio.saved();
   assert.equal(text.split("\n").filter((line) => /^(Box|Sphere|Triangle) /.test(line)).length, 5, text);
   await shot(page, "five-objects");
@@ -112,17 +113,17 @@ test("five objects from an empty page without a number, and the GIF is that of t
 test("the script and the picture follow each other, and faults are told where they are", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page } = studio;
-  const ball = page.getByLabel("Line 34", { exact: true });
   await (await row(page, ".item", { hasText: "Sphere" })).click();
+  const ball = page.locator(".cm-line.chosen");
   await ball.waitFor();
-  const text = await ball.inputValue();
+  const text = await ball.textContent();
   assert.match(text, /^Sphere/);
-  await ball.fill(text.replace("Sphere", "Spere"));
+  await setLine(page, 34, text.replace("Sphere", "Spere"));
   await page.locator(".wave.error").waitFor();
-  await page.getByText("did you mean `Sphere`?").waitFor();
-  await ball.press("Home");
+  await page.locator(".mark.error").waitFor();
+  await page.getByRole("button", { name: /did you mean `Sphere`?/ }).waitFor();
   await shot(page, "fault");
-  await ball.fill(text.replace("Sphere 0.72", "Sphere 0.5"));
+  await setLine(page, 34, text.replace("Sphere 0.72", "Sphere 0.5"));
   await page.locator(".wave.error").waitFor({ state: "detached" });
   await until(async () => (await page.getByRole("spinbutton", { name: "radius" }).inputValue()) === "0.5");
   await studio.settled();
@@ -136,11 +137,10 @@ test("what is typed stays, whatever is told meanwhile", async (t) => {
   const studio = await open(t, { text });
   const { page } = studio;
   const typed = "Sphere 0.25  1 2 3  0.1 0.1 0.1  0.5 0.5 0.5   # typed, not pasted";
-  const line = page.getByLabel("Line 2", { exact: true });
-  await line.click();
-  await line.press("Control+a");
-  await line.pressSequentially(typed);
-  assert.equal(await line.inputValue(), typed);
+  await goLine(page, 2);
+  await selectLine(page);
+  await page.keyboard.type(typed);
+  assert.equal((await caret(page)).text, typed);
   await until(async () => (await studio.saved()).split("\n")[1] === typed);
   // Numbers, and names, while the script changes elsewhere.
   await (await row(page, ".item.object")).click();
@@ -161,7 +161,7 @@ test("what is typed stays, whatever is told meanwhile", async (t) => {
   await page.keyboard.press("Control+a");
   await page.keyboard.type("half a na");
   writeFileSync(studio.path, (await studio.saved()).replace("# 8\n", "# eight\n"));
-  await until(async () => (await page.locator(".code input").evaluateAll((all) => all.map((i) => i.value))).includes("# eight"));
+  await until(async () => (await seenLines(page)).includes("# eight"));
   await page.keyboard.type("me");
   await page.keyboard.press("Enter");
   await until(async () => (await studio.saved()).split("\n")[1].endsWith("# half a name"));
@@ -196,10 +196,9 @@ test("what another program writes meanwhile is never overwritten", async (t) => 
   const text = readFileSync(path, "utf8");
   writeFileSync(path, text.replace("# H", "# another H"));
   await page.getByText("was changed on the disk").waitFor();
-  await until(async () => (await page.locator(".code input").evaluateAll((all) => all.map((i) => i.value))).includes("# another H"));
+  await until(async () => (await seenLines(page)).includes("# another H"));
   // A change on both sides before either is told: the page must ask.
-  const socketed = page.getByLabel("Line 1", { exact: true });
-  await socketed.fill("# mine");
+  await setLine(page, 1, "# mine");
   writeFileSync(path, "# theirs\n");
   await page.getByRole("button", { name: "Keep what is here" }).waitFor();
   assert.equal(readFileSync(path, "utf8"), "# theirs\n");
@@ -212,11 +211,11 @@ test("frames are scrubbed, and each is the tracer's picture", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello"), name: "hello" });
   const { page } = studio;
   await page.getByRole("slider", { name: "Frame" }).fill("20");
-  await page.getByText("frame 20 of 50").waitFor();
+  await page.locator("output", { hasText: "frame 20 of 50" }).waitFor();
   await studio.settled();
   await isDrawn(page, studio.path, 20);
   await page.getByRole("button", { name: "Play" }).click();
-  await until(async () => !(await page.getByText("frame 20 of 50").isVisible()));
+  await until(async () => !(await page.locator("output", { hasText: "frame 20 of 50" }).isVisible()));
   await page.getByRole("button", { name: "Stop" }).click();
   studio.check();
 });
@@ -250,8 +249,7 @@ test("an empty, a broken and a huge script open and stay usable", async (t) => {
       const from = join(folder, name);
       writeFileSync(from, text);
       const studio = await open(t, { from, name, blank: name === "broken.txt" });
-      const line = studio.page.getByLabel("Line 1", { exact: true });
-      await line.fill("Screen 320 180");
+      await setLine(studio.page, 1, "Screen 320 180");
       await until(async () => readFileSync(studio.path, "utf8").startsWith("Screen 320 180\n"));
       assert.equal(readFileSync(studio.path, "utf8").split("\n").length, text.split("\n").length);
       if (name === "huge.txt") assert.ok((await studio.page.locator("body *").count()) < 3000, "only rows in sight are made");

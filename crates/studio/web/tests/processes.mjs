@@ -3,8 +3,8 @@
 import { spawn } from "node:child_process";
 
 /** A run of a program; `said` waits for its standard output, `ended` for its end. */
-export function start(program, args, env = {}) {
-  const server = spawn(program, args, { stdio: ["ignore", "pipe", "pipe"], env: { ...process.env, ...env } });
+export function start(program, args, env = {}, cwd = undefined) {
+  const server = spawn(program, args, { stdio: ["ignore", "pipe", "pipe"], env: { ...process.env, ...env }, cwd });
   let [out, err] = ["", ""];
   server.stderr.on("data", (bytes) => (err += bytes));
   const ended = new Promise((resolve) => server.on("exit", resolve));

@@ -9,7 +9,7 @@ import { basename, join } from "node:path";
 import { test } from "node:test";
 
 import { start } from "./processes.mjs";
-import { audit, open, program, scenes, shot, until } from "./stage.mjs";
+import { audit, caret, open, output, program, scenes, setLine, shot, until } from "./stage.mjs";
 
 /** Longer than a bucket takes on a loaded machine, in milliseconds. */
 const PATIENCE = 600_000;
@@ -53,7 +53,8 @@ async function studio(t, exports, options) {
 
 async function submit(page, name) {
   const isOpen = (await page.locator("dialog.runs").count()) > 0;
-  await page.locator(isOpen ? "dialog.runs" : "header").getByRole("link", { name: "Submit", exact: true }).click();
+  const link = isOpen ? page.locator("dialog.runs").getByRole("link", { name: "Submit", exact: true }) : await output(page, "Submit");
+  await link.click();
   if (name) await page.getByLabel("Name of the run").fill(name);
   await page.getByRole("button", { name: "Estimate the cost" }).click();
   await page.getByText("Making it, once").waitFor();
@@ -95,7 +96,7 @@ function filesOfZip(bytes) {
 test("a run goes on without its page, and gives the GIF of the command line", async (t) => {
   const bucket = await dev(t);
   const { page, context, path, folder, address, check, heard, listen } = await studio(t, bucket.exports, { from: join(scenes, "hello"), name: "hello" });
-  await page.getByRole("link", { name: "Submit", exact: true }).click();
+  await (await output(page, "Submit")).click();
   await page.getByRole("button", { name: "Estimate the cost" }).click();
   await page.getByText("50 frames of 512").waitFor();
   await page.getByText("To scripts/hello/: 51 files to upload, 0 there already").waitFor();
@@ -153,13 +154,12 @@ test("a frame that cannot be drawn opens its line, and is drawn again once that 
   await shot(page, "run-failed");
   assert.deepEqual(await audit(page), []);
   await opens.click();
-  const line = page.getByLabel("Line 4", { exact: true });
-  await until(() => line.evaluate((input) => input === document.activeElement && input.selectionStart === 3));
-  await page.getByText("frame 2 of 3").waitFor();
-  assert.equal(await line.inputValue(), `   ${ball(30).trim()}`);
+  await page.locator("output", { hasText: "frame 2 of 3" }).waitFor();
+  const place = { text: `   ${ball(30).trim()}`, column: 3 };
+  await until(async () => JSON.stringify(await caret(page)) === JSON.stringify(place));
 
   // Mended and submitted again: what failed is drawn, the other frame still fails.
-  await line.fill(`# ${ball(30).trim()}`);
+  await setLine(page, 4, `# ${ball(30).trim()}`);
   await until(() => readFileSync(join(path, "2.txt"), "utf8").includes("\n# Sphere"));
   await submit(page);
   await page.getByText("failed: 2 of 3 frames, 1 failed").waitFor({ timeout: PATIENCE });
@@ -194,7 +194,7 @@ test("what the bucket has and the page has not is deleted only when that is said
   assert.equal(sent.status, 0, String(sent.stderr));
   rmSync(join(folder, "film", "other.txt"));
   const { page, path } = await studio(t, bucket.exports, { from: join(folder, "film"), name: "film" });
-  await page.getByRole("link", { name: "Submit", exact: true }).click();
+  await (await output(page, "Submit")).click();
   await page.getByRole("button", { name: "Estimate the cost" }).click();
   const agree = page.getByLabel(/Delete a script of the bucket that the page does not have: scripts\/film\/other.txt/);
   await agree.waitFor();
@@ -208,8 +208,10 @@ test("what the bucket has and the page has not is deleted only when that is said
 });
 
 test("without a bucket the page says how to name one", async (t) => {
-  const { page, check } = await open(t, { from: join(scenes, "hello/frame01.txt"), env: { RAYFOLD_BUCKET: undefined } });
-  await page.getByRole("link", { name: "Submit", exact: true }).click();
+  const { page, address, check } = await open(t, { from: join(scenes, "hello/frame01.txt"), env: { RAYFOLD_BUCKET: undefined } });
+  await (await output(page, "Frame")).waitFor();
+  assert.equal(await page.locator("#more-output").getByRole("link", { name: "Submit" }).count(), 0);
+  await page.goto(`${address}#submit`);
   await page.getByText("No bucket was named").waitFor();
   check();
 });

@@ -28,7 +28,9 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   const path = join(folder, name);
   if (from) cpSync(from, path, { recursive: true });
   if (text !== undefined) writeFileSync(path, text);
-  const { server, ended, said } = start(program, ["studio", path, "--no-open", ...args], env);
+  // What is opened here is not among the user's recent scenes.
+  const memory = mkdtempSync(join(tmpdir(), "rayfold-state-"));
+  const { server, ended, said } = start(program, ["studio", path, "--no-open", ...args], { XDG_STATE_HOME: memory, ...env });
   const address = (await said((text) => text.includes("\n"))).trim();
   const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, colorScheme: scheme });
   const page = await context.newPage();
@@ -43,7 +45,7 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
     await context.close();
     server.kill("SIGINT");
     await ended;
-    rmSync(folder, { recursive: true, force: true });
+    for (const used of [folder, memory]) rmSync(used, { recursive: true, force: true });
   });
   await page.goto(address);
   const drawn = () => page.locator("canvas").getAttribute("data-picture");
@@ -69,6 +71,23 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
     assert.deepEqual(outside, [], "nothing but its own server");
   };
   return { page, context, path, folder, address, settled, saved, check, ended, server };
+}
+
+/** The start page of a program of its own, with its folder. */
+export async function openStart(t, size = [1024, 768], scheme = "light") {
+  const folder = mkdtempSync(join(tmpdir(), "rayfold-studio-"));
+  const { server, ended, said } = start(program, ["studio", "--no-open"], { XDG_STATE_HOME: folder }, folder);
+  const address = (await said((text) => text.includes("\n"))).trim();
+  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, colorScheme: scheme });
+  const page = await context.newPage();
+  t.after(async () => {
+    await context.close();
+    server.kill("SIGINT");
+    await ended;
+    rmSync(folder, { recursive: true, force: true });
+  });
+  await page.goto(address);
+  return { page, folder, address };
 }
 
 /** Waits for a condition; its patience, in milliseconds, is longer than anything takes on a loaded machine. */
@@ -119,6 +138,49 @@ export async function row(page, selector, options) {
   }
   return found;
 }
+
+/** Opens the menu of outputs and returns one of its links. */
+export async function output(page, name) {
+  await page.getByRole("button", { name: "More output" }).click();
+  return page.locator("#more-output").getByRole("link", { name, exact: true });
+}
+
+/** Puts the caret to the start of a line of the script, counted from 1. */
+export async function goLine(page, number) {
+  await page.locator(".cm-content").focus();
+  await page.keyboard.press("Control+g");
+  await page.keyboard.type(String(number));
+  await page.keyboard.press("Enter");
+  await until(() => page.locator(".code").evaluate((host) => host.shadowRoot.activeElement?.classList.contains("cm-content")));
+}
+
+/** Selects the line of the caret, also if it is shown in several rows. */
+export async function selectLine(page) {
+  await page.keyboard.press("Shift+End");
+  await page.keyboard.press("Shift+End");
+}
+
+/** Replaces a line of the script, counted from 1, in the editor. */
+export async function setLine(page, number, text) {
+  await goLine(page, number);
+  await selectLine(page);
+  await page.keyboard.insertText(text);
+}
+
+/** The lines of the script that the editor has made: those in sight. */
+export const seenLines = (page) => page.locator(".cm-line").allTextContents();
+
+/** The line with the caret, and the column of the caret. */
+export const caret = (page) =>
+  page.locator(".code").evaluate((host) => {
+    const { anchorNode: node, anchorOffset } = host.shadowRoot.getSelection?.() ?? getSelection();
+    const line = (node instanceof Element ? node : node?.parentElement)?.closest(".cm-line");
+    if (!line) return { text: "", column: -1 };
+    const before = new Range();
+    before.setStart(line, 0);
+    before.setEnd(node, anchorOffset);
+    return { text: line.textContent, column: before.toString().length };
+  });
 
 export async function drag(page, from, to, steps = 8) {
   await page.mouse.move(...from);

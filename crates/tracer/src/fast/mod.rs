@@ -1,62 +1,23 @@
-//! The tracer that pictures are made with: packets of rays, by tiles, with the machine's widest instructions.
+//! The fast tracer, which draws the pictures: packets of rays, tile by tile, with the machine's widest instructions.
 //!
-//! It draws what [`crate::reference`] draws, at most one level apart but for isolated pixels, and the same picture bit
-//! for bit for any tile size, number of threads and width of fused multiply-add. It knows the scene only as
-//! [`geometry`] has recentred and scaled it.
+//! It draws the picture of [`crate::reference`], at most one level apart except in isolated pixels. The picture is the
+//! same bit for bit for any tile size, number of threads and width of fused multiply-add. It uses the scene only as
+//! [`placement::geometry`] has recentred and scaled it.
 
-mod band;
-mod beyond;
+mod acceleration;
+mod arithmetic;
 mod bodies;
-mod bounce;
-mod bounding_cone;
-mod bounds;
-mod candidates;
-mod coincidence;
-mod crowds;
-mod descent;
-mod dimming;
-mod dispatch;
-mod exact;
-mod features;
-mod finish;
-mod geometry;
-mod glass;
-mod kind;
-mod left_out;
-mod lens;
-mod light;
+mod build;
+mod film;
 mod lights;
-mod lists;
-mod look;
-#[cfg(feature = "accuracy")]
-mod naive;
-mod onwards;
-mod packet;
-mod parts;
-mod placed;
-mod planes;
-mod precision;
-mod predicate;
-mod prepare;
+mod materials;
+mod placement;
 pub mod probe;
 mod rays;
-mod real;
-mod rounding;
 mod sampled;
-mod search;
-mod shape;
 mod shapes;
 mod shared;
-mod sights;
-mod sky;
-mod surfaces;
-mod ties;
-mod tile;
-mod tone;
-mod tree;
-mod view;
-mod waiting;
-mod window;
+mod transport;
 
 use core::ops::Range;
 use std::sync::atomic::Ordering;
@@ -65,42 +26,44 @@ use fearless_simd::{Level, Simd};
 use image::RgbImage;
 use rayfold_scene::Scene;
 
-use self::band::{Band, Nothing, Tile};
-use self::dispatch::on;
-#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
-use self::features::Unfitted;
-use self::features::{Fitted, Kernel};
-use self::geometry::Geometry;
-use self::prepare::Prepared;
-use self::real::Real;
-use self::rounding::MARGIN;
 use self::sampled::Sampled;
-use self::shape::Robust;
 use self::shapes::{Formulas, Shape};
-use self::ties::Ranked;
-use self::tile::Scratch;
-use self::window::{Grid, Window};
+use crate::fast::arithmetic::dispatch::on;
+use crate::fast::arithmetic::real::Real;
+use crate::fast::arithmetic::rounding::MARGIN;
+use crate::fast::build::features::{self, Kernel};
+use crate::fast::build::precision;
+use crate::fast::build::prepare::Prepared;
+use crate::fast::build::ties::Ranked;
+use crate::fast::film::band::{Band, FlatBackground, Tile};
+use crate::fast::film::tile::{self, Scratch};
+use crate::fast::placement::geometry::Geometry;
+use crate::fast::placement::window::{Grid, Window};
+#[cfg(feature = "accuracy")]
+use crate::fast::shapes::naive;
+use crate::fast::shapes::shape::Robust;
 use crate::parallel::{CHANNELS, bands};
+use crate::parts;
 use crate::{Exposure, Precision, RenderError, RenderOptions};
 
-/// Columns and rows of a tile.
+/// The columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
 
-/// The same for scenes of more than so many objects: small tiles show few of them.
+/// The columns and rows of a tile in scenes of more than `MANY` objects: a small tile shows few of them.
 const SMALL_SIDE: (u32, u32) = (8, 8);
 const MANY: usize = 512;
 
-/// The first half of [`crate::render`]: a scene with all that is worked out before its first pixel, a tree of its
-/// objects among it.
+/// A prepared scene, the first half of [`crate::render`]: the scene with all data that is computed before its first
+/// pixel, such as a tree of its objects.
 pub struct Drawing<'a>(Backend<'a>);
 
-/// What a scene is drawn by.
+/// The renderer of a scene.
 enum Backend<'a> {
     Single(Setup<'a, f32>),
     Double(Setup<'a, f64>),
     SampledSingle(Sampled<'a, f32>),
     SampledDouble(Sampled<'a, f64>),
-    /// Numbers that the kernels cannot hold are left to the tracer that takes them one by one.
+    /// The reference tracer, which traces one ray at a time, for scenes whose numbers the kernels cannot represent.
     Reference(Exposure<'a>, &'a RenderOptions<'a>),
 }
 
@@ -108,7 +71,7 @@ impl<'a> Drawing<'a> {
     /// Prepares a scene, on the current rayon pool.
     ///
     /// # Errors
-    /// When this build leaves out what the scene needs.
+    /// If this build leaves out a feature that the scene needs.
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
         Self::exposed(Exposure::still(scene), options)
     }
@@ -116,9 +79,9 @@ impl<'a> Drawing<'a> {
     /// Prepares a scene that may move while the shutter is open, on the current rayon pool.
     ///
     /// # Errors
-    /// When this build leaves out what the scene needs.
+    /// If this build leaves out a feature that the scene needs.
     pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
-        left_out::check(&exposure)?;
+        parts::check(&exposure)?;
         let scene = exposure.scene();
         if parts::BUILT.samples && scene.samples.most() > 1 {
             return Ok(Self(
@@ -141,34 +104,35 @@ impl<'a> Drawing<'a> {
         }))
     }
 
-    /// The second half: the image, the same each time.
+    /// Draws the image, the second half. The result is the same each time.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
         self.draw_rows(0..self.height())
     }
 
-    /// Some rows of the image, counted from the top: the very pixels that the whole image has there. It takes the time and
-    /// memory of those rows, and of the [margin](Self::margin) above and below them. Rows that the image has not are left out.
+    /// Draws some rows of the image, counted from the top. The pixels are exactly those of the whole image. Takes the
+    /// time and memory of those rows, and of the [margin](Self::margin) above and below them. Rows outside the image
+    /// are left out.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub fn draw_rows(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         self.draw_within(rows, self.margin())
     }
 
-    /// Draws rows without any regard for those beside them: what that shows is not quite what the image shows, but it takes
-    /// about as long. For measuring what the whole will take.
+    /// Draws rows without their margin and discards the pixels, which can differ from those of the image. Takes about
+    /// as long as [`Self::draw_rows`]: for estimates of the time that the whole image will take.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub fn sketch_rows(&self, rows: Range<u32>) -> Result<(), RenderError> {
         self.draw_within(rows, 0).map(drop)
     }
 
-    /// How many rows beside it have a say in what a row shows: none, unless the picture has an error to be reached, so that
-    /// pixels get as many samples as those near them ask for.
+    /// Returns how many rows above and below a row can change its pixels. It is 0 unless sampling is adaptive: then
+    /// noisy pixels request samples for their neighbours.
     pub fn margin(&self) -> u32 {
         match &self.0 {
             Backend::SampledSingle(sampled) => sampled.margin(),
@@ -177,11 +141,11 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// The same; `each` gets the picture after each pass over the image but the last. Each is an estimate of the whole picture,
-    /// the next one with more samples; with one sample a pixel there are none.
+    /// Draws the image. `each` gets the picture after each pass over the image except the last. Each is an estimate of
+    /// the whole picture, the next one with more samples. With one sample per pixel there are none.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub fn draw_progressively(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
         match &self.0 {
             Backend::SampledSingle(sampled) => sampled.draw_progressively(&mut each),
@@ -219,22 +183,22 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// A picture before it becomes levels.
+/// A picture before its conversion to levels.
 #[cfg(feature = "accuracy")]
 #[derive(Clone, Debug)]
 pub struct Means {
-    /// Row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
+    /// The means of the pixels, row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
     pub means: Vec<glam::DVec3>,
-    /// Rays from the camera, pixel by pixel.
+    /// The number of camera rays of each pixel.
     pub counts: Vec<u32>,
 }
 
 #[cfg(feature = "accuracy")]
 impl Drawing<'_> {
-    /// The picture before it becomes levels; none if it is not drawn by sampling kernels.
+    /// Returns the picture before its conversion to levels, or `None` if it is not drawn by sampling kernels.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub fn draw_means(&self) -> Result<Option<Means>, RenderError> {
         let rows = 0..self.height();
         let film = match &self.0 {
@@ -247,7 +211,7 @@ impl Drawing<'_> {
     }
 }
 
-/// For pictures of several samples a pixel; none if there are no kernels for the scene.
+/// Returns the backend for pictures of several samples per pixel, or `None` if there are no kernels for the scene.
 fn sampled_backend<'a>(
     exposure: Exposure<'a>,
     options: &'a RenderOptions,
@@ -279,7 +243,8 @@ fn sampled_backend<'a>(
     }))
 }
 
-/// Whether there are kernels for the instructions; the first 64-bit processors of the x86 line have none of use.
+/// Returns whether there are kernels for the instruction set. The first 64-bit x86 processors lack the instructions
+/// that kernels need.
 #[cfg(target_arch = "x86_64")]
 fn has_kernels(options: &RenderOptions) -> bool {
     let level = options.level.unwrap_or_else(Level::new);
@@ -291,7 +256,7 @@ fn has_kernels(_: &RenderOptions) -> bool {
     true
 }
 
-/// The precision that [`Precision::Auto`] stands for in a scene.
+/// Returns the precision that [`Precision::Auto`] selects for a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
     let geometry = Geometry::new(scene, None).ok();
     let resolved =
@@ -299,10 +264,10 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
     resolved.unwrap_or(Precision::F64)
 }
 
-/// Draws a scene by the textbook.
+/// Draws a scene by textbook formulas.
 ///
 /// # Errors
-/// Those of [`crate::render`].
+/// The errors of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let Ranked { scene: ranked, .. } = &Ranked::new(scene);
@@ -310,15 +275,15 @@ pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<Rgb
     setup.draw::<naive::Naive>(0..scene.screen.height())
 }
 
-/// What a kernel needs to draw a scene.
+/// The data that a kernel needs to draw a scene.
 struct Setup<'a, E> {
     scene: &'a Scene,
     options: &'a RenderOptions<'a>,
     prepared: Prepared<E>,
     window: Window,
-    /// Of few bodies.
+    /// The window of the bodies, if there are few.
     bodies: Option<Window>,
-    /// Columns and rows of a tile.
+    /// The columns and rows of a tile.
     side: (u32, u32),
 }
 
@@ -344,14 +309,14 @@ impl<'a, E: Real> Setup<'a, E> {
         Ok(Self { scene, options, prepared, window, bodies, side })
     }
 
-    /// Draws bands of tiles side by side, those with these rows.
+    /// Draws bands of tiles in parallel, those that contain these rows.
     fn draw<By: Formulas<E>>(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, bodies, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = Nothing::new::<E>(scene.background.colors().0, scene.tone);
+        let background = FlatBackground::new::<E>(scene.background.colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
-        // Boxed: it is passed from band to band by value.
+        // Boxed, because it is passed from band to band by value.
         let image = bands(
             scene.screen,
             rows,
@@ -364,7 +329,7 @@ impl<'a, E: Real> Setup<'a, E> {
                 draw::<E, By>(&Job { prepared, windows, side: *side, row, bounces }, level, band, scratch);
             },
         )?;
-        // A tile of much glass is given up halfway.
+        // A tile with much glass stops halfway if the picture is cancelled.
         let is_cancelled = || options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
         if prepared.has_glass() && is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
     }
@@ -373,13 +338,13 @@ impl<'a, E: Real> Setup<'a, E> {
 /// A row of tiles to draw.
 struct Job<'a, E> {
     prepared: &'a Prepared<E>,
-    /// Of objects, and of few bodies.
+    /// The windows of the objects and, if there are few, of the bodies.
     windows: (&'a Window, Option<&'a Window>),
-    /// Columns and rows of a tile.
+    /// The columns and rows of a tile.
     side: (u32, u32),
     /// The first row of pixels.
     row: u32,
-    /// Bounces that are followed.
+    /// The number of bounces that are followed.
     bounces: u32,
 }
 
@@ -410,22 +375,22 @@ impl<E: Real> Job<'_, E> {
     }
 }
 
-/// Draws with the best kernel for the instructions.
+/// Draws with the best kernel for the instruction set.
 #[cfg(target_arch = "x86_64")]
 fn draw<E: Real, By: Formulas<E>>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
-    #[cfg(feature = "avx512")]
+    #[cfg(all(feature = "avx512", not(all(test, feature = "narrow"))))]
     if let Some(simd) = level.as_avx512() {
-        return job.draw::<_, Fitted<By>>(simd, band, scratch);
+        return job.draw::<_, features::FullKernel<By>>(simd, band, scratch);
     }
+    #[cfg(not(all(test, feature = "narrow")))]
     if let Some(simd) = level.as_avx2() {
-        job.draw::<_, Fitted<By>>(simd, band, scratch);
-    } else {
-        // Such machines are old, and few: one variant of each step will do for them.
-        on!(narrow level, simd => job.draw::<_, Unfitted<By>>(simd, band, scratch));
+        return job.draw::<_, features::FullKernel<By>>(simd, band, scratch);
     }
+    // Such machines are old and rare, so one variant of each step is enough for them.
+    on!(narrow level, simd => job.draw::<_, features::CompactKernel<By>>(simd, band, scratch));
 }
 
 #[cfg(not(target_arch = "x86_64"))]
 fn draw<E: Real, By: Formulas<E>>(job: &Job<E>, level: Level, band: Band, scratch: &mut Scratch<E>) {
-    on!(level, simd => job.draw::<_, Fitted<By>>(simd, band, scratch));
+    on!(level, simd => job.draw::<_, features::FullKernel<By>>(simd, band, scratch));
 }

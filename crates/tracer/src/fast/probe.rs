@@ -7,21 +7,21 @@ use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
-use super::beyond::Beyond;
 use super::bodies::ANY;
-use super::dispatch::on;
-use super::features::{Anything, Everything};
-use super::geometry::Geometry;
-use super::packet::Ray;
-use super::precision::resolve;
-use super::prepare::Prepared;
-use super::real::{Lanes, Real, Vec3};
-use super::rounding::MARGIN;
-use super::search::nearest;
-use super::shape::Robust;
-use super::surfaces::surface;
-use super::ties::Ranked;
-use super::window::Grid;
+use crate::fast::arithmetic::dispatch::on;
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3};
+use crate::fast::arithmetic::rounding::MARGIN;
+use crate::fast::build::extensions::Extensions;
+use crate::fast::build::features::{Anything, Everything};
+use crate::fast::build::precision::resolve;
+use crate::fast::build::prepare::Prepared;
+use crate::fast::build::ties::Ranked;
+use crate::fast::placement::geometry::Geometry;
+use crate::fast::placement::window::Grid;
+use crate::fast::rays::packet::Ray;
+use crate::fast::shapes::shape::Robust;
+use crate::fast::transport::search::nearest;
+use crate::fast::transport::surfaces::surface;
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -132,8 +132,8 @@ impl<E: Real> Batch<'_, E> {
                 } else {
                     nearest::<S, E, Everything<Robust>, false>(simd, self.scene, ray, self.scene.all())
                 };
-                if let Some(bodies) = self.scene.beyond.as_ref().and_then(Beyond::bodies) {
-                    bodies.meet(simd, ANY, ray, &mut found);
+                if let Some(bodies) = self.scene.beyond.as_ref().and_then(Extensions::bodies) {
+                    bodies.intersect(simd, ANY, ray, &mut found);
                 }
                 match &self.scene.shared {
                     Some(shared) if from_eye => {

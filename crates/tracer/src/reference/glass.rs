@@ -1,20 +1,20 @@
-//! What happens to light at a surface of glass.
+//! Reflection and refraction at a surface of glass.
 
 use glam::DVec3;
+use rayfold_scene::Glass;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Glass, Object};
 
-/// What a ray finds at glass.
+/// The reflection and refraction of a ray at glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refraction {
-    /// The share that is mirrored, from 0 to 1: Fresnel's, of light without polarisation.
+    /// The reflected share, from 0 to 1, by Fresnel's equations for unpolarised light.
     pub(super) mirrored: f64,
-    /// Where the rest goes; of no meaning where all is mirrored.
+    /// The direction of the refracted ray; without meaning in total reflection.
     pub(super) direction: DVec3,
 }
 
-/// A ray of this direction at glass whose `normal` faces it. From `within` it leaves the inside; glass that `is_flat` has none,
-/// and is entered from both sides.
+/// Refracts a ray of this direction at glass whose `normal` faces it. A ray from `within` leaves the inside. Glass that
+/// `is_flat` has no inside, and is entered from both sides.
 pub(super) fn refract(
     glass: Glass,
     direction: DVec3,
@@ -27,10 +27,10 @@ pub(super) fn refract(
     if cosine <= 0.0 {
         return total;
     }
-    // Indices before and behind the surface.
+    // The indices of refraction before and behind the surface.
     let (before, behind) = if within && !is_flat { (glass.ior(), 1.0) } else { (1.0, glass.ior()) };
     let aside = direction + cosine * normal;
-    // Snell's law; the larger of two numbers may be of any size.
+    // Snell's law. The ratio may be infinite without this limit, because the larger index has no upper bound.
     let ratio = (before / behind).min(f64::MAX);
     let sine = aside.length() * ratio;
     if sine >= 1.0 {
@@ -42,19 +42,6 @@ pub(super) fn refract(
     let along = part(behind * cosine, before * cosine_behind);
     let straight = unit(aside * ratio - cosine_behind * normal);
     Refraction { mirrored: 0.5 * (across + along), direction: if is_flat { direction } else { straight } }
-}
-
-/// Whether an object, which is no instance, has no inside.
-pub(crate) fn is_flat(object: &Object) -> bool {
-    match object {
-        Object::Triangle(_) | Object::Disc(_) | Object::Plane(_) => true,
-        Object::Cuboid(cuboid) => cuboid.min().cmpeq(cuboid.max()).any(),
-        Object::Sphere(_)
-        | Object::Cylinder(_)
-        | Object::Cone(_)
-        | Object::Torus(_)
-        | Object::Instance(_) => false,
-    }
 }
 
 #[cfg(test)]
@@ -71,7 +58,7 @@ mod tests {
     fn glass_mirrors_by_fresnel_and_bends_by_snell() {
         let straight = at(0.0, 1.5, false, false);
         assert!((straight.mirrored - 0.04).abs() < 1e-15 && straight.direction == DVec3::NEG_Y);
-        // At Brewster's angle nothing of the light along the plane is mirrored.
+        // At Brewster's angle no light polarised along the plane of incidence is reflected.
         let brewster = 1.5f64.atan().to_degrees();
         let across = ((1.0 - 1.5f64.powi(2)) / (1.0 + 1.5f64.powi(2))).powi(2);
         assert!((at(brewster, 1.5, false, false).mirrored - 0.5 * across).abs() < 1e-15);
@@ -89,7 +76,7 @@ mod tests {
         assert_eq!(at(90.0, 1.0, false, false).mirrored.round(), 1.0);
         let grazing = refract(Glass::new(DVec3::ONE, 1.0).unwrap(), DVec3::X, DVec3::Y, false, false);
         assert_eq!(grazing.mirrored, 1.0);
-        // The very angle, by numbers without rounding: sin = 3/5 and an index of 5/3.
+        // The critical angle itself, in numbers without rounding: sin = 3/5 and an index of 5/3.
         let glass = Glass::new(DVec3::ONE, 0.6).unwrap();
         assert_eq!(refract(glass, DVec3::new(0.6, -0.8, 0.0), DVec3::Y, false, false).mirrored, 1.0);
     }

@@ -1,4 +1,4 @@
-//! What arrives at a surface from a light.
+//! The incident light at a surface.
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
@@ -9,29 +9,30 @@ use super::world::{World, glass};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
-/// The rounding of a lamp's place beside that of a surface, in roundoffs.
+/// The rounding error of a lamp's position relative to that of a surface, in roundoffs.
 const LAMP: f64 = 8.0 * f64::EPSILON;
 
-/// Where light comes from, seen from a hit.
-pub(super) struct Arriving {
-    /// Unit vector towards the light.
+/// The incident light from one light, at a hit.
+pub(super) struct IncidentLight {
+    /// The unit vector towards the light.
     pub(super) towards: DVec3,
-    /// If nothing stands in its way.
+    /// The colour of the light that arrives if nothing occludes it.
     pub(super) color: DVec3,
-    /// Where it ends; `None` for a light at infinity.
+    /// The position of the lamp; `None` for a directional light.
     lamp: Option<DVec3>,
 }
 
-/// From a `point` of the light: for a sun a unit vector towards it, for a lamp a place. `None` for a lamp at the hit itself.
-pub(super) fn arriving(light: &Light, point: DVec3, surface: &Surface) -> Option<Arriving> {
+/// Returns the light from a `point` of a light: for a sun a unit vector towards it, for a lamp a position. Returns
+/// `None` for a lamp at the hit itself.
+pub(super) fn arriving(light: &Light, point: DVec3, surface: &Surface) -> Option<IncidentLight> {
     match light {
-        Light::Directional(sun) => Some(Arriving { towards: point, color: sun.color(), lamp: None }),
+        Light::Directional(sun) => Some(IncidentLight { towards: point, color: sun.color(), lamp: None }),
         Light::Lamp(lamp) => from_lamp(lamp, point, surface),
     }
 }
 
-/// From a `place` of the lamp's ball.
-fn from_lamp(lamp: &Lamp, place: DVec3, surface: &Surface) -> Option<Arriving> {
+/// Returns the light from a `place` in the lamp's sphere.
+fn from_lamp(lamp: &Lamp, place: DVec3, surface: &Surface) -> Option<IncidentLight> {
     let towards = place - surface.point;
     if length(towards) <= surface.offset {
         return None;
@@ -46,17 +47,18 @@ fn from_lamp(lamp: &Lamp, place: DVec3, surface: &Surface) -> Option<Arriving> {
     } else {
         lamp.color()
     };
-    Some(Arriving { towards: unit(towards), color, lamp: Some(place) })
+    Some(IncidentLight { towards: unit(towards), color, lamp: Some(place) })
 }
 
-/// The length of a vector whose square may be beyond all numbers.
+/// Returns the length of a vector whose square may overflow.
 fn length(v: DVec3) -> f64 {
     let scale = below_inverse(v.abs().max_element());
     (v * scale).length() / scale
 }
 
-impl Arriving {
-    /// What is left of white light on its way to `start`, which is off the surface; `None` if something stands in the way.
+impl IncidentLight {
+    /// Returns the transmittance between the light and `start`, which is off the surface, or `None` if an opaque object
+    /// occludes the light.
     pub(super) fn let_through(&self, world: &World, start: DVec3) -> Option<DVec3> {
         if !world.has_glass {
             let hidden = world.objects.iter().any(|object| self.is_hidden_by(object, self.ray(start)));
@@ -70,7 +72,7 @@ impl Arriving {
                 break;
             }
             left = held(left * glass(object)?.color());
-            // Surfaces at the same distance are passed with it.
+            // The ray passes all surfaces at the same distance at once.
             let Surface { point, normal, offset, .. } = hit.surface;
             ray.origin = point - offset * normal;
         }
@@ -87,7 +89,7 @@ impl Arriving {
         })
     }
 
-    /// Whether a surface lies before the light: one at the very place of a lamp does not.
+    /// Returns whether a surface is in front of the light. A surface at the position of a lamp is not.
     fn is_before(&self, ray: Ray, distance: f64, surface: &Surface) -> bool {
         let Some(lamp) = self.lamp else { return true };
         let apart = (lamp - surface.point).dot(surface.normal).abs();
@@ -95,8 +97,8 @@ impl Arriving {
     }
 }
 
-/// The highlight of light `towards` which is seen from `towards_eye`, both unit vectors: max(0, N·h)ⁿ for the vector h
-/// halfway between them.
+/// Returns the highlight of light from `towards` as seen from `towards_eye`, both unit vectors: max(0, N·h)ⁿ with the
+/// vector h halfway between them.
 pub(crate) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_eye: DVec3) -> f64 {
     let sum = towards + towards_eye;
     if sum == DVec3::ZERO {
@@ -109,14 +111,15 @@ pub(crate) fn highlight(shine: &Shine, normal: DVec3, towards: DVec3, towards_ey
     } else if cosine < STEEP {
         power(cosine, shine.exponent())
     } else {
-        // From the sine, which is small and therefore known better: cosⁿ = (1 - sin²)^(n/2).
+        // From the sine, which is small and therefore more accurate: cosⁿ = (1 - sin²)^(n/2).
         let sine = normal.cross(halfway).length_squared().min(1.0);
         let half = 0.5 * shine.exponent();
         if half <= SMALL { power(1.0 - sine, half) } else { libm::exp(half * libm::log1p(-sine)) }
     }
 }
 
-/// `x` from 0 to 1 to a power that is not negative. Whole ones, which most scripts have, and their halves take few products.
+/// Returns `x`, from 0 to 1, to a power that is not negative. Whole exponents, which most scripts have, and their
+/// halves take few products.
 fn power(x: f64, exponent: f64) -> f64 {
     let whole = exponent as u32;
     let left = exponent - f64::from(whole);
@@ -135,15 +138,16 @@ fn power(x: f64, exponent: f64) -> f64 {
     product
 }
 
-/// The largest number instead of infinity, from which nothing could be taken away.
+/// Replaces infinities by the largest finite number. Infinities cannot be subtracted from each other.
 pub(super) fn held(color: DVec3) -> DVec3 {
     color.clamp(DVec3::MIN, DVec3::MAX)
 }
 
-/// Up to this exponent the roundings of products cannot be seen: together they are less than so many roundoffs.
+/// The largest exponent for which powers are computed by products. Together their rounding errors are less than this
+/// many roundoffs, which is invisible.
 const SMALL: f64 = 1024.0;
 
-/// Above this cosine the sine says more.
+/// The cosine above which the sine is more accurate.
 const STEEP: f64 = 0.9;
 
 #[cfg(test)]

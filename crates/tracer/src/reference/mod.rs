@@ -1,8 +1,8 @@
-//! The plain tracer, by which everything faster is judged.
+//! The reference tracer, which every faster tracer is tested against.
 //!
-//! One ray after another, every object for every ray, all in `f64`, in the words of the scene language. It is written
-//! to be read and to be right, and knows nothing of packets, tiles or trees. Its own rounding errors are bounded where
-//! they arise ([`Surface::offset`]), relative to the numbers at hand.
+//! It traces one ray after another and tests every object for every ray, all in `f64`, in the terms of the scene
+//! language. It is written for clarity and correctness, without packets, tiles or trees. Its own rounding errors have
+//! bounds where they arise ([`Surface::offset`]), relative to the numbers involved.
 //!
 //! ```
 //! use glam::DVec3;
@@ -32,14 +32,15 @@ use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
 
-pub(crate) use glass::is_flat;
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
 pub(crate) use sampled::render_rows as render_exposed_rows;
 pub use sampled::{Estimate, estimate, render_exposed};
 pub(crate) use shading::{FAINT, FAINT_LINEAR};
 pub use shapes::Surface;
-pub(crate) use shapes::{normal_and_width, power, triangle_normal};
+pub(crate) use shapes::{
+    Place, has_inside, is_flat_at, normal_and_width, power, triangle_normal, turns_axes_to_axes,
+};
 pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
@@ -48,26 +49,26 @@ use crate::{RenderError, RenderOptions};
 use shading::Shader;
 use world::World;
 
-/// Where a ray meets an object first.
+/// The first hit of a ray with an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Position of the object in the script, from 0.
+    /// The position of the object in the script, from 0.
     pub object: usize,
-    /// Distance from the ray's origin, in world units, greater than zero.
+    /// The distance from the ray's origin, in world units, greater than zero.
     pub distance: f64,
-    /// The surface there.
+    /// The surface at the hit.
     pub surface: Surface,
 }
 
-/// Draws a scene with the plain tracer, a single ray a pixel.
+/// Draws a scene with the reference tracer, one ray per pixel.
 ///
 /// # Errors
-/// Those of [`crate::render`].
+/// The errors of [`crate::render`].
 pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     render_rows(scene, 0..scene.screen.height(), options)
 }
 
-/// The same, of some of its rows.
+/// Draws some rows of a scene with the reference tracer.
 fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     let world = World::new(scene);
     let lights = world.middles();
@@ -87,19 +88,19 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
             }
         },
     )?;
-    // A pixel of much glass is given up halfway.
+    // A pixel with much glass stops halfway if the picture is cancelled.
     if shader.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
 }
 
-/// The colour of a pixel, unclamped; `i` counts from the left, `j` from the bottom.
+/// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     let world = World::new(scene);
     let ray = world.rays.ray(f64::from(i), f64::from(j));
     Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces())
 }
 
-/// The nearest hit of a ray; of equal hits, which are within the bound on rounding of each other, one without glass, and of those
-/// that of the object which comes first.
+/// Returns the nearest hit of a ray. Hits are equal if they are within the bound on rounding errors of each other. If
+/// hits are equal, one without glass wins, and among those the one of the object that comes first.
 ///
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
@@ -171,7 +172,8 @@ mod tests {
 
     #[test]
     fn an_eye_next_to_a_surface_stays_on_its_side() {
-        // 1e-16 and 8e-16 from the surface of a sphere whose centre cannot be told from the eye without rounding.
+        // 1e-16 and 8e-16 from the surface of a sphere. The difference of its centre and the eye cannot be computed
+        // without rounding.
         let eye = DVec3::new(-0.4922580368599684, -0.3291578856127372, -0.45973944677895595);
         let ball = |radius: f64| {
             let center = DVec3::new(eye.x, 5.269517229842112, eye.z);

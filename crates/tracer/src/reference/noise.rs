@@ -20,7 +20,7 @@ const PERMUTATION: [u8; 256] = [
     66, 215, 61, 156, 180,
 ];
 
-/// The noise at a place, about -1 to 1; its lattice repeats after 256 in each direction.
+/// Returns the noise at a point, from about -1 to 1. Its lattice repeats after 256 in each direction.
 pub(super) fn noise(place: DVec3) -> f64 {
     let cell = DVec3::from_array(place.to_array().map(floor));
     let within = place - cell;
@@ -43,7 +43,7 @@ fn mix(part: f64, a: f64, b: f64) -> f64 {
     a + part * (b - a)
 }
 
-/// The 12 directions to the middles of a cube's edges, four of which count twice.
+/// The 12 directions to the midpoints of a cube's edges, four of which are repeated.
 const GRADIENTS: [DVec3; 16] = [
     DVec3::new(1.0, 1.0, 0.0),
     DVec3::new(-1.0, 1.0, 0.0),
@@ -63,7 +63,7 @@ const GRADIENTS: [DVec3; 16] = [
     DVec3::new(0.0, -1.0, -1.0),
 ];
 
-/// The scalar product with one of them, whose ones and zeros are no branches.
+/// Returns the dot product with one of the gradients. Their ones and zeros take no branches.
 fn gradient(hash: usize, v: DVec3) -> f64 {
     GRADIENTS[hash % GRADIENTS.len()].dot(v)
 }

@@ -1,22 +1,23 @@
-//! The coefficients of a surface at a place: patterns.
+//! The coefficients of a surface at a point: patterns.
 //!
-//! Patterns are read off the numbers of the script, not off the world: what is seen from the eye is taken back to where the
-//! script has it.
+//! Patterns are evaluated in the coordinates of the script, not of the world. A hit in the coordinates of the eye is
+//! transformed back to them.
 
 use glam::DVec3;
 use rayfold_scene::model::Weight;
 use rayfold_scene::{Coefficients, Object};
 
 use super::noise::noise;
-use super::shapes::Surface;
+use super::shapes::{Surface, face};
 use super::whole::{ceil, is_odd};
 
-/// A number this near to a wall between cells, beside 1 and itself, is on it, if it is a number of the script.
+/// The distance below which a number of the script is on a wall between cells, relative to the larger of 1 and the
+/// number.
 const WALL: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// The coefficients of an object's surface.
+/// Returns the coefficients of an object's surface.
 ///
-/// `place` is where it is hit and `normal` its normal, in the coordinates of the object's numbers; `object` is not an
+/// `place` is the hit point and `normal` its normal, in the coordinates of the object's numbers. `object` is not an
 /// instance.
 pub(crate) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface: &Surface) -> Coefficients {
     let material = object.material();
@@ -26,7 +27,7 @@ pub(crate) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface
     own.mixed(&pattern.other, weight(pattern.weight, place, face))
 }
 
-/// How much there is of the other coefficients. A `face` is square to an axis, at a number of the script.
+/// Returns the share of the other coefficients. A `face` is perpendicular to an axis, at a number of the script.
 fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
     let odd = |is_odd: bool| if is_odd { 1.0 } else { 0.0 };
     let cell = |axis: usize, size: f64| match face {
@@ -42,7 +43,7 @@ fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
         None => place,
     };
     match weight {
-        // The parity of each, as a sum of large numbers is rounded.
+        // The parity of each number, because the sum of large numbers is rounded.
         Weight::Checker(size) => {
             let [x, y, z] = [0, 1, 2].map(|axis| is_odd(cell(axis, size)));
             odd(x ^ y ^ z)
@@ -56,59 +57,11 @@ fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
     }
 }
 
-/// The cell of a number of the script, in cells: numbers all but on a wall are on it.
+/// Returns the cell of a number of the script, in units of cells. A number that is nearly on a wall is on it.
 fn cell_of_number(x: f64) -> f64 {
     let whole = x.round();
     let x = if (x - whole).abs() <= WALL * x.abs().max(1.0) { whole } else { x };
     ceil(x) - 1.0
-}
-
-/// The axis that a flat part is square to, and its number on that axis in the script.
-fn face(object: &Object, place: DVec3, normal: DVec3) -> Option<(usize, f64)> {
-    let nearest = |axis: usize, a: DVec3, b: DVec3| {
-        let (a, b) = (a[axis], b[axis]);
-        if (place[axis] - a).abs() <= (place[axis] - b).abs() { a } else { b }
-    };
-    match object {
-        Object::Cuboid(cuboid) => {
-            let axis = largest(normal);
-            Some((axis, nearest(axis, cuboid.min(), cuboid.max())))
-        }
-        Object::Triangle(triangle) => {
-            let [u, v, w] = triangle.vertices();
-            let axis = (0..3).find(|&axis| u[axis] == v[axis] && v[axis] == w[axis])?;
-            Some((axis, u[axis]))
-        }
-        Object::Plane(plane) => along_an_axis(plane.normal()).map(|axis| (axis, plane.point()[axis])),
-        Object::Disc(disc) => along_an_axis(disc.normal()).map(|axis| (axis, disc.center()[axis])),
-        Object::Cylinder(cylinder) => cap(cylinder.ends(), nearest),
-        Object::Cone(cone) => cap(cone.ends(), nearest),
-        Object::Sphere(_) | Object::Torus(_) | Object::Instance(_) => None,
-    }
-}
-
-fn cap([a, b]: [DVec3; 2], nearest: impl Fn(usize, DVec3, DVec3) -> f64) -> Option<(usize, f64)> {
-    let mut differing = (0..3).filter(|&axis| a[axis] != b[axis]);
-    let axis = differing.next()?;
-    differing.next().is_none().then(|| (axis, nearest(axis, a, b)))
-}
-
-/// The axis along which a direction runs exactly.
-fn along_an_axis(direction: DVec3) -> Option<usize> {
-    let mut other = (0..3).filter(|&axis| direction[axis] != 0.0);
-    let axis = other.next()?;
-    other.next().is_none().then_some(axis)
-}
-
-fn largest(v: DVec3) -> usize {
-    let v = v.abs();
-    if v.x >= v.y && v.x >= v.z {
-        0
-    } else if v.y >= v.z {
-        1
-    } else {
-        2
-    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Pixels that are means, in the words of the language: points of the square, of the lens, of the lights, and moments.
+//! Pixels as means of samples, in the terms of the language: points of the pixel's square, of the lens and of the
+//! lights, and moments.
 
 use core::ops::Range;
 
@@ -22,15 +23,15 @@ struct Moment<'a> {
     bounces: u32,
 }
 
-/// Draws a scene by the same samples as the kernels, all that it may have in every pixel.
+/// Draws a scene with the samples of the kernels, and with the largest number of them in every pixel.
 ///
 /// # Errors
-/// Those of [`crate::render`].
+/// The errors of [`crate::render`].
 pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<RgbImage, RenderError> {
     render_rows(exposure, 0..exposure.scene().screen.height(), options)
 }
 
-/// The same, of some of its rows.
+/// Draws some rows of a scene with these samples.
 pub(crate) fn render_rows(
     exposure: Exposure,
     rows: Range<u32>,
@@ -72,7 +73,7 @@ pub(crate) fn render_rows(
 }
 
 impl Moment<'_> {
-    /// The colour of a sample of a pixel, clamped; rows count from the top. `number` gives its coordinates.
+    /// Returns the colour of a sample of a pixel, clamped. Rows count from the top. `number` gives its coordinates.
     fn color(
         &self,
         scene: &Scene,
@@ -86,11 +87,11 @@ impl Moment<'_> {
         let lights = self.light_points(&number);
         let shader = Shader { world: &self.world, lights: &lights, cancel: options.cancel };
         let color = shader.color(ray, self.bounces);
-        // What is not a number is black.
+        // A NaN is black.
         DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO)
     }
 
-    /// From a point of the lens through where the eye's own ray is in focus.
+    /// Returns the ray from a point of the lens through the point where the eye's own ray is in focus.
     fn ray(&self, i: f64, j: f64, number: impl Fn(usize) -> f64) -> Ray {
         let World { scene, rays, .. } = &self.world;
         let ray = rays.ray(i, j);
@@ -103,7 +104,7 @@ impl Moment<'_> {
         let distance = scene.lens.distance().unwrap_or(own);
         let at = scene.lens.radius() * on_disc(number(first), number(first + 1));
         let offset = at.x * u + at.y * v;
-        // As far as 1 along the gaze.
+        // Scaled to a component of 1 along the view direction.
         let along = ray.direction / -ray.direction.dot(w);
         Ray { origin: ray.origin + offset, direction: (along - offset / distance).normalize() }
     }
@@ -128,17 +129,17 @@ impl Moment<'_> {
     }
 }
 
-/// What a picture is, before it is rounded: the means of independent samples.
+/// An estimate of a picture before it is rounded: the means of independent samples.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// Row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
+    /// The means of the pixels, row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
     pub means: Vec<DVec3>,
-    /// Their standard errors.
+    /// The standard errors of the means.
     pub errors: Vec<DVec3>,
 }
 
-/// Estimates a picture by independent random samples, as many in every pixel: what sampled pictures are judged by. All pixels
-/// share the moment of a sample.
+/// Estimates a picture by independent random samples, the same number in every pixel. Sampled pictures are tested
+/// against it. All pixels share the moment of a sample.
 pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
     use rayon::prelude::*;
 
@@ -177,7 +178,7 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
     Estimate { errors: errors.collect(), means }
 }
 
-/// A number above 0 and below 1: the SplitMix64 hash of Steele, Lea and Flood (2014).
+/// Returns a number above 0 and below 1: the SplitMix64 hash of Steele, Lea and Flood (2014).
 fn independent(seed: u64, place: u64, sample: u64, dimension: usize) -> f64 {
     let mixed = |mut x: u64| {
         x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -1,42 +1,43 @@
-//! The colour along a ray, in the words of the language.
+//! The colour along a ray, in the terms of the language.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
 use rayfold_scene::Tone;
 
-use super::glass::{Refraction, is_flat, refract};
+use super::glass::{Refraction, refract};
 use super::light::{arriving, held, highlight};
 use super::pattern::coefficients;
+use super::shapes::has_inside;
 use super::world::{World, glass};
 use crate::camera::Ray;
 
-/// Once a path has met glass, a ray that counts for less than this in every channel is not followed.
+/// The weight below which, in every channel, a ray is not followed once its path has met glass.
 pub(crate) const FAINT: f64 = 1.0 / 4096.0;
 
-/// The same where the picture is of linear light, whose dark tones are spread.
+/// The limit of the weight for pictures of linear light, whose tone curve expands dark tones.
 pub(crate) const FAINT_LINEAR: f64 = 1.0 / 65536.0;
 
-/// Follows rays.
+/// A shader: traces rays and computes their colours.
 pub(super) struct Shader<'a> {
     pub(super) world: &'a World<'a>,
-    /// The point of each light, as [`arriving`] takes it.
+    /// The sampled point of each light, as for [`arriving`].
     pub(super) lights: &'a [DVec3],
     pub(super) cancel: Option<&'a AtomicBool>,
 }
 
-/// A way from the camera.
+/// A path from the camera.
 #[derive(Clone, Copy)]
 struct Path {
-    /// So many more mirrorings and refractions are followed.
+    /// The number of further reflections and refractions that are followed.
     bounces: u32,
-    /// The product of all factors so far, absolute.
+    /// The absolute value of the product of all factors so far.
     weight: DVec3,
     has_met_glass: bool,
 }
 
 impl Shader<'_> {
-    /// The colour along a ray from the camera, unclamped.
+    /// Returns the colour along a ray from the camera, unclamped.
     pub(super) fn color(&self, ray: Ray, bounces: u32) -> DVec3 {
         self.color_along(ray, Path { bounces, weight: DVec3::ONE, has_met_glass: false })
     }
@@ -80,20 +81,20 @@ impl Shader<'_> {
         let mut refracted = None;
         if let Some(glass) = glass(object) {
             let Refraction { mirrored, direction } =
-                refract(glass, ray.direction, normal, hit.surface.within, is_flat(object));
+                refract(glass, ray.direction, normal, hit.surface.within, !has_inside(object));
             factor += mirrored;
             refracted = Some(((1.0 - mirrored) * glass.color(), direction));
         }
         let has_met_glass = path.has_met_glass || refracted.is_some();
-        if let Some(path) = self.onwards(path, factor, has_met_glass) {
-            // The normal faces the ray; where rounding says otherwise, the ray grazes.
+        if let Some(path) = self.scattered(path, factor, has_met_glass) {
+            // The normal faces the ray. If rounding has changed the sign, the ray grazes.
             let towards_surface = ray.direction.dot(normal).min(0.0);
             let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
             let mirrored = self.color_along(Ray { origin: start, direction }, path);
             color = held(color + factor * mirrored);
         }
         if let Some((factor, direction)) = refracted
-            && let Some(path) = self.onwards(path, factor, has_met_glass)
+            && let Some(path) = self.scattered(path, factor, has_met_glass)
         {
             let origin = hit.surface.point - hit.surface.offset * normal;
             let seen = self.color_along(Ray { origin, direction }, path);
@@ -102,8 +103,8 @@ impl Shader<'_> {
         color
     }
 
-    /// The path of a ray that counts by this factor; `None` where it is not followed.
-    fn onwards(&self, path: Path, factor: DVec3, has_met_glass: bool) -> Option<Path> {
+    /// Returns the path of a ray with this factor, or `None` if it is not followed.
+    fn scattered(&self, path: Path, factor: DVec3, has_met_glass: bool) -> Option<Path> {
         let weight = held(path.weight * factor.abs());
         let faint = match self.world.scene.tone {
             Tone::Plain => FAINT,
@@ -148,7 +149,7 @@ mod tests {
         scene
     }
 
-    /// What a ray sees that goes straight down from a height of 5.
+    /// Returns the colour along a ray that goes straight down from a height of 5.
     fn down(scene: &Scene, x: f64) -> f64 {
         let ray = Ray { origin: DVec3::new(x, 5.0, 0.0), direction: DVec3::NEG_Y };
         let world = World::new(scene);
@@ -162,15 +163,16 @@ mod tests {
     #[test]
     fn panes_let_through_what_they_do_not_mirror() {
         let floor = || disc(0.0, matte(1.0, 0.0));
-        // An index of 1 mirrors nothing: each surface counts by its coefficient, those at one place once.
+        // An index of 1 reflects no light. Each surface multiplies by its coefficient; surfaces at one place multiply
+        // once.
         assert_eq!(down(&scene(vec![floor(), disc(1.0, pane(0.5, 1.0))], None), 0.0), 0.5);
         assert_eq!(down(&scene(vec![floor(), brick(1.0, 2.0, pane(0.5, 1.0))], None), 0.0), 0.25);
         let stacked = vec![floor(), brick(1.0, 2.0, pane(0.5, 1.0)), brick(2.0, 3.0, pane(0.25, 1.0))];
         assert_eq!(down(&scene(stacked, None), 0.0), 0.0625);
-        // 4 % at the front of a pane: what it mirrors is black here.
+        // 4 % at the front of a pane: its reflection is black here.
         let mirrored = down(&scene(vec![floor(), disc(1.0, pane(1.0, 1.5))], None), 0.0);
         assert!((mirrored - 0.96).abs() < 1e-15);
-        // On the floor the floor is seen, whichever comes first.
+        // A pane that coincides with the floor does not hide it, in either order.
         assert_eq!(down(&scene(vec![disc(0.0, pane(0.5, 1.5)), floor()], None), 0.0), 1.0);
     }
 

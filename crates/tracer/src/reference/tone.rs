@@ -1,11 +1,11 @@
-//! From colours to the levels of a picture.
+//! The conversion of colours to the levels of a picture.
 
 use glam::DVec3;
 use rayfold_scene::Tone;
 
 use crate::parallel::CHANNELS;
 
-/// A colour as the levels of a pixel.
+/// Returns the levels of a pixel of this colour.
 pub(crate) fn toned(tone: Tone, color: DVec3) -> [u8; CHANNELS] {
     levels(match tone {
         Tone::Plain => color,
@@ -13,13 +13,13 @@ pub(crate) fn toned(tone: Tone, color: DVec3) -> [u8; CHANNELS] {
     })
 }
 
-/// The sRGB curve (IEC 61966-2-1) of a channel of linear light, which is clamped.
+/// Returns a channel of linear light, clamped, encoded by the sRGB curve (IEC 61966-2-1).
 pub(crate) fn encoded(light: f64) -> f64 {
     let light = light.clamp(0.0, 1.0);
     if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055 }
 }
 
-/// Display values to the levels of a channel.
+/// Converts display values to the levels of the channels.
 pub(crate) fn levels(color: DVec3) -> [u8; CHANNELS] {
     #[cfg(feature = "accuracy")]
     crate::nans::add(color.is_nan_mask().bitmask().count_ones());

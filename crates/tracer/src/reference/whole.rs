@@ -1,13 +1,13 @@
-//! Whole numbers in `f64`, without the library calls that `floor` and the remainder are where the compiler knows of no
-//! instruction for them: patterns ask for some of each in every pixel.
+//! Whole numbers in `f64`. On targets without an instruction for them, `floor` and the remainder are library calls,
+//! which this module avoids: patterns need some of each in every pixel.
 
-/// From here on every number is whole.
+/// The bound from which every number is whole.
 const ALL_WHOLE: f64 = (1u64 << f64::MANTISSA_DIGITS) as f64;
 
-/// From here on every number is a multiple of 256.
+/// The bound from which every number is a multiple of 256.
 const ALL_ROUND: f64 = 256.0 * ALL_WHOLE;
 
-/// The largest whole number that is not larger.
+/// Returns the largest whole number that is not larger.
 pub(super) fn floor(x: f64) -> f64 {
     if x.abs() < ALL_WHOLE {
         let towards_zero = x as i64 as f64;
@@ -17,17 +17,17 @@ pub(super) fn floor(x: f64) -> f64 {
     }
 }
 
-/// The smallest whole number that is not smaller.
+/// Returns the smallest whole number that is not smaller.
 pub(super) fn ceil(x: f64) -> f64 {
     -floor(-x)
 }
 
-/// The remainder, from 0 to 255, of a whole number divided by 256, however large or negative it is; 0 for what is no number.
+/// Returns the remainder, from 0 to 255, of a whole number of any size and sign divided by 256; 0 for a NaN.
 pub(super) fn remainder(whole: f64) -> u8 {
     if whole.abs() < ALL_ROUND { whole as i64 as u8 } else { 0 }
 }
 
-/// Whether a whole number is odd.
+/// Returns whether a whole number is odd.
 pub(super) fn is_odd(whole: f64) -> bool {
     remainder(whole) % 2 == 1
 }

@@ -1,4 +1,4 @@
-//! A scene as the plain tracer sees it: with the eye at the origin, and groups written out where that is exact.
+//! A scene for the reference tracer: with the eye at the origin, and groups expanded where that is exact.
 
 use std::borrow::Cow;
 
@@ -10,23 +10,23 @@ use super::Hit;
 use super::shapes::{self, Surface};
 use crate::camera::{Ray, Rays, Single};
 
-/// What rays are sent through.
+/// The world that rays are traced through.
 pub(super) struct World<'a> {
-    /// As the script has it.
+    /// The scene of the script.
     pub(super) scene: &'a Scene,
     pub(super) rays: Rays,
-    /// In the order of the script, in coordinates whose origin is `center`.
+    /// The objects in the order of the script, in coordinates whose origin is `center`.
     pub(super) objects: Cow<'a, [Object]>,
-    /// The same.
+    /// The lights in the order of the script, in the same coordinates.
     pub(super) lights: Cow<'a, [Light]>,
-    /// Where the origin of these coordinates lies in those of the script.
+    /// The origin of these coordinates in those of the script.
     center: DVec3,
     pub(super) has_glass: bool,
 }
 
 impl<'a> World<'a> {
-    /// With the eye at the origin: what is seen then has coordinates as small as it is near, wherever all of it lies. As it
-    /// is, where it cannot be moved, or where rounding would take the eye through a surface.
+    /// Makes the world with the eye at the origin, so that coordinates are small for objects that are near. Keeps the
+    /// coordinates of the script if the scene cannot be moved, or if rounding would move the eye through a surface.
     pub(super) fn new(scene: &'a Scene) -> Self {
         let rays = Rays::new(&scene.camera, scene.screen, Single::of(scene));
         let has_groups = scene.objects.iter().any(|object| matches!(object, Object::Instance(_)));
@@ -69,7 +69,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// The middle of each light: for a sun the unit vector towards it, for a lamp its place.
+    /// Returns the centre of each light: for a sun the unit vector towards it, for a lamp its position.
     pub(super) fn middles(&self) -> Vec<DVec3> {
         let middle = |light: &Light| match light {
             Light::Directional(sun) => -unit(sun.direction()),
@@ -82,36 +82,42 @@ impl<'a> World<'a> {
         nearest(&self.objects, ray, self.center)
     }
 
-    /// Where a surface is hit, and its normal, in the coordinates of its object's numbers; and the object, which is not an
-    /// instance.
+    /// Returns the object, which is not an instance, and the hit point and its normal in the coordinates of the
+    /// object's numbers.
     pub(super) fn in_script(&self, object: usize, surface: &Surface) -> (&Object, DVec3, DVec3) {
         let Object::Instance(of_group) = &self.scene.objects[object] else {
             return (&self.scene.objects[object], surface.point + self.center, surface.normal);
         };
-        // As it is drawn, where it is drawn as an instance: nearer to the eye.
+        // An object that is drawn as an instance is transformed by the drawn instance, whose coordinates are nearer to
+        // the eye.
         let placed = match &self.objects[object] {
-            Object::Instance(drawn) => drawn.placement().local_point(surface.point),
+            Object::Instance(drawn) => {
+                let (drawn, own) = (drawn.placement(), of_group.placement());
+                // Where the group's own numbers count from the eye.
+                let eye = own.local_point(self.center) - drawn.local_point(DVec3::ZERO);
+                drawn.local_point(surface.point) + eye
+            }
             _ => of_group.placement().local_point(surface.point + self.center),
         };
         (of_group.object(), placed, of_group.placement().rotation().transpose() * surface.normal)
     }
 }
 
-/// How far apart hits may be that count as equal, in roundoffs of the distance and of numbers that were rounded before: those
-/// by which new rays start off curved surfaces.
+/// The distance within which hits count as equal, in roundoffs of the distance and of numbers that were rounded before:
+/// the offset of new rays from curved surfaces.
 const EQUAL: f64 = 32.0 * f64::EPSILON;
 
-/// The sine of the angle between surfaces above which they cross, and are not one.
+/// The sine of the angle between two surfaces above which they cross and do not coincide.
 const PARALLEL: f64 = 1.0 / (1u64 << 20) as f64;
 
-/// Hits farther apart than this, for the numbers that take part, are not looked at any closer.
+/// The distance, relative to the numbers in the computation, above which hits are not compared further.
 const APART: f64 = 1.0 / (1u64 << 30) as f64;
 
-/// The nearest hit; see [`super::nearest`]. No object is an instance that could be moved into the world. The objects' own
-/// numbers were rounded when they were moved by `center`.
+/// Returns the nearest hit; see [`super::nearest`]. No object is an instance that could be expanded into the world. The
+/// objects' own numbers were rounded when they were moved by `center`.
 ///
-/// Hits are equal to the nearest if they are no farther from its surface than new rays start off both, and the surfaces are
-/// parallel there. Rays that go on start off all of them.
+/// Hits are equal to the nearest if they are no farther from its surface than the offsets of new rays from both, and
+/// the surfaces are parallel there. The start of a new ray is outside all of them.
 pub(super) fn nearest(objects: &[Object], ray: Ray, center: DVec3) -> Option<Hit> {
     let rank = |index: usize| (glass(&objects[index]).is_some(), index);
     let mut best: Option<(usize, f64)> = None;
@@ -154,7 +160,7 @@ pub(super) fn nearest(objects: &[Object], ray: Ray, center: DVec3) -> Option<Hit
     Some(hit)
 }
 
-/// What an object lets through.
+/// Returns the glass of an object.
 pub(super) fn glass(object: &Object) -> Option<Glass> {
     object.material().finish().and_then(|finish| finish.glass)
 }

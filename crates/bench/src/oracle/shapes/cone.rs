@@ -1,4 +1,4 @@
-//! Cones and cylinders: the quadric that the side is a part of, and two discs.
+//! Cones and cylinders: the quadric that contains the side, and two discs.
 
 use glam::DVec3;
 use rayfold_scene::{Cone, Cylinder};
@@ -8,11 +8,11 @@ use super::{Shape, is_at_most};
 use crate::oracle::line::Line;
 use crate::oracle::real::{Real, Vector};
 
-/// Either of them.
+/// A cone or a cylinder.
 struct Round {
     radii: [Real; 2],
     ends: [Vector; 2],
-    /// From one end to the other, and the square of that.
+    /// The vector from one end to the other, followed by the square of its length.
     axis: Vector,
     square: Real,
 }
@@ -25,17 +25,17 @@ impl Round {
         Self { radii: radii.map(Real::from), ends, axis, square }
     }
 
-    /// How much the radius grows from end to end.
+    /// Returns the increase of the radius from end to end.
     fn growth(&self) -> Real {
         &self.radii[1] - &self.radii[0]
     }
 
-    /// The share of the axis, from 0 to 1 between the ends.
+    /// Returns the height along the axis, from 0 at the first end to 1 at the second.
     fn height(&self, point: &Vector) -> Real {
         point.minus(&self.ends[0]).dot(&self.axis).over(&self.square)
     }
 
-    /// Where the line meets the quadric |(p - a) × v|²·v² = (Ra·v² + (Rb - Ra)·((p - a)·v))².
+    /// Returns the hits of the line with the quadric |(p - a) × v|²·v² = (Ra·v² + (Rb - Ra)·((p - a)·v))².
     fn side(&self, line: &Line) -> Vec<Real> {
         let from = line.origin.minus(&self.ends[0]);
         let (turn, start) = (line.direction.cross(&self.axis), from.cross(&self.axis));
@@ -76,7 +76,7 @@ impl Round {
         height >= -&hair && height <= &Real::from(1.0) + &hair
     }
 
-    /// The end whose cap a point lies on, unless it lies on the side too.
+    /// Returns the end whose cap contains the point, unless the point is on the side too.
     fn cap(&self, point: &Vector) -> Option<usize> {
         let height = self.height(point);
         let aside = point.minus(&self.ends[0]).plus(&-&height, &self.axis);
@@ -96,13 +96,13 @@ impl Round {
             Some(0) => self.axis.unit().opposite(),
             Some(_) => self.axis.unit(),
             None => {
-                // Square to the line of the side through the point: away from the axis, and against the growth.
+                // Perpendicular to the side: away from the axis, and against the growth of the radius.
                 let height = self.height(&point);
                 let aside = point.minus(&self.ends[0]).plus(&-&height, &self.axis);
                 let length = aside.dot(&aside).root();
                 let size = self.square.root();
                 let away = if length < size.shifted(-280) {
-                    // At a tip: from where the ray comes.
+                    // At a tip: opposite to the ray.
                     let along = line.direction.dot(&self.axis).over(&self.square);
                     let aside = line.direction.plus(&-&along, &self.axis).opposite();
                     if aside.dot(&aside) < line.direction.dot(&line.direction).shifted(-500) {

@@ -1,4 +1,4 @@
-//! Boxes along the axes.
+//! Axis-aligned boxes.
 
 use glam::DVec3;
 use rayfold_scene::Cuboid;
@@ -12,12 +12,17 @@ impl Shape for Cuboid {
         self.corners().iter().map(|v| v.abs().max_element()).fold(0.0, f64::max)
     }
 
+    fn has_inside(&self) -> bool {
+        (0..3).all(|axis| self.min()[axis] < self.max()[axis])
+    }
+
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {
         let [enter, leave] = slabs(self, line)?.map(|(at, _)| at.value());
         if enter > *start { Some(enter) } else { (leave > *start).then_some(leave) }
     }
 
-    /// On an edge that of the first axis which leads there, but of a rectangle its own.
+    /// On an edge the normal is that of the first axis whose face leads to the edge. A rectangle always has its own
+    /// normal.
     fn outward(&self, line: &Line, t: &Real) -> Vector {
         let Some((axis, entering)) = met(self, line, t) else { return DVec3::ZERO.into() };
         let upwards = (line.direction.0[axis].sign() > 0) != entering;
@@ -31,7 +36,7 @@ impl Shape for Cuboid {
     }
 }
 
-/// The axis whose face is met at `t`, and whether the line enters there.
+/// Returns the axis of the face that is hit at `t`, and whether the line enters there.
 fn met(cuboid: &Cuboid, line: &Line, t: &Real) -> Option<(usize, bool)> {
     let [(enter, first), (_, last)] = slabs(cuboid, line)?;
     let mut flat = (0..3).filter(|&axis| cuboid.min()[axis] == cuboid.max()[axis]);
@@ -40,7 +45,7 @@ fn met(cuboid: &Cuboid, line: &Line, t: &Real) -> Option<(usize, bool)> {
     Some(if (&enter.value() - t).sign() == 0 { (first, true) } else { (last, false) })
 }
 
-/// A quotient that is compared without being computed; the divisor is positive.
+/// A quotient that is compared without a division. The divisor is positive.
 #[derive(Clone)]
 struct Fraction {
     over: Real,
@@ -65,7 +70,7 @@ impl Fraction {
     }
 }
 
-/// Where the line enters and leaves the closed box, each with its axis.
+/// Returns the distances at which the line enters and leaves the closed box, each with its axis.
 fn slabs(cuboid: &Cuboid, line: &Line) -> Option<[(Fraction, usize); 2]> {
     let mut enter: Option<(Fraction, usize)> = None;
     let mut leave: Option<(Fraction, usize)> = None;
@@ -111,7 +116,7 @@ mod tests {
         assert_eq!(t(&object, [1.0 + 1e-15, 0.0, 4.0], [0.0, 0.0, -1.0]), None);
         assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]), Some(2.0), "from a face inwards");
         assert_eq!(t(&object, [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), None, "from a face outwards");
-        // An edge at a third, which no binary fraction is.
+        // An edge at a third, which is no binary fraction.
         assert!(t(&object, [2.0, 2.0 - 3.0, 0.1], [-1.0, 2.0, 0.0]).is_some());
     }
 }

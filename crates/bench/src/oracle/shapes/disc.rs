@@ -12,6 +12,10 @@ impl Shape for Disc {
         self.center().abs().max_element() + self.radius()
     }
 
+    fn has_inside(&self) -> bool {
+        false
+    }
+
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {
         let center = self.center().into();
         let t = crossing(line, &center, &self.normal().into())?;

@@ -1,4 +1,4 @@
-//! Objects of groups: the line in the group's coordinates has the same lengths.
+//! Objects of groups. In the group's coordinates the line has the same distances.
 
 use rayfold_scene::Instance;
 
@@ -11,6 +11,10 @@ impl Shape for Instance {
         let placement = self.placement();
         placement.translation().abs().max_element()
             + 3.0 * placement.scale() * super::shape(self.object()).extent()
+    }
+
+    fn has_inside(&self) -> bool {
+        super::has_inside(self.object())
     }
 
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {

@@ -11,6 +11,10 @@ impl Shape for Plane {
         self.point().abs().max_element()
     }
 
+    fn has_inside(&self) -> bool {
+        false
+    }
+
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {
         crossing(line, &self.point().into(), &self.normal().into()).filter(|t| t > start)
     }
@@ -24,7 +28,7 @@ impl Shape for Plane {
     }
 }
 
-/// Where a line crosses a plane; `None` for one that runs along it.
+/// Returns the distance at which a line crosses a plane; `None` if it is parallel to the plane.
 pub(super) fn crossing(line: &Line, point: &Vector, normal: &Vector) -> Option<Real> {
     let towards = line.direction.dot(normal);
     (towards.sign() != 0).then(|| point.minus(&line.origin).dot(normal).over(&towards))

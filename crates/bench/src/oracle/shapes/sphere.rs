@@ -18,7 +18,7 @@ impl Shape for Sphere {
             return None;
         }
         if power(self, line).sign() == 0 {
-            // From a point of the self itself one root is zero, which the other formula would round.
+            // From a point of the sphere itself one root is zero, which the other formula would round.
             return Some((-&b.shifted(1)).over(&a)).filter(|t| t > start);
         }
         let root = discriminant.root();
@@ -35,14 +35,14 @@ impl Shape for Sphere {
     }
 }
 
-/// `|o-c|² - r²`.
+/// Returns `|o-c|² - r²`.
 fn power(sphere: &Sphere, line: &Line) -> Real {
     let m = line.origin.minus(&sphere.center().into());
     let radius = Real::from(sphere.radius());
     &m.dot(&m) - &(&radius * &radius)
 }
 
-/// a, b and b² - a·c of `a·t² + 2·b·t + c = 0`.
+/// Returns a, b and b² - a·c of `a·t² + 2·b·t + c = 0`.
 fn quadratic(sphere: &Sphere, line: &Line) -> (Real, Real, Real) {
     let m = line.origin.minus(&sphere.center().into());
     let a = line.direction.dot(&line.direction);
@@ -51,7 +51,8 @@ fn quadratic(sphere: &Sphere, line: &Line) -> (Real, Real, Real) {
     (a, b, discriminant)
 }
 
-/// How far the line passes outside the sphere, in world units; negative when it meets the sphere.
+/// Returns the distance at which the line passes outside the sphere, in world units. It is negative if the line hits
+/// the sphere.
 pub fn sphere_clearance(sphere: &Sphere, origin: DVec3, direction: DVec3) -> f64 {
     let line = Line { origin: origin.into(), direction: direction.into() };
     let (a, _, discriminant) = quadratic(sphere, &line);

@@ -6,13 +6,13 @@ use super::Shape;
 use crate::oracle::line::Line;
 use crate::oracle::real::{Real, Vector};
 
-/// Coefficients of the powers 0, 1, 2, ...
+/// The coefficients of the powers 0, 1, 2, ...
 type Polynomial = Vec<Real>;
 
-/// A remainder this much smaller than what it is one of is nothing but rounding: a power of two.
+/// A remainder is rounding error if it is smaller than the dividend by this power of two.
 const NOTHING: i32 = -330;
 
-/// Halvings of a stretch that holds a root, if Newton's steps do not help.
+/// Bisections of an interval that contains a root, if Newton's method does not converge.
 const HALVINGS: usize = 360;
 
 impl Shape for Torus {
@@ -24,7 +24,7 @@ impl Shape for Torus {
         let from = line.origin.minus(&self.center().into());
         let (radius, thickness) = (Real::from(self.radius()), Real::from(self.thickness()));
         let (ring, tube) = (&radius * &radius, &thickness * &thickness);
-        // In the ball around it alone.
+        // Only the part of the line within the bounding sphere.
         let square = line.direction.dot(&line.direction);
         let (middle, apart) = (from.dot(&line.direction), from.dot(&from));
         let outer = &radius + &thickness;
@@ -78,7 +78,7 @@ fn scaled(p: &[Real], by: &Real) -> Polynomial {
     p.iter().map(|a| a * by).collect()
 }
 
-/// `p - q`, where q has no higher power.
+/// Returns `p - q`. The degree of q is at most that of p.
 fn difference(p: &[Real], q: &[Real]) -> Polynomial {
     p.iter().enumerate().map(|(k, a)| q.get(k).map_or_else(|| a.clone(), |b| a - b)).collect()
 }
@@ -91,9 +91,9 @@ fn derivative(p: &[Real]) -> Polynomial {
     p.iter().enumerate().skip(1).map(|(k, a)| a * &Real::from(k as f64)).collect()
 }
 
-/// The first root above `low`, up to `high`.
+/// Returns the first root above `low`, up to `high`.
 fn first_root(quartic: Polynomial, low: Real, high: Real) -> Option<Real> {
-    // From 0 to 1, where powers are alike.
+    // Maps the interval to 0..1, where the powers have similar sizes.
     let width = &high - &low;
     let quartic = shifted_to(&quartic, &low, &width);
     let chain = chain(quartic);
@@ -115,7 +115,7 @@ fn first_root(quartic: Polynomial, low: Real, high: Real) -> Option<Real> {
         } else {
             from = middle
         }
-        // One root alone: Newton's steps, if they stay.
+        // The interval contains a single root: Newton's method, if its steps stay within.
         if step >= 60 && step % 60 == 0 {
             let mut root = (&from + &to).shifted(-1);
             let mut stays = true;
@@ -136,7 +136,7 @@ fn first_root(quartic: Polynomial, low: Real, high: Real) -> Option<Real> {
     Some(&low + &(&(&from + &to).shifted(-1) * &width))
 }
 
-/// The polynomial of a place between 0 and 1 for one between `low` and `low + width`.
+/// Returns the polynomial in s for t = `low` + s·`width`, with s from 0 to 1.
 fn shifted_to(p: &[Real], low: &Real, width: &Real) -> Polynomial {
     let step = vec![low.clone(), width.clone()];
     p.iter().rev().fold(vec![Real::zero()], |sum, a| {
@@ -147,7 +147,7 @@ fn shifted_to(p: &[Real], low: &Real, width: &Real) -> Polynomial {
     })
 }
 
-/// Sturm's chain.
+/// Returns Sturm's sequence.
 fn chain(p: Polynomial) -> Vec<Polynomial> {
     let p = normalized(p, None).unwrap_or_default();
     let slope = normalized(derivative(&p), None).unwrap_or_default();
@@ -162,7 +162,7 @@ fn chain(p: Polynomial) -> Vec<Polynomial> {
     chain
 }
 
-/// With a largest coefficient of about 1, and without leading zeros; `None` where all are below 2^`least`.
+/// Scales the largest coefficient to about 1, and removes leading zeros. Returns `None` if all are below 2^`least`.
 fn normalized(mut p: Polynomial, least: Option<i32>) -> Option<Polynomial> {
     let largest = p.iter().map(Real::magnitude).reduce(|a, b| if b > a { b } else { a })?;
     let nothing = least.is_some_and(|least| largest < Real::from(1.0).shifted(least));
@@ -179,7 +179,7 @@ fn normalized(mut p: Polynomial, least: Option<i32>) -> Option<Polynomial> {
     Some(p)
 }
 
-/// What division leaves; the divisor's leading coefficient is not 0.
+/// Returns the remainder of a division. The divisor's leading coefficient is not 0.
 fn remainder(a: &[Real], b: &[Real]) -> Polynomial {
     let mut rest = a.to_vec();
     while rest.len() >= b.len() {

@@ -12,6 +12,10 @@ impl Shape for Triangle {
         self.vertices().iter().map(|v| v.abs().max_element()).fold(0.0, f64::max)
     }
 
+    fn has_inside(&self) -> bool {
+        false
+    }
+
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {
         let [u, v, w] = self.vertices().map(|vertex| Vector::from(vertex).minus(&line.origin));
         let area = area(self);
@@ -37,13 +41,14 @@ impl Shape for Triangle {
     }
 }
 
-/// Twice the area along the normal.
+/// Returns twice the area as a vector along the normal.
 fn area(triangle: &Triangle) -> Vector {
     let [u, v, w] = triangle.vertices().map(Vector::from);
     v.minus(&u).cross(&w.minus(&u))
 }
 
-/// How far from the triangle's outline the line pierces its plane, in world units; `None` for a line in the plane.
+/// Returns the distance between the triangle's outline and the point where the line crosses its plane, in world units.
+/// Returns `None` for a line in the plane.
 pub fn edge_clearance(triangle: &Triangle, origin: DVec3, direction: DVec3) -> Option<f64> {
     let line = Line { origin: origin.into(), direction: direction.into() };
     let area = area(triangle);

@@ -4,10 +4,12 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::Material;
 use crate::model::surface;
+use crate::model::vector::across;
 
 /// A round cone or truncated cone, closed at both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,9 +52,18 @@ impl Cone {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(self.radii.map(|radius| scale * radius), self.ends.map(place), self.material.clone())
+impl Shape for Cone {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        let radii = self.radii.map(|radius| motion.length(radius));
+        Self::new(radii, self.ends.map(|end| motion.point(end)), material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        let ([a, b], [radius_a, radius_b]) = (self.ends, self.radii);
+        let across = across(b - a, direction);
+        Some((a.dot(direction) + radius_a * across).max(b.dot(direction) + radius_b * across))
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
@@ -46,9 +47,15 @@ impl Cuboid {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(self.corners.map(place), self.material.clone())
+impl Shape for Cuboid {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        Self::new(self.corners.map(|corner| motion.point(corner)), material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        Some(DVec3::select(direction.cmpgt(DVec3::ZERO), self.max(), self.min()).dot(direction))
     }
 }
 

@@ -4,10 +4,12 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
+use crate::model::vector::{across, furthest};
 
 /// A round cylinder, closed at both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,9 +48,16 @@ impl Cylinder {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(scale * self.radius, self.ends.map(place), self.material.clone())
+impl Shape for Cylinder {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        Self::new(motion.length(self.radius), self.ends.map(|end| motion.point(end)), material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        let [a, b] = self.ends;
+        Some(furthest(&self.ends, direction) + self.radius * across(b - a, direction))
     }
 }
 

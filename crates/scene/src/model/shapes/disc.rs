@@ -4,10 +4,12 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
+use crate::model::vector::across;
 
 /// A flat, round, two-sided disc, including its rim.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,9 +51,16 @@ impl Disc {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(scale * self.radius, place(self.center), self.normal, self.material.clone())
+impl Shape for Disc {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        let (center, normal) = (motion.point(self.center), motion.direction(self.normal));
+        Self::new(motion.length(self.radius), center, normal, material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        Some(self.center.dot(direction) + self.radius * across(self.normal, direction))
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::Object;
+use super::{Motion, Object};
 use crate::form::{Field, Form, Kind, Names, Numbers, Subject, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
@@ -141,10 +141,19 @@ impl Instance {
         self.object().material()
     }
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        let Placement { translation, rotation, scale: own } = *self.placement;
-        let placement = Placement::new(place(translation), rotation, scale * own)?;
+    pub(super) fn moved(&self, motion: &impl Motion) -> Result<Self, InvalidValue> {
+        let Placement { translation, rotation, scale } = *self.placement;
+        let [x, y, z] =
+            [rotation.x_axis, rotation.y_axis, rotation.z_axis].map(|axis| motion.direction(axis));
+        let rotation = DMat3::from_cols(x, y, z);
+        let placement = Placement::new(motion.point(translation), rotation, motion.length(scale))?;
         Ok(Self { placement: Arc::new(placement), ..self.clone() })
+    }
+
+    pub(super) fn support(&self, direction: DVec3) -> Option<f64> {
+        let Placement { translation, rotation, scale } = *self.placement;
+        let support = self.object().support(rotation.transpose() * direction)?;
+        Some(translation.dot(direction) + scale * support)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Objects, which rays can hit.
 //!
-//! Each shape has a file with its checking constructor and its syntax. This file only lists them; for a new shape,
-//! the compiler reports the missing parts.
+//! Each shape has a file with its checking constructor, its extent and its syntax. A new shape needs a file, its `mod`
+//! and a line in `with_shapes` here, and its export in `lib.rs`. A parameter that no other shape has is added to `Parameter`.
 
 mod cone;
 mod cuboid;
@@ -17,158 +17,194 @@ use std::fmt::{self, Formatter};
 
 use glam::DVec3;
 
-pub use cone::Cone;
-pub use cuboid::Cuboid;
-pub use cylinder::Cylinder;
-pub use disc::Disc;
 pub(crate) use instance::USE;
 pub use instance::{Instance, Placement};
-pub use plane::Plane;
-pub use sphere::Sphere;
-pub use torus::Torus;
-pub use triangle::Triangle;
 
 use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
 use crate::form::write_line;
 
-/// An object that a ray can hit.
-#[expect(missing_docs, reason = "the types have the documentation")]
-#[derive(Clone, Debug, PartialEq)]
-pub enum Object {
-    Sphere(Sphere),
-    Triangle(Triangle),
-    /// A box whose edges are parallel to the axes.
-    Cuboid(Cuboid),
-    /// An infinite plane.
-    Plane(Plane),
-    Disc(Disc),
-    /// A cylinder that is closed at both ends.
-    Cylinder(Cylinder),
-    /// A closed cone or truncated cone.
-    Cone(Cone),
-    /// A ring (torus).
-    Torus(Torus),
-    /// An object of a group, as it is drawn.
-    Instance(Instance),
+/// Passes the list of the shapes to a macro, after some other tokens: the file, the type and a summary of each. The
+/// type's name is also that of its command. The order is that of the documentation.
+macro_rules! with_shapes {
+    ($callback:ident! { $($before:tt)* }) => {
+        $callback! {
+            $($before)*
+            shapes {
+                sphere::Sphere: "A sphere.";
+                triangle::Triangle: "A triangle.";
+                cuboid::Cuboid: "A box along the axes.";
+                plane::Plane: "An infinite plane.";
+                disc::Disc: "A flat, round disc.";
+                cylinder::Cylinder: "A closed cylinder.";
+                cone::Cone: "A closed cone or truncated cone.";
+                torus::Torus: "A ring (torus).";
+            }
+        }
+    };
+}
+pub(crate) use with_shapes;
+
+/// The properties of a shape that every kind of object has.
+trait Shape: Sized {
+    /// Moves the shape, and gives it a material.
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue>;
+
+    /// Returns the maximum of p·`direction` over all points p, or `None` if the shape is unbounded.
+    fn support(&self, direction: DVec3) -> Option<f64>;
+
+    /// Returns a valid property that is probably a mistake.
+    fn lint(&self) -> Option<Lint> {
+        None
+    }
 }
 
-impl Object {
-    /// Returns the material of the surface.
-    pub fn material(&self) -> &Material {
-        match self {
-            Self::Sphere(o) => o.material(),
-            Self::Triangle(o) => o.material(),
-            Self::Cuboid(o) => o.material(),
-            Self::Plane(o) => o.material(),
-            Self::Disc(o) => o.material(),
-            Self::Cylinder(o) => o.material(),
-            Self::Cone(o) => o.material(),
-            Self::Torus(o) => o.material(),
-            Self::Instance(o) => o.material(),
-        }
-    }
+/// Defines [`Object`], with a variant for each shape and one for instances.
+macro_rules! objects {
+    (shapes { $($module:ident::$Shape:ident: $summary:literal;)* }) => {
+        $(pub use $module::$Shape;)*
 
+        /// An object that a ray can hit.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Object {
+            $(#[doc = $summary] $Shape($Shape),)*
+            /// An object of a group, as it is drawn.
+            Instance(Instance),
+        }
+
+        $(impl From<$Shape> for Object {
+            fn from(shape: $Shape) -> Self {
+                Self::$Shape(shape)
+            }
+        })*
+
+        impl From<Instance> for Object {
+            fn from(instance: Instance) -> Self {
+                Self::Instance(instance)
+            }
+        }
+
+        impl Object {
+            /// Returns the material of the surface.
+            pub fn material(&self) -> &Material {
+                match self {
+                    $(Self::$Shape(shape) => shape.material(),)*
+                    Self::Instance(instance) => instance.material(),
+                }
+            }
+
+            /// Moves the object, and gives it a material. An instance keeps its own.
+            ///
+            /// # Errors
+            /// Fails if a number overflows or a length vanishes.
+            pub fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+                match self {
+                    $(Self::$Shape(shape) => shape.moved(motion, material).map(Self::$Shape),)*
+                    Self::Instance(instance) => instance.moved(motion).map(Self::Instance),
+                }
+            }
+
+            /// Returns the maximum of p·`direction` over all points p of the object (its support function), or `None` if
+            /// the object is unbounded.
+            pub fn support(&self, direction: DVec3) -> Option<f64> {
+                match self {
+                    $(Self::$Shape(shape) => shape.support(direction),)*
+                    Self::Instance(instance) => instance.support(direction),
+                }
+            }
+
+            /// Returns a valid property that is probably a mistake.
+            pub(crate) fn lint(&self) -> Option<Lint> {
+                match self {
+                    $(Self::$Shape(shape) => shape.lint(),)*
+                    Self::Instance(_) => None,
+                }
+            }
+
+            /// Writes a line of a script. `surface` is the name of its material, if it has one.
+            pub(crate) fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
+                match self {
+                    $(Self::$Shape(shape) => write_line(f, shape, surface),)*
+                    // An object of a group is written with its group.
+                    Self::Instance(_) => Err(fmt::Error),
+                }
+            }
+        }
+    };
+}
+
+with_shapes! { objects! {} }
+
+impl Object {
     /// Moves every position by `place`, which scales all distances by `scale` and keeps directions.
     ///
     /// # Errors
     /// Fails if a number overflows or a length vanishes.
     pub fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        match self {
-            Self::Sphere(o) => o.placed(scale, place).map(Self::from),
-            Self::Triangle(o) => o.placed(place).map(Self::from),
-            Self::Cuboid(o) => o.placed(place).map(Self::from),
-            Self::Plane(o) => o.placed(place).map(Self::Plane),
-            Self::Disc(o) => o.placed(scale, place).map(Self::Disc),
-            Self::Cylinder(o) => o.placed(scale, place).map(Self::Cylinder),
-            Self::Cone(o) => o.placed(scale, place).map(Self::Cone),
-            Self::Torus(o) => o.placed(scale, place).map(Self::Torus),
-            Self::Instance(o) => o.placed(scale, place).map(Self::Instance),
-        }
+        self.moved(&Shift { scale, place }, self.material().clone())
     }
 
-    /// Returns a valid property that is probably a mistake.
-    pub(crate) fn lint(&self) -> Option<Lint> {
-        match self {
-            Self::Triangle(o) => o.is_degenerate().then_some(Lint::DegenerateTriangle),
-            Self::Sphere(_)
-            | Self::Cuboid(_)
-            | Self::Plane(_)
-            | Self::Disc(_)
-            | Self::Cylinder(_)
-            | Self::Cone(_)
-            | Self::Torus(_)
-            | Self::Instance(_) => None,
-        }
+    /// Gives the object a material. An instance keeps its own.
+    ///
+    /// # Errors
+    /// Never fails for an object that could be made.
+    pub fn with_material(&self, material: Material) -> Result<Self, InvalidValue> {
+        self.moved(&Shift { scale: 1.0, place: |position| position }, material)
     }
 
-    /// Writes a line of a script. `surface` is the name of its material, if it has one.
-    pub(crate) fn write(&self, f: &mut Formatter<'_>, surface: Option<&str>) -> fmt::Result {
-        match self {
-            Self::Sphere(o) => write_line(f, o, surface),
-            Self::Triangle(o) => write_line(f, o, surface),
-            Self::Cuboid(o) => write_line(f, o, surface),
-            Self::Plane(o) => write_line(f, o, surface),
-            Self::Disc(o) => write_line(f, o, surface),
-            Self::Cylinder(o) => write_line(f, o, surface),
-            Self::Cone(o) => write_line(f, o, surface),
-            Self::Torus(o) => write_line(f, o, surface),
-            // An object of a group is written with its group.
-            Self::Instance(_) => Err(fmt::Error),
-        }
+    /// Returns the lowest and the highest corner of the box around the object, or `None` if it is unbounded.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let corner = |sign: f64| {
+            let [x, y, z] = DVec3::AXES.map(|axis| self.support(sign * axis));
+            Some(sign * DVec3::new(x?, y?, z?))
+        };
+        Some([corner(-1.0)?, corner(1.0)?])
     }
 }
 
-impl From<Sphere> for Object {
-    fn from(sphere: Sphere) -> Self {
-        Self::Sphere(sphere)
+/// A motion of space that keeps angles. A result that cannot be represented is NaN, which no shape accepts.
+pub trait Motion {
+    /// Returns the moved position.
+    fn point(&self, position: DVec3) -> DVec3;
+
+    /// Returns the rotated direction, of the same length.
+    fn direction(&self, direction: DVec3) -> DVec3;
+
+    /// Returns the scaled length.
+    fn length(&self, length: f64) -> f64;
+}
+
+/// Group coordinates to world coordinates.
+impl Motion for Placement {
+    fn point(&self, position: DVec3) -> DVec3 {
+        Self::point(self, position)
+    }
+
+    fn direction(&self, direction: DVec3) -> DVec3 {
+        self.rotation() * direction
+    }
+
+    fn length(&self, length: f64) -> f64 {
+        self.scale() * length
     }
 }
 
-impl From<Triangle> for Object {
-    fn from(triangle: Triangle) -> Self {
-        Self::Triangle(triangle)
-    }
+/// A motion without rotation.
+struct Shift<F> {
+    scale: f64,
+    place: F,
 }
 
-impl From<Cuboid> for Object {
-    fn from(cuboid: Cuboid) -> Self {
-        Self::Cuboid(cuboid)
+impl<F: Fn(DVec3) -> DVec3> Motion for Shift<F> {
+    fn point(&self, position: DVec3) -> DVec3 {
+        (self.place)(position)
     }
-}
 
-impl From<Plane> for Object {
-    fn from(plane: Plane) -> Self {
-        Self::Plane(plane)
+    fn direction(&self, direction: DVec3) -> DVec3 {
+        direction
     }
-}
 
-impl From<Disc> for Object {
-    fn from(disc: Disc) -> Self {
-        Self::Disc(disc)
-    }
-}
-
-impl From<Cylinder> for Object {
-    fn from(cylinder: Cylinder) -> Self {
-        Self::Cylinder(cylinder)
-    }
-}
-
-impl From<Cone> for Object {
-    fn from(cone: Cone) -> Self {
-        Self::Cone(cone)
-    }
-}
-
-impl From<Torus> for Object {
-    fn from(torus: Torus) -> Self {
-        Self::Torus(torus)
-    }
-}
-
-impl From<Instance> for Object {
-    fn from(instance: Instance) -> Self {
-        Self::Instance(instance)
+    fn length(&self, length: f64) -> f64 {
+        self.scale * length
     }
 }

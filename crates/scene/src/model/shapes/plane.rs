@@ -4,6 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
@@ -42,9 +43,15 @@ impl Plane {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(place(self.point), self.normal, self.material.clone())
+impl Shape for Plane {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        Self::new(motion.point(self.point), motion.direction(self.normal), material)
+    }
+
+    fn support(&self, _: DVec3) -> Option<f64> {
+        None
     }
 }
 

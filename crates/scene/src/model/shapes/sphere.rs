@@ -4,6 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
@@ -42,9 +43,15 @@ impl Sphere {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(scale * self.radius, place(self.center), self.material.clone())
+impl Shape for Sphere {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        Self::new(motion.length(self.radius), motion.point(self.center), material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        Some(self.center.dot(direction) + self.radius * direction.length())
     }
 }
 

@@ -4,10 +4,12 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::{Motion, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
 use crate::model::surface;
+use crate::model::vector::across;
 
 /// A ring: all points whose distance from a circle is at most its thickness.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,10 +68,18 @@ impl Torus {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, scale: f64, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        let (radius, thickness) = (scale * self.radius, scale * self.thickness);
-        Self::new(radius, thickness, place(self.center), self.normal, self.material.clone())
+impl Shape for Torus {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        let (radius, thickness) = (motion.length(self.radius), motion.length(self.thickness));
+        let (center, normal) = (motion.point(self.center), motion.direction(self.normal));
+        Self::new(radius, thickness, center, normal, material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        let ring = self.radius * across(self.normal, direction);
+        Some(self.center.dot(direction) + ring + self.thickness * direction.length())
     }
 }
 

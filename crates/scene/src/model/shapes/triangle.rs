@@ -4,11 +4,12 @@ use std::fmt;
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
+use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
-use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
+use crate::model::invalid::{Faults, InvalidValue, Lint, Parameter, finite};
 use crate::model::material::Material;
 use crate::model::surface;
-use crate::model::vector::to_unit_scale;
+use crate::model::vector::{furthest, to_unit_scale};
 
 /// A two-sided triangle. One without area is allowed and never hit.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,9 +53,19 @@ impl Triangle {
     pub fn material(&self) -> &Material {
         &self.material
     }
+}
 
-    pub(super) fn placed(&self, place: impl Fn(DVec3) -> DVec3) -> Result<Self, InvalidValue> {
-        Self::new(self.vertices.map(place), self.material.clone())
+impl Shape for Triangle {
+    fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
+        Self::new(self.vertices.map(|vertex| motion.point(vertex)), material)
+    }
+
+    fn support(&self, direction: DVec3) -> Option<f64> {
+        Some(furthest(&self.vertices, direction))
+    }
+
+    fn lint(&self) -> Option<Lint> {
+        self.is_degenerate().then_some(Lint::DegenerateTriangle)
     }
 }
 

@@ -1,42 +1,47 @@
-//! Cones and cylinders: round about an axis, straight from end to end and closed by caps.
+//! Cones and cylinders: rotationally symmetric about an axis, with straight sides, closed by caps.
 //!
-//! With ρ the distance from the axis and r(z) = Ra + k·z the radius at the height z, the side is where ρ² - r² is 0. The
-//! body is convex: all that a ray has of it is one stretch, from the latest place where it enters the side or the slab of
-//! the caps to the first where it leaves them.
+//! Let ρ be the distance from the axis and r(z) = Ra + k·z the radius at the height z. The side is the surface where ρ²
+//! = r². The body is convex, so a ray has one interval in it: from the last place where it enters the side or the slab
+//! of the caps to the first place where it leaves them.
 //!
-//! A ray is followed from its place that is nearest to the end a, so that the numbers of the side are no larger than the
-//! body; along A·t² + 2·B·t + C the discriminant is n² - x², with n = r·s - k·dz·ρ⃗, x = ρ⃗ × s and s the part of the
-//! direction that is square to the axis. Errors are then some roundoffs of the body's size aside, far less than what a new
-//! ray starts off the surface by. (Products of sum and difference would take roots, whose rounding is as large as that of the
-//! squares.)
+//! The ray's parameter is counted from its point nearest to the end a, so that the numbers of the side are no larger
+//! than the body. The quadratic is `A·t² + 2·B·t + C`. Its discriminant is `n² - x²`, with `n = r·s - k·dz·ρ⃗`,
+//! `x = ρ⃗ × s`, and s the part of the direction perpendicular to the axis. So errors across the ray are a few
+//! roundoffs of the body's size, far less than the offset of a new ray from the surface. (Products of sum and
+//! difference would need square roots, whose rounding errors are as large as those of the squares.)
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
+use rayfold_scene::model::unit;
 
-use super::{Local, Met};
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use super::solid::{Form, Frame, Place, flat};
+use super::{BodyHit, Local};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::shared::{Plain, Side, Surface};
 
-/// Rounding errors of where a ray meets the side or a cap, in roundoffs of the body's size and of the distance: edges
-/// belong to the body.
+/// The rounding error of a hit on the side or a cap, in roundoffs of the body's size and of the distance. Edges belong
+/// to the body.
 const EDGE: f64 = 8.0;
 
-/// From the end a at the origin along z.
+/// A cone or cylinder with its end a at the origin, along z.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone<E> {
     radii: [E; 2],
-    /// How much the radius changes for a unit of height.
+    /// The change of the radius per unit of height.
     slope: E,
     height: E,
     /// The largest of these lengths.
     size: E,
 }
 
-/// The stretch of rays in the body.
+/// The interval of each ray in the body.
 struct Stretch<S: Simd, E: Real> {
     enter: Lanes<S, E>,
     leave: Lanes<S, E>,
     hit: Mask<S, E>,
-    /// Whether it begins and ends at the side.
+    /// Whether the interval begins and ends at the side.
     enters_side: Mask<S, E>,
     leaves_side: Mask<S, E>,
 }
@@ -51,7 +56,7 @@ impl<E: Real> Cone<E> {
         }
     }
 
-    /// `over` is how high over the end b the ray starts.
+    /// Returns the interval of each ray in the body. `over` is the height of the ray's start above the end b.
     #[inline(always)]
     fn stretch<S: Simd>(&self, simd: S, ray: Local<S, E>, over: Lanes<S, E>) -> Stretch<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
@@ -85,7 +90,7 @@ impl<E: Real> Cone<E> {
         let outside = still & c.simd_gt(zero);
         let enter = still.select(back, enter).max(back);
         let leave = still.select(far, leave).min(far);
-        // The caps.
+        // The interval in the slab of the caps.
         let is_along = direction.z.simd_eq(zero);
         let inverse = one / direction.z;
         let (at_a, at_b) = ((zero - origin.z) * inverse, (zero - over) * inverse);
@@ -103,7 +108,7 @@ impl<E: Real> Cone<E> {
     }
 
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(
+    pub(super) fn intersect<S: Simd>(
         &self,
         simd: S,
         ray: Local<S, E>,
@@ -115,7 +120,8 @@ impl<E: Real> Cone<E> {
         (hit & distance.simd_gt(zero), distance)
     }
 
-    /// On a rim it is that of the side. A tip has no direction of its own: it is taken from where the ray comes from.
+    /// Returns the hit of each ray. On a rim the normal is that of the side. At a tip, which has no normal, the normal
+    /// points back along the ray.
     #[inline(always)]
     pub(super) fn surface<S: Simd>(
         &self,
@@ -123,14 +129,14 @@ impl<E: Real> Cone<E> {
         ray: Local<S, E>,
         over: Lanes<S, E>,
         distance: Lanes<S, E>,
-    ) -> Met<S, E> {
+    ) -> BodyHit<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
         let Stretch { enter, enters_side, leaves_side, .. } = self.stretch(simd, ray, over);
         let within = enter.simd_le(zero);
         let is_side = (within & leaves_side) | (!within & enters_side);
         let place = ray.direction.scale_add(distance, ray.origin);
         let forwards = ray.direction.z.simd_gt(zero);
-        // The caps are left upwards at b, and entered upwards at a.
+        // A ray that goes up leaves through the cap at b and enters through the cap at a.
         let is_b = !(within ^ forwards);
         let height = splat::<S, E>(simd, self.height);
         let cap = is_b.select(height, zero);
@@ -156,6 +162,62 @@ impl<E: Real> Cone<E> {
         );
         let normal = normal.normalize(simd);
         let side = within.select(zero - one, one);
-        Met { point: Vec3::<S, E>::new(x * radius, y * radius, z), normal: normal.scale(side), within }
+        BodyHit { point: Vec3::<S, E>::new(x * radius, y * radius, z), normal: normal.scale(side), within }
+    }
+}
+
+/// A cone or cylinder along the last axis, from its end a at the frame's centre to its end b, `end`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ConeForm {
+    pub(super) radii: [f64; 2],
+    pub(super) height: f64,
+    pub(super) end: DVec3,
+}
+
+impl ConeForm {
+    pub(super) fn new(radii: [f64; 2], [a, b]: [DVec3; 2], place: Place) -> (Frame, Self) {
+        // The difference of the ends is more accurate than their positions.
+        let along = (b - a) * place.scale;
+        let radii = radii.map(|radius| place.scale * radius);
+        let form = Self { radii, height: along.length(), end: place.point(b) };
+        (Frame::round_about(unit(along), place.point(a)), form)
+    }
+}
+
+impl Form for ConeForm {
+    fn size(&self) -> f64 {
+        self.height + self.radii[0].max(self.radii[1])
+    }
+
+    fn each_surface(&self, frame: &Frame, each: &mut dyn FnMut(Surface)) {
+        let &Frame { axes: [.., axis], center } = frame;
+        let &Self { radii, height, end } = self;
+        for (center, radius) in [center, end].into_iter().zip(radii) {
+            if radius > 0.0 {
+                each(flat(axis, center, radius, Plain::ByAxis));
+            }
+        }
+        each(Surface::Side(Side { end: center, axis, height, radii }));
+    }
+
+    fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
+        let &Self { radii: [a, b], height, .. } = self;
+        let (z, aside) = (place.z, place.x.hypot(place.y));
+        let radius = a + (b - a) * (z / height).clamp(0.0, 1.0);
+        let ends = z.abs().min((z - height).abs());
+        let within = z >= -near && z <= height + near;
+        let slope = 1.0 + (b - a).abs() / height;
+        within && ((aside - radius).abs() <= near * slope || ends <= near && aside <= radius + near)
+    }
+
+    fn ball(&self, frame: &Frame) -> (DVec3, f64) {
+        let radius = self.radii[0].max(self.radii[1]).hypot(0.5 * self.height);
+        (0.5 * (frame.center + self.end), radius)
+    }
+
+    fn bounds(&self, frame: &Frame) -> Option<Bounds> {
+        let (circle, center) = (frame.circle(), frame.center);
+        let [a, b] = self.radii.map(|radius| radius * circle);
+        Some(((center - a).min(self.end - b), (center + a).max(self.end + b)))
     }
 }

@@ -1,20 +1,24 @@
-//! Boxes that stand askew: slabs along axes of their own (Kay and Kajiya), faces, edges and corners with them.
+//! Rotated boxes: slabs along axes of their own (Kay and Kajiya). Faces, edges and corners belong to the box.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
+use rayfold_scene::Placement;
 
-use super::{Local, Met};
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rounding::LATE;
+use super::solid::{Form, Frame, Place, flat};
+use super::{BodyHit, Local};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::rounding::LATE;
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::shared::{Plain, Surface};
 
-/// A box around the origin.
+/// A box centred at the origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cuboid<E> {
     half: [E; 3],
 }
 
-/// Where rays enter each slab and leave it.
+/// The distances at which rays enter and leave each slab.
 struct Slabs<S: Simd, E: Real> {
     near: Vec3<S, E>,
     far: Vec3<S, E>,
@@ -44,7 +48,7 @@ impl<E: Real> Cuboid<E> {
     }
 
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
+    pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
         let Slabs { enter, leave, .. } = self.slabs(simd, ray);
         let hit = enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE * E::ROUNDOFF));
@@ -52,9 +56,10 @@ impl<E: Real> Cuboid<E> {
         (hit & distance.simd_gt(zero), distance)
     }
 
-    /// Where faces meet, that of the first axis counts, but of a rectangle its own.
+    /// Returns the hit of each ray. Where faces share an edge, the face of the first axis wins; a rectangle (one half
+    /// length of 0) always has the normal of its plane.
     #[inline(always)]
-    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> Met<S, E> {
+    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> BodyHit<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
         let Slabs { near, far, enter, leave } = self.slabs(simd, ray);
         let entering = enter.simd_gt(zero);
@@ -77,11 +82,12 @@ impl<E: Real> Cuboid<E> {
         let (y, ny) = face::<S, E>(simd, is_y, entering, ray.direction.y, hy, place.y);
         let (z, nz) = face::<S, E>(simd, is_z, entering, ray.direction.z, hz, place.z);
         let (point, normal) = (Vec3::<S, E>::new(x, y, z), Vec3::<S, E>::new(nx, ny, nz));
-        Met { point, normal, within: !entering }
+        BodyHit { point, normal, within: !entering }
     }
 }
 
-/// Where rays enter and leave a slab; one along it is in it for ever, or never.
+/// Returns the distances at which rays enter and leave a slab. A ray parallel to the slab is in it for all distances,
+/// or for none.
 #[inline(always)]
 fn slab<S: Simd, E: Real>(
     simd: S,
@@ -100,7 +106,7 @@ fn slab<S: Simd, E: Real>(
     )
 }
 
-/// A coordinate, brought onto the face if the ray meets it there, and that of the normal.
+/// Returns a coordinate of the hit, moved onto the face if the ray hits that face, and the coordinate of the normal.
 #[inline(always)]
 fn face<S: Simd, E: Real>(
     simd: S,
@@ -115,4 +121,52 @@ fn face<S: Simd, E: Real>(
     let low = !(forwards ^ entering);
     let within = place.max(zero - half).min(half);
     (here.select(low.select(zero - half, half), within), here.select(forwards.select(zero - one, one), zero))
+}
+
+/// A box in its frame, by half of its lengths.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CuboidForm {
+    pub(super) half: DVec3,
+}
+
+impl CuboidForm {
+    pub(super) fn new(cuboid: &rayfold_scene::Cuboid, placement: &Placement, place: Place) -> (Frame, Self) {
+        let rotation = placement.rotation();
+        let (min, max) = (cuboid.min(), cuboid.max());
+        let center = place.point(placement.point(min + 0.5 * (max - min)));
+        let half = 0.5 * (max - min) * (placement.scale() * place.scale);
+        (Frame { axes: [rotation.x_axis, rotation.y_axis, rotation.z_axis], center }, Self { half })
+    }
+}
+
+impl Form for CuboidForm {
+    fn size(&self) -> f64 {
+        self.half.element_sum()
+    }
+
+    fn each_surface(&self, frame: &Frame, each: &mut dyn FnMut(Surface)) {
+        let (half, center) = (self.half, frame.center);
+        for number in 0..3 {
+            let (normal, across) = (frame.axes[number], half * (1.0 - DVec3::AXES[number]));
+            let apart = half[number] * normal;
+            each(flat(normal, center - apart, across.length(), Plain::No));
+            if half[number] > 0.0 {
+                each(flat(normal, center + apart, across.length(), Plain::No));
+            }
+        }
+    }
+
+    fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
+        (place.abs() - self.half).max_element().abs() <= near
+    }
+
+    fn ball(&self, frame: &Frame) -> (DVec3, f64) {
+        (frame.center, self.half.length())
+    }
+
+    fn bounds(&self, frame: &Frame) -> Option<Bounds> {
+        let ([x, y, z], half) = (frame.axes, self.half);
+        let reach = x.abs() * half.x + y.abs() * half.y + z.abs() * half.z;
+        Some((frame.center - reach, frame.center + reach))
+    }
 }

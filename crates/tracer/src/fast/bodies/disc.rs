@@ -1,19 +1,25 @@
-//! Discs: what is within their radius of a plane, the rim with it.
+//! Discs: the points of a plane within a radius. The rim belongs to the disc.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
+use rayfold_scene::model::unit;
 
-use super::{Local, plane};
-use crate::fast::real::{Lanes, Mask, Real, constant, splat};
+use super::Local;
+use super::solid::{Form, Frame, Place, flat};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, constant, splat};
+use crate::fast::bodies::plane;
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::shared::{Plain, Surface};
 
-/// How much farther than the radius the rim may be met, in roundoffs of the square: the place has one of each of two
-/// products and sums along the ray, and so has its square.
+/// The tolerance of the squared radius at the rim, in roundoffs of the square. The hit point has one roundoff of each
+/// of two products and sums along the ray, and so has its square.
 const RIM: f64 = 8.0;
 
-/// A disc around the origin, square to z.
+/// A disc centred at the origin, perpendicular to z.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc<E> {
-    /// r², with room for the rim.
+    /// r², widened by the tolerance of the rim.
     square: E,
 }
 
@@ -23,11 +29,47 @@ impl<E: Real> Disc<E> {
     }
 
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
+    pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
         let (hit, distance) = plane::along(simd, ray);
         let distance = hit.select(distance, constant::<S, E>(simd, 0.0));
         let place = ray.direction.scale_add(distance, ray.origin);
         let apart = place.x.mul_add(place.x, place.y * place.y);
         (hit & apart.simd_le(splat::<S, E>(simd, self.square)), distance)
+    }
+}
+
+/// A disc in its frame, perpendicular to the last axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DiscForm {
+    pub(super) radius: f64,
+}
+
+impl DiscForm {
+    pub(super) fn new(disc: &rayfold_scene::Disc, place: Place) -> (Frame, Self) {
+        let frame = Frame::round_about(unit(disc.normal()), place.point(disc.center()));
+        (frame, Self { radius: place.scale * disc.radius() })
+    }
+}
+
+impl Form for DiscForm {
+    fn size(&self) -> f64 {
+        self.radius
+    }
+
+    fn each_surface(&self, frame: &Frame, each: &mut dyn FnMut(Surface)) {
+        each(flat(frame.axes[2], frame.center, self.radius, Plain::ByAxis));
+    }
+
+    fn is_near(&self, place: DVec3, near: f64, is_slanted: bool) -> bool {
+        is_slanted && place.z.abs() <= near && place.x.hypot(place.y) <= self.radius + near
+    }
+
+    fn ball(&self, frame: &Frame) -> (DVec3, f64) {
+        (frame.center, self.radius)
+    }
+
+    fn bounds(&self, frame: &Frame) -> Option<Bounds> {
+        let reach = self.radius * frame.circle();
+        Some((frame.center - reach, frame.center + reach))
     }
 }

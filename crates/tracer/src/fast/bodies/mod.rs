@@ -1,39 +1,43 @@
-//! Shapes that have axes of their own: planes, discs, cylinders, cones, tori, and boxes that stand askew.
+//! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, and rotated boxes.
 //!
-//! A shape is a file here: where rays in its own coordinates meet it, and the surface there. What is common stands in this
-//! one: the way into these coordinates and back, the offset of new rays, the search. None of it is part of the steps that
-//! look for spheres, boxes and triangles, or of their masks, lists and trees: scenes without bodies execute nothing for
-//! them. Bodies are found down a tree of their own; planes, which have no bounds, stand beside it.
+//! Each shape has its own file, with its intersection and its surface in the shape's coordinates. The common parts are
+//! here: the transformation into these coordinates and back, the offset of new rays, and the search. None of it is part
+//! of the code, the masks, the lists or the trees for spheres, boxes and triangles, so scenes without bodies execute
+//! nothing for them. Bodies have a tree of their own. Planes have no bounding box and are kept outside it.
 //!
-//! Scenes with bodies are drawn in `f64`. Lengths are at most about 1, and all errors here are some roundoffs of that: a
-//! place in the coordinates of a body has one of the difference to its middle, and three of a product with an axis; the
-//! tests add what their files say, at most 32 of the body's size and of where it lies. New rays start off a surface by
-//! twice that ([`Solid::offset`]).
+//! Scenes with bodies are drawn in `f64`. Lengths are at most about 1, and all errors here are a few roundoffs of that.
+//! A point in the coordinates of a body has one roundoff from the subtraction of the centre, and three from the product
+//! with an axis. The tests add the errors given in their files, at most 32 roundoffs of the body's size and position.
+//! New rays start off a surface by twice that ([`Solid::offset`]).
 
+mod body_culler;
 mod cone;
 mod cuboid;
 mod disc;
-mod few;
-mod placed;
 mod plane;
+mod solid;
 mod torus;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use rayfold_scene::Object;
 
-use self::cone::Cone;
-use self::cuboid::Cuboid;
-use self::disc::Disc;
-use self::few::Few;
-pub(super) use self::placed::{Form, Solid, body, reach};
-use self::torus::Torus;
-use super::bounds::Crossing;
-use super::descent::{backwards, descend};
-use super::packet::{Nearest, Ray, Surface};
-use super::parts::BUILT;
-use super::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use super::shapes::Shape as Placed;
-use super::tree::{Copies, Tree, group};
+use self::body_culler::BodyCuller;
+use self::cone::{Cone, ConeForm};
+use self::cuboid::{Cuboid, CuboidForm};
+use self::disc::{Disc, DiscForm};
+use self::plane::PlaneForm;
+use self::solid::{Form, Frame, Place};
+pub(super) use self::solid::{Solid, body, reach};
+use self::torus::{Torus, TorusForm};
+use super::shapes::Shape as PlacedShape;
+use super::shapes::instance::turned_box;
+use crate::fast::acceleration::descent::{backwards, descend};
+use crate::fast::acceleration::tree::{Copies, Tree, group};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::rays::bounds::Crossing;
+use crate::fast::rays::packet::{Nearest, Ray, Surface};
+use crate::parts::BUILT;
 
 /// A packet of rays in the coordinates of a body.
 #[derive(Clone, Copy)]
@@ -42,27 +46,65 @@ struct Local<S: Simd, E: Real> {
     direction: Vec3<S, E>,
 }
 
-/// Where rays meet a body, in its coordinates or those of the scene: the place brought onto it, the unit normal on the side
-/// that they came from, and whether that is the inside.
-struct Met<S: Simd, E: Real> {
+/// The hits of a packet on a body, in its coordinates or those of the scene: the point, moved onto the surface; the
+/// unit normal on the side that the ray came from; and whether that side is the inside.
+struct BodyHit<S: Simd, E: Real> {
     point: Vec3<S, E>,
     normal: Vec3<S, E>,
     within: Mask<S, E>,
 }
 
-/// A shape in its own coordinates.
+/// The shape of a body along its axes, in `f64`.
+#[derive(Clone, Copy, Debug)]
+enum AnyForm {
+    Plane(PlaneForm),
+    Disc(DiscForm),
+    Cone(ConeForm),
+    Torus(TorusForm),
+    Cuboid(CuboidForm),
+}
+
+impl AnyForm {
+    /// Returns the shape of an object and its coordinate frame, or `None` if the object is no body.
+    fn new(object: &Object, place: Place) -> Option<(Frame, Self)> {
+        fn of<F>(form: fn(F) -> AnyForm) -> impl Fn((Frame, F)) -> (Frame, AnyForm) {
+            move |(frame, own)| (frame, form(own))
+        }
+        Some(match object {
+            Object::Plane(o) => of(Self::Plane)(PlaneForm::new(o, place)),
+            Object::Disc(o) => of(Self::Disc)(DiscForm::new(o, place)),
+            Object::Cylinder(o) => of(Self::Cone)(ConeForm::new([o.radius(); 2], o.ends(), place)),
+            Object::Cone(o) => of(Self::Cone)(ConeForm::new(o.radii(), o.ends(), place)),
+            Object::Torus(o) => of(Self::Torus)(TorusForm::new(o, place)),
+            Object::Instance(o) => of(Self::Cuboid)(CuboidForm::new(turned_box(o)?, o.placement(), place)),
+            _ => return None,
+        })
+    }
+
+    fn form(&self) -> &dyn Form {
+        match self {
+            Self::Plane(form) => form,
+            Self::Disc(form) => form,
+            Self::Cone(form) => form,
+            Self::Torus(form) => form,
+            Self::Cuboid(form) => form,
+        }
+    }
+}
+
+/// A shape in its own coordinates, as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 enum Shape<E> {
     Plane,
     Disc(Disc<E>),
-    /// With the middle of the end b.
+    /// A cone, and the centre of its end b.
     Cone(Cone<E>, [E; 3]),
     Torus(Torus<E>),
     Cuboid(Cuboid<E>),
 }
 
 impl<E> Shape<E> {
-    /// Whether this build looks for it.
+    /// Returns whether this build intersects the shape.
     #[inline(always)]
     fn is_built(&self) -> bool {
         match self {
@@ -75,14 +117,14 @@ impl<E> Shape<E> {
     }
 }
 
-/// A body as the kernels read it.
+/// A body as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Body<E> {
-    /// Orthonormal; the last is that of what is round.
+    /// Orthonormal axes. The last is the axis of symmetry of round shapes.
     axes: [[E; 3]; 3],
-    /// Where they start.
+    /// The origin of the axes.
     center: [E; 3],
-    /// How far off its surface a new ray starts, beside what depends on the place.
+    /// The offset of a new ray from the surface, without the part that depends on the hit point.
     offset: E,
     order: E,
     shape: Shape<E>,
@@ -91,17 +133,17 @@ pub(super) struct Body<E> {
 impl<E: Real> Body<E> {
     fn new(solid: &Solid) -> Self {
         let shape = match solid.form {
-            Form::Plane => Shape::Plane,
-            Form::Disc { radius } => Shape::Disc(Disc::new(radius)),
-            Form::Cone { radii, height, end } => {
+            AnyForm::Plane(_) => Shape::Plane,
+            AnyForm::Disc(DiscForm { radius }) => Shape::Disc(Disc::new(radius)),
+            AnyForm::Cone(ConeForm { radii, height, end }) => {
                 Shape::Cone(Cone::new(radii, height), end.to_array().map(E::narrow))
             }
-            Form::Torus { radius, thickness } => Shape::Torus(Torus::new(radius, thickness)),
-            Form::Cuboid { half } => Shape::Cuboid(Cuboid::new(half)),
+            AnyForm::Torus(TorusForm { radius, thickness }) => Shape::Torus(Torus::new(radius, thickness)),
+            AnyForm::Cuboid(CuboidForm { half }) => Shape::Cuboid(Cuboid::new(half)),
         };
         Self {
-            axes: solid.axes.map(|axis| axis.to_array().map(E::narrow)),
-            center: solid.center.to_array().map(E::narrow),
+            axes: solid.frame.axes.map(|axis| axis.to_array().map(E::narrow)),
+            center: solid.frame.center.to_array().map(E::narrow),
             offset: E::narrow(OFFSET * E::ROUNDOFF * solid.extent()),
             order: E::narrow(f64::from(solid.order)),
             shape,
@@ -132,33 +174,34 @@ impl<E: Real> Body<E> {
         Vec3::splat(simd, z).scale_add(v.z, along)
     }
 
-    /// What its own coordinates say in those of the scene.
+    /// Converts a hit from the body's coordinates to those of the scene.
     #[inline(always)]
-    fn in_scene<S: Simd>(&self, simd: S, Met { point, normal, within }: Met<S, E>) -> Met<S, E> {
+    fn in_scene<S: Simd>(&self, simd: S, BodyHit { point, normal, within }: BodyHit<S, E>) -> BodyHit<S, E> {
         let center = Vec3::splat(simd, self.center);
         let point = self.turned_back(simd, point).scale_add(constant::<S, E>(simd, 1.0), center);
-        Met { point, normal: self.turned_back(simd, normal), within }
+        BodyHit { point, normal: self.turned_back(simd, normal), within }
     }
 
-    /// How high over the end b rays start, as exactly as over the end a: caps in the plane of a face are met where that is.
+    /// Returns the height of the ray origins above the end b, as exact as that above the end a. So a cap in the plane
+    /// of a face is hit at the face's distance.
     #[inline(always)]
     fn over<S: Simd>(&self, simd: S, end: [E; 3], ray: Ray<S, E>) -> Lanes<S, E> {
         Vec3::splat(simd, self.axes[2]).dot(ray.origin.sub(Vec3::splat(simd, end)))
     }
 
-    /// Offers where the rays meet the body, one of the tree: planes are met by themselves.
-    // Out of line, so that there is one piece of code for all that looks for bodies.
+    /// Offers the hits of the rays with the body, one of the tree. Planes are intersected separately.
+    // Out of line, so that all searches for bodies share one piece of code.
     #[inline(never)]
-    fn meet<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    fn intersect<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         if !self.shape.is_built() {
             return;
         }
-        // Apart, as discs need none of the room that the long tests of the others do.
+        // A separate branch, because discs need none of the stack that the long tests of the other shapes need.
         if let Shape::Disc(disc) = &self.shape {
             simd.vectorize(
                 #[inline(always)]
                 || {
-                    let (hit, distance) = disc.meet(simd, self.local(simd, ray));
+                    let (hit, distance) = disc.intersect(simd, self.local(simd, ray));
                     nearest.offer(simd, hit, distance, self.order);
                 },
             );
@@ -168,9 +211,9 @@ impl<E: Real> Body<E> {
                 || {
                     let local = self.local(simd, ray);
                     let (hit, distance) = match &self.shape {
-                        Shape::Cone(cone, end) => cone.meet(simd, local, self.over(simd, *end, ray)),
-                        Shape::Torus(torus) => torus.meet(simd, local, nearest.distance),
-                        Shape::Cuboid(cuboid) => cuboid.meet(simd, local),
+                        Shape::Cone(cone, end) => cone.intersect(simd, local, self.over(simd, *end, ray)),
+                        Shape::Torus(torus) => torus.intersect(simd, local, nearest.distance),
+                        Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
                         Shape::Plane | Shape::Disc(_) => return,
                     };
                     nearest.offer(simd, hit, distance, self.order);
@@ -179,7 +222,7 @@ impl<E: Real> Body<E> {
         }
     }
 
-    /// Offers where the rays meet the body, a plane, if any of the `open` ones do.
+    /// Offers the hits of the rays with the body, a plane, if any of the `open` rays hits it.
     #[inline(always)]
     fn meet_plane<S: Simd>(&self, simd: S, ray: Ray<S, E>, open: Mask<S, E>, nearest: &mut Nearest<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
@@ -193,7 +236,7 @@ impl<E: Real> Body<E> {
         }
     }
 
-    /// The surface where the rays meet the body.
+    /// Returns the surface at the hits of the rays with the body.
     #[inline(never)]
     pub(super) fn surface<S: Simd>(&self, simd: S, ray: Ray<S, E>, distance: Lanes<S, E>) -> Surface<S, E> {
         simd.vectorize(
@@ -217,7 +260,7 @@ impl<E: Real> Body<E> {
                         self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
                     }
                 };
-                let Met { point, normal, within } = met;
+                let BodyHit { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
                 let offset = size
                     .mul_add(constant::<S, E>(simd, OFFSET * E::ROUNDOFF), splat::<S, E>(simd, self.offset));
@@ -227,24 +270,25 @@ impl<E: Real> Body<E> {
     }
 }
 
-/// How far off its surface a new ray starts, in roundoffs of the place and of the body.
+/// The offset of a new ray from the surface, in roundoffs of the hit point and of the body.
 const OFFSET: f64 = 64.0;
 
 /// All bodies of a scene.
 #[derive(Debug)]
 pub(super) struct Bodies<E> {
-    /// Planes first, then in the order of the tree's leaves.
+    /// The planes first, then the other bodies in the order of the tree's leaves.
     bodies: Vec<Body<E>>,
     planes: usize,
     way: Way<E>,
-    /// Those of the tree, where they are few.
-    few: Option<Few<E>>,
+    /// The bounding volumes of the bodies of the tree, if a mask has enough bits.
+    few: Option<BodyCuller<E>>,
 }
 
-/// Any body, whether they are few or many.
+/// The mask of all bodies, for any number of them.
 pub(super) const ANY: u64 = u64::MAX;
 
-/// How bodies are found: one question, so that those in a tree do not ask for planes.
+/// The structures that are searched for bodies. One match decides, so that a scene with a tree alone does not check for
+/// planes.
 #[derive(Debug)]
 enum Way<E> {
     Tree(Tree<E>),
@@ -259,7 +303,7 @@ impl<E: Real> Bodies<E> {
         let branches = group(&mut bounded, Some(true), Copies::Kept);
         let count = planes.len();
         let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
-        let few = Few::new(&bounded);
+        let few = BodyCuller::new(&bounded);
         planes.append(&mut bounded);
         let way = match tree {
             Some(tree) if count == 0 => Way::Tree(tree),
@@ -269,20 +313,21 @@ impl<E: Real> Bodies<E> {
         Self { bodies: planes.iter().map(Body::new).collect(), planes: count, way, few }
     }
 
-    /// Where each stands, by its order in the script.
+    /// Returns, for each body, its order in the script and its index here.
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
         self.bodies.iter().enumerate().map(|(at, body)| (body.order.to_index(), at))
     }
 
-    /// The boxes around those that have bounds, in the order of the bits that ask for them; none where they are too many for
-    /// that.
-    pub(super) fn boxes(&self) -> Option<&[Placed]> {
+    /// Returns the bounding boxes of the bodies that have one, in the order of their bits in a mask, or `None` if there
+    /// are too many for a mask.
+    pub(super) fn boxes(&self) -> Option<&[PlacedShape]> {
         self.few.as_ref().map(|few| &few.boxes[..])
     }
 
-    /// Offers where the rays meet a body that is not farther than what they met before: a plane, or one that `bits` asks for.
+    /// Offers the hits of the rays that are no farther than the nearest hits so far, with planes and with the bodies of
+    /// the mask `bits`.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, simd: S, bits: u64, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    pub(super) fn intersect<S: Simd>(&self, simd: S, bits: u64, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         match &self.way {
             Way::Tree(tree) => self.meet_bounded(simd, (tree, bits), ray, nearest),
             Way::Planes => self.meet_planes(simd, ray, nearest),
@@ -293,12 +338,12 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Whether any body is a plane.
+    /// Returns whether any body is a plane.
     pub(super) fn has_planes(&self) -> bool {
         BUILT.planes && self.planes > 0
     }
 
-    /// The tree of those that have bounds.
+    /// Returns the tree of the bodies that have bounding boxes.
     pub(super) fn tree(&self) -> Option<&Tree<E>> {
         match &self.way {
             Way::Tree(tree) | Way::Both(tree) => Some(tree),
@@ -306,7 +351,8 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Offers where the rays meet a body of the tree: one that `bits` asks for, if they are few.
+    /// Offers the hits of the rays with the bodies of the tree; only with those of the mask `bits`, if the bodies have
+    /// bits.
     #[inline(always)]
     pub(super) fn meet_bounded<S: Simd>(
         &self,
@@ -325,19 +371,20 @@ impl<E: Real> Bodies<E> {
     fn meet_few<S: Simd>(
         &self,
         simd: S,
-        (few, mut bits): (&Few<E>, u64),
+        (few, mut bits): (&BodyCuller<E>, u64),
         ray: Ray<S, E>,
         nearest: &mut Nearest<S, E>,
     ) {
         let zero = constant::<S, E>(simd, 0.0);
-        // What others may write to stands in memory: a copy does, and `nearest` need not.
+        // A callee that is not inlined needs its argument in memory. This copy is there, so that `nearest` can stay in
+        // registers.
         let mut with = *nearest;
         while bits != 0 {
             let bit = bits.trailing_zeros() as usize;
             bits &= bits - 1;
             let open = with.distance.simd_gt(zero);
             if (open & few.are_near(simd, bit, ray)).any_true() {
-                self.bodies[self.planes + bit].meet(simd, ray, &mut with);
+                self.bodies[self.planes + bit].intersect(simd, ray, &mut with);
             }
         }
         *nearest = with;
@@ -345,8 +392,8 @@ impl<E: Real> Bodies<E> {
 
     #[inline(always)]
     fn meet_in_tree<S: Simd>(&self, simd: S, tree: &Tree<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        // Computed distances are no nearer than this to those of boxes beyond them.
-        let slack = constant::<S, E>(simd, super::rounding::distance_error::<E>());
+        // A computed distance is below that of the box around its body by no more than this error.
+        let slack = constant::<S, E>(simd, crate::fast::arithmetic::rounding::distance_error::<E>());
         let crossing = Crossing::new(simd, ray);
         let found = core::cell::Cell::new(*nearest);
         descend(
@@ -356,13 +403,13 @@ impl<E: Real> Bodies<E> {
             |node| {
                 let distance = found.get().distance;
                 let limit = distance.mul_add(slack, distance + slack);
-                crossing.meets(simd, node.low, node.high, limit).any_true()
+                crossing.intersects(simd, node.low, node.high, limit).any_true()
             },
             #[inline(always)]
             |_, items| {
                 let mut nearest = found.get();
                 for body in &self.bodies[items] {
-                    body.meet(simd, ray, &mut nearest);
+                    body.intersect(simd, ray, &mut nearest);
                 }
                 found.set(nearest);
                 true
@@ -371,16 +418,17 @@ impl<E: Real> Bodies<E> {
         *nearest = found.get();
     }
 
-    /// Offers where the rays meet the planes, of which no more than one axis is needed.
+    /// Offers the hits of the rays with the planes. A plane needs only one axis.
     #[inline(always)]
     pub(super) fn meet_planes<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        // What others may write to stands in memory: a copy does, and `nearest` need not.
+        // A callee that is not inlined needs its argument in memory. This copy is there, so that `nearest` can stay in
+        // registers.
         let mut with = *nearest;
         self.meet_planes_out_of_line(simd, ray, &mut with);
         *nearest = with;
     }
 
-    // So that scenes without planes are not prepared for them.
+    // Out of line, so that scenes without planes set up nothing for them.
     #[inline(never)]
     fn meet_planes_out_of_line<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         if !BUILT.planes {
@@ -398,18 +446,18 @@ impl<E: Real> Bodies<E> {
         );
     }
 
-    /// Offers where the rays meet one of the bodies.
+    /// Offers the hits of the rays with one of the bodies.
     pub(super) fn meet_one<S: Simd>(&self, simd: S, at: usize, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         let body = &self.bodies[at];
         if at < self.planes {
             let all = nearest.distance.simd_gt(constant::<S, E>(simd, 0.0));
             body.meet_plane(simd, ray, all, nearest);
         } else {
-            body.meet(simd, ray, nearest);
+            body.intersect(simd, ray, nearest);
         }
     }
 
-    /// Which of the rays that `lit` names meet no plane and no body that `bits` asks for, nearer than `far`.
+    /// Returns the rays of `lit` that hit no plane and no body of the mask `bits` nearer than `far`.
     #[inline(always)]
     pub(super) fn unoccluded<S: Simd>(
         &self,
@@ -420,14 +468,14 @@ impl<E: Real> Bodies<E> {
         lit: Mask<S, E>,
     ) -> Mask<S, E> {
         let mut nearest = Nearest::none(simd);
-        // What is in the dark has no way to go.
+        // Lanes in the dark get a negative distance, so that nothing is searched for them.
         nearest.distance = lit.select(far, constant::<S, E>(simd, -1.0));
         let limit = nearest.distance;
-        self.meet(simd, bits, ray, &mut nearest);
+        self.intersect(simd, bits, ray, &mut nearest);
         lit & !nearest.distance.simd_lt(limit)
     }
 
-    /// The surface of one of the bodies.
+    /// Returns the surface of one of the bodies.
     #[inline(always)]
     pub(super) fn surface<S: Simd>(
         &self,

@@ -1,36 +1,43 @@
-//! Tori: all that is as far as r from a circle of radius R.
+//! Tori: the points at distance r from a circle of radius R.
 //!
-//! With ρ the distance from the axis, the surface is where s = (ρ - R)² + z² - r² is 0. Squared, that is a quartic along
-//! the ray with the sign of s; from the place nearest to the middle, where its cubic term is 0, its derivative over 4 is
-//! t³ + p·t + v. Between two roots of that the quartic goes one way and has one root at most. So roots are bracketed: by
-//! those of the cubic, which Newton's method finds from where it cannot overshoot. The quartic is never computed: where s
-//! has another sign at both ends of such a stretch, there is the hit. s errs by some roundoffs of the torus's size, far less
-//! than what a new ray starts off the surface by.
+//! With ρ the distance from the axis, the surface is where s = (ρ - R)² + z² - r² is 0. Multiplied by its conjugate, s
+//! becomes a quartic along the ray with the same sign. If t counts from the point nearest to the centre, the quartic's
+//! cubic term is 0, and a quarter of its derivative is the cubic t³ + p·t + v. Between two roots of the cubic the
+//! quartic is monotonic and has at most one root. So the roots of the cubic bracket the hits. Newton's method finds
+//! them from starting points where it cannot overshoot. The quartic itself is never computed: if s has different signs
+//! at the ends of an interval, the hit is in it. The error of s is a few roundoffs of the torus's size, far less than
+//! the offset of a new ray from the surface.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
+use rayfold_scene::model::unit;
 
-use super::{Local, Met};
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use super::solid::{Form, Frame, Place};
+use super::{BodyHit, Local};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::shared::{Ring, Surface};
 
-/// Newton's method alone finds most roots in so many steps.
+/// The number of steps in which Newton's method alone finds most roots.
 const FAST: u32 = 6;
 
-/// A bracket is narrowed so often at most: after the fast steps it is halved every third time, so that it ends at the last bit
-/// also where a ray grazes the torus and tangents help little.
+/// The largest number of steps that narrow a bracket. After the fast steps every third one is a bisection, so that the
+/// search ends at the last bit even if a ray grazes the torus and tangents help little.
 const STEPS: u32 = FAST + 3 * f64::MANTISSA_DIGITS;
 
-/// Steps to a root of the cubic at most, which get shorter by half at the least: towards two roots in one place.
+/// The largest number of steps to a root of the cubic. Each step is at most half as long as the one before; towards a
+/// double root it is just half.
 const TURN_STEPS: u32 = f64::MANTISSA_DIGITS;
 
-/// How near to a turn is near enough, in parts of the torus: s is known there up to the square of it, and where turns meet up to
-/// the cube.
+/// The tolerance of a root of the cubic, relative to the torus. There, s is accurate to the square of it, and to the
+/// cube at a double root.
 const NEAR_TURN: f64 = 1e-6;
 
-/// Around the origin, square to z; lengths are in units of the torus.
+/// A torus centred at the origin, perpendicular to z. Lengths are in units of the torus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Torus<E> {
-    /// R and r.
+    /// The radius R of the circle and the radius r of the tube.
     ring: E,
     tube: E,
 }
@@ -38,16 +45,16 @@ pub(super) struct Torus<E> {
 /// The part of a ray that is near the torus.
 #[derive(Clone, Copy)]
 struct Chord<S: Simd, E: Real> {
-    /// The place nearest to the middle.
+    /// The point of the ray nearest to the centre.
     place: Vec3<S, E>,
     direction: Vec3<S, E>,
     ring: Lanes<S, E>,
-    /// r²
+    /// The square of the tube's radius, r².
     square: Lanes<S, E>,
 }
 
 impl<S: Simd, E: Real> Chord<S, E> {
-    /// Negative within the tube.
+    /// Returns s, which is negative within the tube.
     #[inline(always)]
     fn outside(&self, t: Lanes<S, E>) -> Lanes<S, E> {
         let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
@@ -55,7 +62,7 @@ impl<S: Simd, E: Real> Chord<S, E> {
         over.mul_add(over, z * z) - self.square
     }
 
-    /// The same, and how it changes along the ray; that may be no number on the axis.
+    /// Returns s and its derivative along the ray, which may be NaN on the axis.
     #[inline(always)]
     fn outside_and_slope(&self, t: Lanes<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
         let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
@@ -73,7 +80,7 @@ impl<E: Real> Torus<E> {
     }
 
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(
+    pub(super) fn intersect<S: Simd>(
         &self,
         simd: S,
         ray: Local<S, E>,
@@ -87,7 +94,7 @@ impl<E: Real> Torus<E> {
         let outer = (ring + tube) * constant::<S, E>(simd, 1.0 + 8.0 * E::ROUNDOFF);
         let near = place.dot(place);
         let half_chord = outer.mul_sub(outer, near).max(zero).sqrt();
-        // Where the ray is between the planes that touch the torus from above and below.
+        // The interval in which the ray is between the planes that touch the torus from above and below.
         let inverse = constant::<S, E>(simd, 1.0) / direction.z;
         let wide = tube * constant::<S, E>(simd, 1.0 + 8.0 * E::ROUNDOFF);
         let (a, b) = ((zero - wide - place.z) * inverse, (wide - place.z) * inverse);
@@ -98,8 +105,8 @@ impl<E: Real> Torus<E> {
         let high = is_along.select(between.select(far, zero - far), a.max(b));
         let begin = (zero - middle).max(zero - half_chord).max(low);
         let end = half_chord.min(high);
-        // What was met before may end the search, but never the stretch in which a root is looked for: its last bits would
-        // turn on it. The rounding of the sum is far less than this.
+        // The nearest hit so far may end the search, but must not change the interval in which a root is bracketed: the
+        // root's last bits would depend on it. The rounding error of the sum is far less than this slack.
         let slack = (outer + middle.abs() + limit.abs()) * constant::<S, E>(simd, 8.0 * E::ROUNDOFF);
         let limit = limit - middle + slack;
         let mut open = begin.simd_lt(end) & begin.simd_le(limit) & near.simd_lt(outer * outer);
@@ -108,7 +115,7 @@ impl<E: Real> Torus<E> {
             return (none, zero);
         }
         let chord = Chord { place, direction, ring, square: tube * tube };
-        // The cubic over 4: t³ + p·t + v.
+        // A quarter of the quartic's derivative: t³ + p·t + v.
         let near_turn = outer * constant::<S, E>(simd, NEAR_TURN);
         let twice = (ring + ring) * ring * direction.z;
         let p = twice.mul_add(direction.z, near - ring.mul_add(ring, tube * tube));
@@ -117,14 +124,15 @@ impl<E: Real> Torus<E> {
         let turn = (zero - p * constant::<S, E>(simd, 1.0 / 3.0)).max(zero).sqrt();
         let least = begin.min(zero - turn);
         let most = end.max(turn);
-        // The roots of the cubic in order; where a stretch has none, its end.
+        // The roots of the cubic in order. For an interval without a root it is the interval's end.
         let turns = [
             cubic_root::<S, E>(simd, cubic, (least, zero - turn), least, near_turn),
             cubic_root::<S, E>(simd, cubic, (zero - turn, turn), zero, near_turn),
             cubic_root::<S, E>(simd, cubic, (turn, most), most, near_turn),
             end,
         ];
-        // What begins before the torus does is outside; what begins on it goes one way up to the first turn.
+        // An interval that begins before the torus begins outside. One that begins on the surface is monotonic up to
+        // the first turn.
         let is_ahead = begin.simd_gt(zero - middle);
         let mut at_from = chord.outside(begin);
         let mut side = is_ahead.select(constant::<S, E>(simd, 1.0), at_from);
@@ -148,7 +156,7 @@ impl<E: Real> Torus<E> {
         if !found.any_true() {
             return (none, zero);
         }
-        // Where it only touches, the turn is known better than the root.
+        // If the ray only touches the surface, the turn is more accurate than the root.
         let touches = at_end.simd_eq(zero);
         let sign = side.simd_lt(zero).select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
         let error = outer * constant::<S, E>(simd, 2.0 * E::ROUNDOFF);
@@ -167,9 +175,9 @@ impl<E: Real> Torus<E> {
         (found & distance.simd_gt(zero), distance)
     }
 
-    /// From within what is met first is the inside; from without it is the outside.
+    /// Returns the hit of each ray. A ray that starts within the torus hits the inside, any other the outside.
     #[inline(always)]
-    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> Met<S, E> {
+    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> BodyHit<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
         let (ring, tube) = (splat::<S, E>(simd, self.ring), splat::<S, E>(simd, self.tube));
         let place = ray.direction.scale_add(distance, ray.origin);
@@ -179,15 +187,15 @@ impl<E: Real> Torus<E> {
         let outward = place.sub(circle).normalize(simd);
         let start = Chord { place: ray.origin, direction: ray.direction, ring, square: tube * tube };
         let outside = start.outside(zero);
-        // From the surface itself what goes inwards is within.
+        // A ray from the surface itself that goes inwards is within.
         let inwards = outside.simd_eq(zero) & outward.dot(ray.direction).simd_gt(zero);
         let within = outside.simd_lt(zero) | inwards;
         let side = within.select(zero - one, one);
-        Met { point: outward.scale_add(tube, circle), normal: outward.scale(side), within }
+        BodyHit { point: outward.scale_add(tube, circle), normal: outward.scale(side), within }
     }
 }
 
-/// t³ + p·t + v
+/// The cubic t³ + p·t + v.
 #[derive(Clone, Copy)]
 struct Cubic<S: Simd, E: Real> {
     p: Lanes<S, E>,
@@ -201,8 +209,8 @@ impl<S: Simd, E: Real> Cubic<S, E> {
     }
 }
 
-/// Where the cubic is 0 between two places, between which it goes one way; the second place where it is not 0. On the way there
-/// from `start` it is bent away from 0, so that no tangent leads beyond the root.
+/// Returns the root of the cubic between two points, between which it is monotonic, or the second point if it has no
+/// root there. On the way from `start` to the root the cubic bends away from 0, so that no tangent overshoots the root.
 #[inline(always)]
 fn cubic_root<S: Simd, E: Real>(
     simd: S,
@@ -229,11 +237,12 @@ fn cubic_root<S: Simd, E: Real>(
     changes.select(root, to)
 }
 
-/// Where a function is 0, to within an `error`, that is not negative at the first of two places, and negative, or 0, at the
-/// second: places come with their values, what is asked with its slope. Only the `wanted` lanes need be right.
+/// Returns a root of a function, to within `error`. The function is not negative at the first of two points, and
+/// negative or 0 at the second. Both points come with their values; `value` returns a value and its slope. Only the
+/// `wanted` lanes need be right.
 ///
-/// Newton's method within a bracket, and bisection where that leads out of it or takes too long. Each lane goes its own way,
-/// whatever the others do.
+/// Uses Newton's method within a bracket, and bisection where a step would leave the bracket or convergence is slow.
+/// Each lane is independent of the others.
 #[inline(always)]
 fn bracketed<S: Simd, E: Real>(
     simd: S,
@@ -269,4 +278,43 @@ fn bracketed<S: Simd, E: Real>(
         open &= !ends;
     }
     root
+}
+
+/// A torus in its frame, perpendicular to the last axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TorusForm {
+    pub(super) radius: f64,
+    pub(super) thickness: f64,
+}
+
+impl TorusForm {
+    pub(super) fn new(torus: &rayfold_scene::Torus, place: Place) -> (Frame, Self) {
+        let frame = Frame::round_about(unit(torus.normal()), place.point(torus.center()));
+        (frame, Self { radius: place.scale * torus.radius(), thickness: place.scale * torus.thickness() })
+    }
+}
+
+impl Form for TorusForm {
+    fn size(&self) -> f64 {
+        self.radius + self.thickness
+    }
+
+    fn each_surface(&self, frame: &Frame, each: &mut dyn FnMut(Surface)) {
+        let &Frame { axes: [.., axis], center } = frame;
+        each(Surface::Ring(Ring { center, axis, radius: self.radius, thickness: self.thickness }));
+    }
+
+    fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
+        let aside = place.x.hypot(place.y);
+        ((aside - self.radius).hypot(place.z) - self.thickness).abs() <= near
+    }
+
+    fn ball(&self, frame: &Frame) -> (DVec3, f64) {
+        (frame.center, self.size())
+    }
+
+    fn bounds(&self, frame: &Frame) -> Option<Bounds> {
+        let reach = self.radius * frame.circle() + self.thickness;
+        Some((frame.center - reach, frame.center + reach))
+    }
 }

@@ -1,11 +1,11 @@
-//! A lamp: light from a place. Its shadow rays end there.
+//! A lamp: a point light, whose shadow rays end at it.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
-use crate::fast::packet::Ray;
-use crate::fast::real::{Lanes, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant, splat};
+use crate::fast::rays::packet::Ray;
 use crate::scale::below_inverse;
 
 /// A lamp in the kernels' coordinates.
@@ -13,14 +13,14 @@ use crate::scale::below_inverse;
 pub(in crate::fast) struct Place {
     pub(in crate::fast) position: DVec3,
     color: DVec3,
-    /// Of its ball.
+    /// The radius of its sphere.
     pub(in crate::fast) radius: f64,
-    /// The distance at which its colour arrives; 0 where it does at all.
+    /// The distance at which its intensity equals its colour; 0 if the light does not fall off.
     reach: f64,
 }
 
 impl Place {
-    /// Moved so that `center` is the origin, and then scaled.
+    /// Makes a lamp, moved so that `center` is the origin, and then scaled.
     pub(in crate::fast) fn new(lamp: &rayfold_scene::Lamp, center: DVec3, scale: f64) -> Self {
         let position = (lamp.position() - center) * scale;
         let (color, reach) = balanced(lamp.color(), lamp.reach() * scale);
@@ -28,36 +28,37 @@ impl Place {
     }
 }
 
-/// Reaches whose squares are as large as numbers of the kernels may be, and as small.
+/// The reaches whose squares neither overflow nor underflow in the kernels.
 const REACHES: core::ops::Range<f64> = 1e-60..1e60;
 
-/// A colour and a reach that light alike, such that the square of the reach is not beyond all numbers: by a power of two, without
-/// rounding.
+/// Returns a colour and a reach that give the same light and whose squared reach does not overflow or underflow. Scales
+/// by a power of two, without rounding.
 fn balanced(color: DVec3, reach: f64) -> (DVec3, f64) {
     if reach == 0.0 || REACHES.contains(&reach) {
         return (color, reach);
     }
     let part = below_inverse(reach);
-    // In two steps: the square of the part may be beyond all numbers itself.
+    // In two steps, because the square of the factor may itself overflow.
     let color = (color / part / part).clamp(DVec3::splat(-BRIGHTEST), DVec3::splat(BRIGHTEST));
     (color, reach * part)
 }
 
-/// Whatever is brighter is as bright; products of it with what arrives are numbers.
+/// The largest brightness of a colour; brighter ones are clamped to it. Products with the arriving share stay finite.
 const BRIGHTEST: f64 = 1e120;
 
-/// How near the lamp, in roundoffs of its distance, a surface is taken for one that it lies in, which does not hide it.
+/// The distance from the lamp, in roundoffs of the ray's length, below which a surface does not hide the lamp: the lamp
+/// may be in that surface.
 ///
-/// The distance to a surface errs by some roundoffs over the sine of the angle at which the ray meets it; a surface in
-/// which the lamp lies is met at angles down to 2⁻¹⁴ and less.
+/// The distance to a surface has an error of some roundoffs divided by the sine of the angle between the ray and the
+/// surface. A surface that contains the lamp is hit at angles down to 2⁻¹⁴ and less.
 const AT_THE_LAMP: f64 = 1048576.0;
 
-/// A lamp as the kernels read it.
+/// A lamp as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Lamp<E> {
     position: [E; 3],
     pub(in crate::fast) color: [E; 3],
-    /// Its square.
+    /// The square of the reach.
     reach: Option<E>,
 }
 
@@ -65,9 +66,9 @@ pub(in crate::fast) struct Lamp<E> {
 #[derive(Clone, Copy)]
 pub(in crate::fast) struct Rays<S: Simd, E: Real> {
     pub(in crate::fast) ray: Ray<S, E>,
-    /// What is met nearer than this hides the lamp.
+    /// The distance to the lamp: a hit nearer than this hides it.
     pub(in crate::fast) far: Lanes<S, E>,
-    /// What arrives of each channel's light.
+    /// The share of the light that arrives, the same in each channel.
     pub(in crate::fast) part: Lanes<S, E>,
 }
 
@@ -80,14 +81,16 @@ impl<E: Real> Lamp<E> {
         }
     }
 
-    /// From where rays leave a surface to the lamp. From the lamp's own place they lead back into the surface.
+    /// Returns the shadow rays from points off a surface to the lamp. A ray from the lamp's own position goes back into
+    /// the surface.
     #[inline(always)]
     pub(in crate::fast) fn rays<S: Simd>(&self, simd: S, start: Vec3<S, E>) -> Rays<S, E> {
         let middle = Vec3::splat(simd, self.position);
         self.rays_to(simd, start, middle)
     }
 
-    /// The same to points of its ball, one for each ray; how much arrives depends on the distance of its middle.
+    /// Returns the shadow rays to points of the lamp's sphere, one for each ray. The share that arrives depends on the
+    /// distance of the sphere's centre.
     #[inline(always)]
     pub(in crate::fast) fn rays_to<S: Simd>(
         &self,

@@ -1,9 +1,8 @@
-//! The lights of a scene: a kind of light is a file.
+//! The lights of a scene: each kind of light has a file.
 //!
-//! A sun's rays all have one direction, so its tests against shapes are worked out for that direction once, and what can
-//! stand in its way is found on its screen. A light that has a place shares none of that: a shadow ray of its own is a
-//! [`Ray`](super::packet::Ray) like a mirrored one, and what it meets before its end is in its way.
+//! A sun's shadow rays all have one direction. So the constants of its tests are computed once for that direction, and
+//! its possible occluders are found on its screen. A lamp shares none of that. Its shadow ray is a
+//! [`Ray`](crate::fast::rays::packet::Ray) like a reflected one, and any hit before its end occludes.
 
-pub(super) mod buffer;
 pub(super) mod lamp;
 pub(super) mod sun;

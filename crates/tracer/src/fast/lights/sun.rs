@@ -1,32 +1,32 @@
-//! A sun: light from infinity, all of it in one direction.
+//! A sun: a directional light.
 //!
-//! What is true of suns alone is here: axes of its own, along which a sphere is a circle; the outlines that objects have
-//! on its screen; the beam of shadow rays that start in a region, and which outlines it meets.
+//! This file has the parts that only suns need: axes of its own, along which a sphere is a circle; the outlines of
+//! objects on its screen; and the beam of shadow rays that start in a region, with the outlines that it hits.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 
-use crate::fast::placed::Placed;
-use crate::fast::real::{Lanes, Real, Vec3, constant};
-use crate::fast::rounding::{BEAM, BOUNDS};
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
+use crate::fast::arithmetic::rounding::{BEAM, BOUNDS};
+use crate::fast::rays::placed::RenderSpaceShape;
 
-/// A sun in the kernels' coordinates: the unit vector towards its middle, its colour, and its extent.
+/// A sun in the kernels' coordinates: the unit vector towards its centre, its colour, and its extent.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Direction {
     pub(in crate::fast) towards: DVec3,
     pub(in crate::fast) color: DVec3,
-    /// 1 - cos of half the angle that it spans.
+    /// 1 - cos of half of its angular diameter.
     pub(in crate::fast) spread: f64,
 }
 
-/// A sun as the kernels read it.
+/// A sun as the kernels use it.
 #[derive(Clone, Debug)]
 pub(in crate::fast) struct Sun<E> {
-    /// Orthonormal; the last points towards the light.
+    /// Orthonormal axes. The last points towards the light.
     pub(in crate::fast) axes: [[E; 3]; 3],
     pub(in crate::fast) color: [E; 3],
-    /// 1 / direction for the axes where it is not zero.
+    /// The reciprocals of the direction's coordinates that are not zero.
     pub(in crate::fast) inverse: [Option<E>; 3],
 }
 
@@ -40,18 +40,18 @@ impl<E: Real> Sun<E> {
         }
     }
 
-    /// The axes as the kernels have them, a row each: so both sides of a test see the same map.
+    /// Returns the axes as rounded for the kernels, one per row. So both sides of a test use the same map.
     pub(in crate::fast) fn rounded(&self) -> DMat3 {
         DMat3::from_cols_array_2d(&self.axes.map(|axis| axis.map(Real::widen))).transpose()
     }
 
-    /// The unit vector towards it.
+    /// Returns the unit vector towards it.
     #[inline(always)]
     pub(in crate::fast) fn towards<S: Simd>(&self, simd: S) -> Vec3<S, E> {
         Vec3::splat(simd, self.axes[2])
     }
 
-    /// A point in the sun's own axes.
+    /// Returns a point in the sun's own axes.
     #[inline(always)]
     pub(in crate::fast) fn facing<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Vec3<S, E> {
         let [x, y, z] = self.axes;
@@ -62,7 +62,7 @@ impl<E: Real> Sun<E> {
         )
     }
 
-    /// The shadow rays that start in a box, wider by the rounding errors.
+    /// Returns the shadow rays that start in a box, widened by the rounding errors.
     #[inline(always)]
     pub(in crate::fast) fn beam(&self, low: [E; 3], high: [E; 3]) -> Beam {
         let mut spans = [(0.0, 0.0); 3];
@@ -73,7 +73,7 @@ impl<E: Real> Sun<E> {
                 let (a, b) = (direction.widen() * low.widen(), direction.widen() * high.widen());
                 *from += a.min(b);
                 *to += a.max(b);
-                // Of all coordinates: the light's axes are square to each other but for rounding.
+                // The sum over all coordinates, because the sun's axes are perpendicular only up to rounding.
                 slack += low.widen().abs().max(high.widen().abs());
             }
             *from -= BEAM * E::ROUNDOFF * slack;
@@ -86,8 +86,8 @@ impl<E: Real> Sun<E> {
     }
 }
 
-/// A region's shadow rays: the rectangle and the least height on a sun's screen, and where they start along the scene's
-/// axes, times the signs of the direction towards it.
+/// The shadow rays of a region: the rectangle and the smallest height on a sun's screen, and the smallest start along
+/// each axis of the scene, times the sign of the direction towards the sun.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Beam {
     pub(in crate::fast) low: [f64; 2],
@@ -96,8 +96,8 @@ pub(in crate::fast) struct Beam {
     pub(in crate::fast) starts: [f64; 3],
 }
 
-/// An object as a sun sees it: a rectangle on its screen, how near to the light it reaches, and the farthest that it
-/// reaches along each scene axis in the light's direction, times the sign of that.
+/// An object as seen from a sun: a rectangle on its screen, the height up to which it reaches towards the light, and
+/// the farthest point along each axis of the scene in the light's direction, times the sign of that direction.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Outline {
     pub(in crate::fast) low: [f64; 2],
@@ -107,19 +107,19 @@ pub(in crate::fast) struct Outline {
 }
 
 impl Outline {
-    /// `axes` are the sun's [rounded](Sun::rounded) ones.
-    pub(in crate::fast) fn new<E: Real>(shape: &impl Placed, axes: DMat3) -> Self {
+    /// Makes an outline. `axes` are the sun's [rounded](Sun::rounded) axes.
+    pub(in crate::fast) fn new<E: Real>(shape: &impl RenderSpaceShape, axes: DMat3) -> Self {
         let slack = BOUNDS * E::ROUNDOFF * shape.magnitude();
         let reach = |axis: DVec3| shape.support(axis) + 2.0 * slack;
         let [x, y] = [axes.row(0), axes.row(1)];
         let (min, max) = shape.bounds();
-        // A face is exact: what starts beyond it, if only by its offset, is beyond it.
+        // A face along the axes is exact. A ray that starts beyond it, if only by its offset, is beyond it.
         let is_exact = shape.is_its_box();
         let rounded = |x: f64| if is_exact { E::narrow(x).widen() } else { x + slack };
         let mut exits = [0.0; 3];
         for (axis, limit) in exits.iter_mut().enumerate() {
             let towards = axes.row(2)[axis];
-            // A light along the other two axes passes on both sides.
+            // A sun along one of the other two axes also shines past both sides of the object.
             let exit = if towards > 0.0 {
                 max[axis]
             } else if towards < 0.0 {
@@ -133,9 +133,9 @@ impl Outline {
     }
 }
 
-/// The outlines of few objects, in columns, so that a packet of them is compared at once.
+/// The outlines of few objects, as a structure of arrays, so that a packet of them is compared at once.
 ///
-/// The columns are as long as a multiple of every packet's width; what is added overlaps nothing.
+/// The columns are padded to a multiple of every packet's width. The padding overlaps no beam.
 #[derive(Clone, Debug, Default)]
 pub(in crate::fast) struct Outlines<E> {
     low: [Vec<E>; 2],
@@ -145,7 +145,7 @@ pub(in crate::fast) struct Outlines<E> {
 }
 
 impl<E: Real> Outlines<E> {
-    /// In `room` rows.
+    /// Makes columns of `room` rows.
     pub(in crate::fast) fn new(of: &[Outline], room: usize) -> Self {
         let column = |value: &dyn Fn(&Outline) -> f64, never: f64| {
             let mut column: Vec<E> = of.iter().map(|outline| E::narrow(value(outline))).collect();
@@ -160,9 +160,9 @@ impl<E: Real> Outlines<E> {
         }
     }
 
-    /// Those that can stand in a beam's way, by bits.
+    /// Returns the possible occluders of a beam, as bits.
     #[inline(always)]
-    pub(in crate::fast) fn in_the_way<S: Simd>(&self, simd: S, beam: Beam) -> u64 {
+    pub(in crate::fast) fn occluders<S: Simd>(&self, simd: S, beam: Beam) -> u64 {
         let (left, right) = (constant::<S, E>(simd, beam.low[0]), constant::<S, E>(simd, beam.high[0]));
         let (bottom, top) = (constant::<S, E>(simd, beam.low[1]), constant::<S, E>(simd, beam.high[1]));
         let near = constant::<S, E>(simd, beam.height);

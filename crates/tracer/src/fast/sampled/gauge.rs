@@ -4,9 +4,9 @@ use glam::{DMat3, DVec2, DVec3};
 use rayfold_scene::model::unit;
 use rayfold_scene::{Cuboid, Light, Object, Scene, Shine};
 
-use crate::fast::lens::Lens;
+use crate::fast::placement::lens::Lens;
+use crate::fast::rays::view::{View, view};
 use crate::fast::shapes::instance::in_world;
-use crate::fast::view::{View, view};
 
 /// Pixels in the scene, and where its light comes from.
 #[derive(Debug)]

@@ -5,8 +5,6 @@
 //! `light` is the one step that knows lights with an extent.
 
 mod gauge;
-mod hulls;
-pub(super) mod light;
 mod scouts;
 mod stand_ins;
 mod tile;
@@ -20,23 +18,21 @@ use rayfold_scene::{Scene, Tone};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-use self::light::Extents;
 use self::scouts::Scouts;
 use self::tile::{Pass, SampledTile, Workspace};
-use super::dispatch::on;
-#[cfg(all(target_arch = "x86_64", feature = "narrow"))]
-use super::features::Unfitted;
-use super::features::{Fitted, Kernel};
-use super::geometry::Geometry;
-use super::lens::Aperture;
-use super::prepare::Prepared;
-use super::real::Real;
-use super::shape::Robust;
 use super::shapes::Shape;
-use super::view::View;
-use super::window::{Grid, Window};
+use crate::fast::arithmetic::dispatch::on;
+use crate::fast::arithmetic::real::Real;
+use crate::fast::build::features::{self, Kernel};
+use crate::fast::build::prepare::Prepared;
+use crate::fast::placement::geometry::Geometry;
+use crate::fast::placement::lens::Aperture;
+use crate::fast::placement::window::{Grid, Window};
+use crate::fast::rays::view::View;
+use crate::fast::shapes::shape::Robust;
+use crate::fast::transport::soft_light::Extents;
 use crate::parallel::{CHANNELS, image, whole_bands};
-use crate::sampling::film::{self, Band, Film, First, Wanted};
+use crate::sampling::film::{self, Band, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
@@ -50,7 +46,7 @@ pub(super) const SIDE: (u32, u32) = (16, 16);
 const MOVING_SIDE: (u32, u32) = (32, 32);
 
 /// The half of a pixel, and a little for rounding: how far rays go from its middle.
-pub(super) const MARGIN: f64 = 0.5 + super::rounding::MARGIN;
+pub(super) const MARGIN: f64 = 0.5 + crate::fast::arithmetic::rounding::MARGIN;
 
 /// A scene at a moment, ready to be drawn.
 #[derive(Debug)]
@@ -145,6 +141,9 @@ impl<'a, E: Real> Sampled<'a, E> {
         if let Some(floors) = self.scouts.floors(rows.clone())? {
             film.raise(floors);
         }
+        if let Some(progress) = self.options.progress {
+            progress.set(0, 0);
+        }
         let mut passes = 0;
         while let Some(span) = film.plan() {
             if passes > 0 {
@@ -152,6 +151,9 @@ impl<'a, E: Real> Sampled<'a, E> {
             }
             passes += 1;
             self.pass(&mut film, rows.start, span)?;
+        }
+        if let Some(progress) = self.options.progress {
+            progress.set(progress.done(), 0);
         }
         Ok(film)
     }
@@ -178,7 +180,12 @@ impl<'a, E: Real> Sampled<'a, E> {
         let points = Points::new(&self.dimensions, self.options.sampler, first, end);
         let level = self.options.level.unwrap_or_else(Level::new);
         let side = film.side();
+        let watched = self.options.progress.map(|progress| (progress, progress.done(), film.work()));
+        if let Some((progress, before, work)) = &watched {
+            progress.set(*before, work.ahead);
+        }
         let (bands, wanted) = film.split();
+        let all = watched.as_ref().map_or(0, |_| wanted.pixels.count(0..wanted.pixels.rows()));
         bands.into_par_iter().enumerate().try_for_each_init(
             || Box::new(Workspace::new(self.options.cancel)),
             |workspace, (row, mut band)| {
@@ -187,9 +194,19 @@ impl<'a, E: Real> Sampled<'a, E> {
                 }
                 let job = Job { of: self, points: &points, wanted, side, row, above };
                 draw::<E>(&job, level, &mut band, workspace);
+                if let Some((progress, _, work)) = &watched {
+                    let end = ((row + 1) * side.1).min(wanted.pixels.rows());
+                    // Pixels of a pass can get different numbers of samples: this is the mean.
+                    let share = wanted.pixels.count(row * side.1..end) as f64 / all.max(1) as f64;
+                    progress.add((work.now as f64 * share) as u64);
+                }
                 Ok(())
             },
-        )
+        )?;
+        if let Some((progress, before, work)) = &watched {
+            progress.set(before + work.now, work.ahead - work.now);
+        }
+        Ok(())
     }
 
     /// Levels of rows of the image, from a film with so many rows above it.
@@ -202,7 +219,7 @@ impl<'a, E: Real> Sampled<'a, E> {
                 film.each_of_row(first + row, |color| {
                     let levels = match tone {
                         Tone::Plain => color.levels(),
-                        Tone::Srgb => super::tone::levels(color.unit(), tone),
+                        Tone::Srgb => crate::fast::film::tone::levels(color.unit(), tone),
                     };
                     if let Some(bytes) = bytes.next() {
                         bytes.copy_from_slice(&levels);
@@ -246,7 +263,7 @@ impl<E: Real> Moment<E> {
 struct Job<'a, E> {
     of: &'a Sampled<'a, E>,
     points: &'a Points,
-    wanted: Wanted<'a>,
+    wanted: PassTargets<'a>,
     /// Columns and rows of a tile.
     side: (usize, usize),
     /// Of tiles, from the top of the film.
@@ -299,18 +316,18 @@ impl<E: Real> Job<'_, E> {
 /// Draws with the best kernel for the instructions.
 #[cfg(target_arch = "x86_64")]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
-    #[cfg(feature = "avx512")]
+    #[cfg(all(feature = "avx512", not(all(test, feature = "narrow"))))]
     if let Some(simd) = level.as_avx512() {
-        return job.draw::<_, Fitted<Robust>>(simd, band, workspace);
+        return job.draw::<_, features::FullKernel<Robust>>(simd, band, workspace);
     }
+    #[cfg(not(all(test, feature = "narrow")))]
     if let Some(simd) = level.as_avx2() {
-        job.draw::<_, Fitted<Robust>>(simd, band, workspace);
-    } else {
-        on!(narrow level, simd => job.draw::<_, Unfitted<Robust>>(simd, band, workspace));
+        return job.draw::<_, features::FullKernel<Robust>>(simd, band, workspace);
     }
+    on!(narrow level, simd => job.draw::<_, features::CompactKernel<Robust>>(simd, band, workspace));
 }
 
 #[cfg(not(target_arch = "x86_64"))]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
-    on!(level, simd => job.draw::<_, Fitted<Robust>>(simd, band, workspace));
+    on!(level, simd => job.draw::<_, features::FullKernel<Robust>>(simd, band, workspace));
 }

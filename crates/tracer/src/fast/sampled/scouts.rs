@@ -17,9 +17,10 @@ use rayfold_scene::{Material, Object, Samples, Scene, Shine};
 use super::gauge::{Gauge, Hull, Width, hull};
 use super::stand_ins::{Widener, repainted};
 use crate::RenderOptions;
-use crate::fast::geometry::Geometry;
+use crate::fast::build::precision;
+use crate::fast::placement::geometry::Geometry;
 use crate::fast::sampled::Sampled;
-use crate::fast::{parts, precision};
+use crate::parts;
 use crate::reference::triangle_normal;
 use crate::sampling::film::{Difference, Floors};
 use crate::{Precision, RenderError, Sampler};
@@ -87,7 +88,12 @@ impl<'a> Scouts<'a> {
         }
         let most = (OBJECTS / first.objects.len().max(1)).clamp(1, MOMENTS);
         let step = moments.len().div_ceil(most);
-        let options = RenderOptions { precision: Precision::F64, sampler: Sampler::default(), ..*options };
+        let options = RenderOptions {
+            precision: Precision::F64,
+            sampler: Sampler::default(),
+            progress: None,
+            ..*options
+        };
         let mut all = vec![];
         let moments: Vec<&Scene> = moments.iter().skip(step / 2).step_by(step).collect();
         for (k, moment) in moments.iter().enumerate() {

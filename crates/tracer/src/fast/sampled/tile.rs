@@ -7,18 +7,18 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use super::Moment;
-use super::light::{LightPoints, SoftLight};
-use crate::fast::bounce::{Column, Hits, Queue};
-use crate::fast::candidates::Candidates;
-use crate::fast::features::{BUILT, Kernel, Variant, fitted};
-use crate::fast::lens::Aperture;
-use crate::fast::look::look;
-use crate::fast::parts;
-use crate::fast::rays::Rays;
-use crate::fast::real::{Lanes, Real, Vec3, constant};
-use crate::fast::tile::{Met, Scratch, shade};
+use crate::fast::acceleration::candidates::Candidates;
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
+use crate::fast::build::features::{BUILT, Kernel, Variant, fitted};
+use crate::fast::film::tile::{HitBatch, Scratch, shade};
+use crate::fast::film::trace::trace_queue;
+use crate::fast::placement::lens::Aperture;
+use crate::fast::rays::bounce::{Column, Hits, RayBatch};
+use crate::fast::rays::pixels::Rays;
+use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
-use crate::sampling::film::{BitRows, FirstRows, Pixel, Wanted, quantised};
+use crate::parts;
+use crate::sampling::film::{BitRows, FirstRows, PassTargets, Pixel, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
 
@@ -37,7 +37,7 @@ pub(super) struct Pass<'a, E> {
     pub(super) points: &'a Points,
     pub(super) dimensions: &'a Dimensions,
     pub(super) bounces: u32,
-    pub(super) wanted: Wanted<'a>,
+    pub(super) wanted: PassTargets<'a>,
     /// Rows of the image.
     pub(super) height: u32,
 }
@@ -188,7 +188,7 @@ impl SampledTile {
 
     /// The same of those that are wanted.
     #[inline(always)]
-    fn each_wanted_pixel(&self, wanted: Wanted, mut each: impl FnMut((u32, u32))) {
+    fn each_wanted_pixel(&self, wanted: PassTargets, mut each: impl FnMut((u32, u32))) {
         self.each_block(|left, row, columns| {
             let mut bits = wanted.pixels.run(self.left + left, self.top + row) & ((1 << columns) - 1);
             while bits != 0 {
@@ -308,7 +308,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         .filter(|_| parts::BUILT.extents)
         .map(|extents| SoftLight { extents, points: lights });
     aim::<S, E>(simd, moment, &mut scratch.queue);
-    let Scratch { queue, hits, next, waiting, in_the_way, sights, .. } = &mut *scratch;
+    let Scratch { queue, hits, next, waiting, occluders, sights, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
@@ -326,18 +326,18 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     let bodies = moment.bodies_in(tile);
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
-            look::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
+            trace_queue::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = Met { kinds, bodies, background, queue, count, next, waiting, soft };
-        shade::<S, E, N, true>(simd, scene, met, hits, in_the_way);
+        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft };
+        shade::<S, E, N, true>(simd, scene, met, hits, occluders);
     } else {
         fitted!(N, kinds, tree, C T D => {
-            look::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
+            trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = Met { kinds, bodies, background, queue, count, next, waiting, soft };
-        shade::<S, E, N, false>(simd, scene, met, hits, in_the_way);
+        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft };
+        shade::<S, E, N, false>(simd, scene, met, hits, occluders);
     }
     if pass.wanted.is_first_look {
         note_objects(hits, Lanes::<S, E>::LEN, objects);
@@ -466,7 +466,7 @@ fn place<S: Simd, E: Real>(
 /// The rays of a batch: their columns and rows wait in the first two columns of the weights, their points of the lens in those
 /// of the origins.
 #[inline(never)]
-fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut Queue<E>) {
+fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut RayBatch<E>) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -496,10 +496,9 @@ fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]
     objects.fill(NOTHING);
     for &(at, _) in &hits.packets {
         let end = (at + lanes).min(ROOM);
-        let hits = hits.distance.0[at..end].iter().zip(&hits.order.0[at..end]);
-        for (object, (distance, order)) in objects[at..end].iter_mut().zip(hits) {
-            if distance.widen() < E::FAR {
-                *object = order.to_index() as u32;
+        for (lane, object) in (at..end).zip(&mut objects[at..end]) {
+            if hits.is_hit(lane) {
+                *object = hits.order.0[lane].to_index() as u32;
             }
         }
     }

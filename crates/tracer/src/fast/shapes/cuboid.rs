@@ -6,36 +6,37 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
-use crate::fast::bounds::Bounds;
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::rounding::{LATE, OFFSET};
 use crate::fast::lights::sun::Sun;
-use crate::fast::packet::{Nearest, Ray, Slopes, Surface, offset};
-use crate::fast::placed::{self, Face, Sight, across_corners, edge_nearest, nearest_within};
-use crate::fast::predicate::Place;
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rounding::{LATE, OFFSET};
-use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::rays::packet::{Nearest, Ray, Slopes, Surface, offset};
+use crate::fast::rays::placed;
+use crate::fast::rays::placed::{Face, Sight, across_corners, edge_nearest, nearest_within};
+use crate::fast::rays::predicate::Place;
+use crate::fast::shapes::shape::{Items, Obstacles, Obstructs, Precalculations, Robust, Tests};
 
 /// A box in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Placed {
+pub(in crate::fast) struct RenderSpaceCuboid {
     pub(in crate::fast) min: DVec3,
     pub(in crate::fast) max: DVec3,
 }
 
-impl Placed {
-    /// Moved so that `center` is the origin, and then scaled.
+impl RenderSpaceCuboid {
+    /// Makes a box, moved so that `center` is the origin, and then scaled.
     pub(in crate::fast) fn new(cuboid: &rayfold_scene::Cuboid, center: DVec3, scale: f64) -> Self {
         Self { min: (cuboid.min() - center) * scale, max: (cuboid.max() - center) * scale }
     }
 }
 
-/// The largest distance along an axis from `center` to a point of the box.
+/// Returns the largest distance along an axis from `center` to a point of the box.
 pub(in crate::fast) fn reach(cuboid: &rayfold_scene::Cuboid, center: DVec3) -> f64 {
     let from = |point: DVec3| (point - center).abs().max_element();
     from(cuboid.min()).max(from(cuboid.max()))
 }
 
-impl placed::Placed for Placed {
+impl placed::RenderSpaceShape for RenderSpaceCuboid {
     fn bounds(&self) -> Bounds {
         (self.min, self.max)
     }
@@ -77,7 +78,7 @@ impl placed::Placed for Placed {
         if inside { (-self.min).min(self.max).min_element() } else { nearest_within(self.bounds()) }
     }
 
-    /// Of all edges, though not every one is the shadow's.
+    /// Returns the smallest distance over all edges, though not every edge is an edge of the shadow.
     fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
         let faces = (0..6).map(|number| self.face(number).corners);
         let edges = faces.flat_map(|corners| (0..4).map(move |k| [corners[k], corners[(k + 1) % 4]]));
@@ -89,26 +90,26 @@ impl placed::Placed for Placed {
     }
 }
 
-/// A box as the kernels read it.
+/// A box as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Cuboid<E> {
     pub(in crate::fast) min: [E; 3],
     pub(in crate::fast) max: [E; 3],
     pub(in crate::fast) order: E,
-    /// The axis to which it is square, if it is a rectangle.
+    /// The axis to which it is perpendicular, if it is a rectangle.
     flat: Option<u8>,
 }
 
 impl<E: Real> Cuboid<E> {
-    pub(in crate::fast) fn new(&Placed { min, max }: &Placed, order: u32) -> Self {
+    pub(in crate::fast) fn new(&RenderSpaceCuboid { min, max }: &RenderSpaceCuboid, order: u32) -> Self {
         let (min, max) = (min.to_array().map(E::narrow), max.to_array().map(E::narrow));
         let mut axes = (0..3u8).filter(|&axis| min[usize::from(axis)] == max[usize::from(axis)]);
         let flat = axes.next().filter(|_| axes.next().is_none());
         Self { min, max, order: E::narrow(f64::from(order)), flat }
     }
 
-    /// Where the ray enters each slab of the box and where it leaves the box (Kay and Kajiya); planes belong to their
-    /// slab.
+    /// Returns the distances at which the ray enters each slab of the box, and the one at which it leaves the box (Kay
+    /// and Kajiya). The planes belong to their slab.
     #[inline(always)]
     fn slabs<S: Simd>(&self, simd: S, ray: Ray<S, E>, slopes: Slopes<S, E>) -> (Vec3<S, E>, Lanes<S, E>) {
         let a = Vec3::splat(simd, self.min).sub(ray.origin).mul(slopes.inverse);
@@ -124,7 +125,7 @@ impl<E: Real> Cuboid<E> {
         (near, far.x.min(far.y).min(far.z))
     }
 
-    /// Whether it keeps the sun's light from points.
+    /// Returns the points that it occludes from the sun.
     #[inline(always)]
     fn occludes<S: Simd>(&self, simd: S, sun: &Sun<E>, point: Vec3<S, E>) -> Mask<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -138,7 +139,8 @@ impl<E: Real> Cuboid<E> {
         within & enter.simd_le(leave * late) & leave.simd_gt(zero)
     }
 
-    /// An axis of [`Cuboid::occludes`]: lanes have no index, so that it is not a loop.
+    /// Intersects the interval with the slab of one axis, for [`Cuboid::occludes`]. Not a loop over the axes, because a
+    /// vector of lanes has no index.
     #[inline(always)]
     fn narrow_to_slab<S: Simd>(
         &self,
@@ -162,7 +164,8 @@ impl<E: Real> Cuboid<E> {
     }
 }
 
-/// A slab that the ray runs along is one that it is in for ever, or never; any other stays as it is.
+/// Returns the interval of a slab. A ray parallel to the slab is in it for all distances, or for none; for any other
+/// ray the interval is unchanged.
 #[inline(always)]
 fn along<S: Simd, E: Real>(
     simd: S,
@@ -178,8 +181,8 @@ fn along<S: Simd, E: Real>(
     (flat.select(within.select(start, end), near), flat.select(within.select(end, start), far))
 }
 
-impl<E: Real> Aim<E> for Cuboid<E> {
-    type Aimed<S: Simd> = Slopes<S, E>;
+impl<E: Real> Precalculations<E> for Cuboid<E> {
+    type RayPrecalculations<S: Simd> = Slopes<S, E>;
 
     #[inline(always)]
     fn aim<S: Simd>(simd: S, ray: Ray<S, E>) -> Slopes<S, E> {
@@ -189,7 +192,7 @@ impl<E: Real> Aim<E> for Cuboid<E> {
 
 impl<E: Real> Tests<Cuboid<E>, E> for Robust {
     #[inline(always)]
-    fn meet<S: Simd, const EYE: bool>(
+    fn intersect<S: Simd, const EYE: bool>(
         simd: S,
         cuboid: &Cuboid<E>,
         _: Place,
@@ -207,8 +210,8 @@ impl<E: Real> Tests<Cuboid<E>, E> for Robust {
         }
     }
 
-    /// The point is brought onto the face; where faces meet that of the first axis counts, but of a rectangle its own: its
-    /// sides have no area.
+    /// Returns the surface with the point moved onto the face. Where faces share an edge, the face of the first axis
+    /// wins. A rectangle always has the normal of its plane, because its sides have no area.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -251,7 +254,7 @@ impl<E: Real> Tests<Cuboid<E>, E> for Robust {
     }
 }
 
-/// A coordinate, brought onto the face where the ray meets it there, and the normal's.
+/// Returns a coordinate of the hit, moved onto the face if the ray hits that face, and the coordinate of the normal.
 #[inline(always)]
 fn face<S: Simd, E: Real>(
     simd: S,
@@ -271,7 +274,7 @@ fn face<S: Simd, E: Real>(
 
 impl<E: Real> Obstructs<E> for Cuboid<E> {
     type Obstacle = Self;
-    type Faced<S: Simd> = ();
+    type SunPrecalculations<S: Simd> = ();
 
     #[inline(always)]
     fn face<S: Simd>(_: S, _: &Sun<E>, _: Vec3<S, E>) {}

@@ -1,42 +1,46 @@
-//! The shapes that there are: a kind is a file, and an arm in each `match` here.
+//! The shapes: each kind has a file, and an arm in each `match` here.
 //!
-//! This is the one place that leads from a kind to its file. A kind that somewhere lacks its arm does not compile.
+//! This is the only place that dispatches from a kind to its file. A kind without one of its arms does not compile.
 
 pub(super) mod cuboid;
 pub(super) mod instance;
+#[cfg(feature = "accuracy")]
+pub(super) mod naive;
+pub(super) mod shape;
 pub(super) mod sphere;
 pub(super) mod triangle;
+mod unrounded;
 
 use std::fmt::Debug;
-use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
 use fearless_simd::Simd;
 use glam::{DMat3, DVec3};
-use rayfold_scene::Object;
+use rayfold_scene::{Instance, Object};
 
 use self::cuboid::Cuboid;
 use self::sphere::{Circle, Sphere};
 use self::triangle::{Prism, Triangle};
-use super::bounds::Bounds;
-use super::exact::Edge;
-use super::kind::{ByKind, Kind};
+use self::unrounded::Exact;
+pub(super) use self::unrounded::{Neighbours, Seen};
 use super::lights::sun::Sun;
-use super::packet::{Nearest, Ray, Surface};
-use super::placed::{Face, Placed, Sight};
-use super::predicate::Corners;
-use super::rays::Pixels;
-use super::real::{Lanes, Mask, Real, Vec3};
-use super::shape::{Aim, Items, Obstructs, Tests};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3};
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::rays::kind::{ByKind, Kind};
+use crate::fast::rays::packet::{Nearest, Ray, Surface};
+use crate::fast::rays::placed::{Face, RenderSpaceShape, Sight};
+use crate::fast::shapes::shape::{Items, Obstructs, Precalculations, Tests};
 use crate::parallel::map;
+use crate::reference::{Place, power};
+use crate::scale::below_inverse;
 
 /// A shape in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
-    Sphere(sphere::Placed),
-    Cuboid(cuboid::Placed),
-    Triangle(triangle::Placed),
+    Sphere(sphere::RenderSpaceSphere),
+    Cuboid(cuboid::RenderSpaceCuboid),
+    Triangle(triangle::RenderSpaceTriangle),
 }
 
 /// An object and its position in the script.
@@ -46,7 +50,7 @@ pub(super) struct Solid {
     pub(super) order: u32,
 }
 
-/// Evaluates an expression for a shape, whatever it is.
+/// Evaluates an expression for a shape of any kind.
 macro_rules! whatever {
     ($of:expr, $shape:ident => $value:expr) => {
         match $of {
@@ -66,7 +70,7 @@ impl Shape {
         }
     }
 
-    /// What tells it from others of its kind.
+    /// Returns the numbers that distinguish it from others of its kind.
     pub(super) fn numbers(&self) -> [f64; 9] {
         let mut numbers = [0.0; 9];
         let parts = match self {
@@ -80,34 +84,73 @@ impl Shape {
         numbers
     }
 
-    /// Whether rays meet both at the same distance bit for bit in single precision: their numbers are rounded to the same ones.
+    /// Returns whether rays hit both shapes at the same distance bit for bit in single precision, because their numbers
+    /// round to the same numbers.
     pub(super) fn is_one_in_single(&self, other: &Self) -> bool {
         let square = |of: &Self| of.ball().map(|(_, radius)| (radius * radius) as f32);
         let (numbers, others) = (self.numbers(), other.numbers());
         numbers.map(|x| x as f32) == others.map(|x| x as f32) && square(self) == square(other)
     }
 
-    /// A box of this size.
+    /// Makes a box of this size.
     pub(super) fn of_box((min, max): Bounds) -> Self {
-        Self::Cuboid(cuboid::Placed { min, max })
+        Self::Cuboid(cuboid::RenderSpaceCuboid { min, max })
     }
 
-    /// An object of the scene in the kernels' coordinates: moved so that `center` is the origin, then scaled. None if it
-    /// can never be hit, or is a [body](super::bodies).
+    /// Returns an object of the scene in the kernels' coordinates: moved so that `center` is the origin, then scaled.
+    /// Returns `None` if it can never be hit, or is a [body](super::bodies).
     pub(super) fn new(object: &Object, center: DVec3, scale: f64) -> Option<Self> {
         match object {
-            Object::Sphere(sphere) => Some(Self::Sphere(sphere::Placed::new(sphere, center, scale))),
-            Object::Cuboid(cuboid) => Some(Self::Cuboid(cuboid::Placed::new(cuboid, center, scale))),
-            Object::Triangle(triangle) => triangle::Placed::new(triangle, center, scale).map(Self::Triangle),
-            Object::Instance(instance) => Self::new(&instance::in_world(instance)?, center, scale),
-            Object::Plane(_) | Object::Disc(_) | Object::Cylinder(_) | Object::Cone(_) | Object::Torus(_) => {
-                None
+            Object::Sphere(sphere) => {
+                Some(Self::Sphere(sphere::RenderSpaceSphere::new(sphere, center, scale)))
             }
+            Object::Cuboid(cuboid) => {
+                Some(Self::Cuboid(cuboid::RenderSpaceCuboid::new(cuboid, center, scale)))
+            }
+            Object::Triangle(triangle) => {
+                triangle::RenderSpaceTriangle::new(triangle, center, scale).map(Self::Triangle)
+            }
+            Object::Instance(instance) => {
+                let placed = Self::new(&instance::in_world(instance)?, center, scale)?;
+                Some(placed.on_the_side_of(instance, center, scale))
+            }
+            _ => None,
         }
     }
 }
 
-/// The largest distance along an axis from `center` to a point of the object.
+impl Shape {
+    /// Returns an object of a group with the eye on the right side of its surface, even if rounding changed the side.
+    fn on_the_side_of(self, instance: &Instance, eye: DVec3, scale: f64) -> Self {
+        let placement = instance.placement();
+        match (self, instance.object()) {
+            (Self::Sphere(placed), Object::Sphere(sphere)) => {
+                let scale = placement.scale() * scale;
+                let rough = below_inverse(1.0 / scale);
+                let power = power(Place::in_group(eye, placement), sphere, rough) * (scale / rough).powi(2);
+                let is_other = power.partial_cmp(&0.0) != placed.power.partial_cmp(&0.0);
+                Self::Sphere(if is_other { sphere::RenderSpaceSphere { power, ..placed } } else { placed })
+            }
+            (Self::Cuboid(placed), Object::Cuboid(cuboid)) => {
+                let local = Place::in_group(eye, placement);
+                let corners = cuboid
+                    .corners()
+                    .map(|corner| placement.rotation() * local.towards(corner) * (placement.scale() * scale));
+                let exact = cuboid::RenderSpaceCuboid {
+                    min: corners[0].min(corners[1]),
+                    max: corners[0].max(corners[1]),
+                };
+                let sides = |of: cuboid::RenderSpaceCuboid| {
+                    [of.min, of.max].map(|corner| corner.to_array().map(|x| x.partial_cmp(&0.0)))
+                };
+                Self::Cuboid(if sides(exact) == sides(placed) { placed } else { exact })
+            }
+            _ => self,
+        }
+    }
+}
+
+/// Returns the largest distance along an axis from `center` to a point of the object.
 pub(super) fn reach(object: &Object, center: DVec3) -> f64 {
     match object {
         Object::Sphere(sphere) => sphere::reach(sphere, center),
@@ -116,11 +159,11 @@ pub(super) fn reach(object: &Object, center: DVec3) -> f64 {
         Object::Instance(instance) => {
             instance::in_world(instance).map_or(0.0, |object| reach(&object, center))
         }
-        Object::Plane(_) | Object::Disc(_) | Object::Cylinder(_) | Object::Cone(_) | Object::Torus(_) => 0.0,
+        _ => 0.0,
     }
 }
 
-impl Placed for Shape {
+impl RenderSpaceShape for Shape {
     fn bounds(&self) -> Bounds {
         whatever!(self, shape => shape.bounds())
     }
@@ -177,7 +220,7 @@ impl<E: Real, By> Formulas<E> for By where
 {
 }
 
-/// All shapes as the kernels read them, by kind.
+/// All shapes as the kernels use them, by kind.
 #[derive(Debug)]
 pub(super) struct Shapes<E> {
     spheres: Vec<Sphere<E>>,
@@ -186,57 +229,10 @@ pub(super) struct Shapes<E> {
     exact: Exact<E>,
 }
 
-/// Solids by kind, each by its place among all.
+/// The solids of each kind, by their indices among all.
 pub(super) type Sorted = ByKind<Vec<u32>>;
 
-/// The solids before their numbers were rounded.
-#[derive(Debug)]
-struct Exact<E> {
-    solids: Arc<Vec<Solid>>,
-    triangles: Vec<u32>,
-    /// Where triangles are, if they are many.
-    tree: Option<Arc<dyn Neighbours>>,
-    /// If they are single rays from the eye.
-    pixels: Option<Pixels>,
-    number: PhantomData<E>,
-}
-
-/// A place to look shapes up by their boxes: the tree, of which shapes know no more.
-pub(super) trait Neighbours: Debug + Send + Sync {
-    /// Whether `is` holds of the shapes of any group whose box has this one within it; they are of one kind, by their places
-    /// among those of that kind.
-    fn any_around(&self, bounds: Bounds, is: &dyn Fn(Kind, Range<usize>) -> bool) -> bool;
-}
-
-impl<E: Real> Corners for Exact<E> {
-    fn of(&self, at: usize) -> [DVec3; 3] {
-        match self.solids[self.triangles[at] as usize].shape {
-            Shape::Triangle(triangle) => triangle.vertices,
-            Shape::Sphere(_) | Shape::Cuboid(_) => unreachable!("the places are those of triangles"),
-        }
-    }
-
-    // Neighbours are looked up for the few rays that need them: to know them all would cost every mesh.
-    fn any_across(&self, at: usize, [p, q]: Edge, is: &dyn Fn(DVec3) -> bool) -> bool {
-        let is_across = |other: usize| {
-            let corners = self.of(other);
-            let apex = corners.iter().find(|corner| **corner != p && **corner != q);
-            other != at && corners.contains(&p) && corners.contains(&q) && apex.is_some_and(|apex| is(*apex))
-        };
-        match &self.tree {
-            Some(tree) => tree.any_around((p.min(q), p.max(q)), &|kind, mut items| {
-                kind == Kind::Triangle && items.any(is_across)
-            }),
-            None => (0..self.triangles.len()).any(is_across),
-        }
-    }
-
-    fn unrounded(&self, direction: DVec3) -> Option<DVec3> {
-        self.pixels?.unrounded::<E>(direction)
-    }
-}
-
-/// What each of the sorted solids of a kind becomes, on all cores.
+/// Converts each of the sorted solids of a kind, on all cores.
 macro_rules! each {
     ($solids:expr, $places:expr, $kind:ident($shape:ident), $order:ident => $made:expr) => {
         map($places, |&place| {
@@ -252,7 +248,7 @@ impl<E: Real> Shapes<E> {
         solids: &Arc<Vec<Solid>>,
         sorted: Sorted,
         tree: Option<Arc<dyn Neighbours>>,
-        pixels: Option<Pixels>,
+        seen: Seen,
     ) -> Self {
         Self {
             spheres: each!(solids, &sorted.spheres, Sphere(sphere), order => Sphere::new(sphere, *order)),
@@ -260,18 +256,12 @@ impl<E: Real> Shapes<E> {
             triangles: each!(solids, &sorted.triangles, Triangle(triangle), order => {
                 Triangle::new(triangle, *order)
             }),
-            exact: Exact {
-                solids: solids.clone(),
-                triangles: sorted.triangles,
-                tree,
-                pixels,
-                number: PhantomData,
-            },
+            exact: Exact::new(solids.clone(), sorted, tree, seen),
         }
     }
 }
 
-/// All shapes as obstacles to one sun, but for those that are the same to all.
+/// All shapes as occluders of one sun, except those whose data does not depend on the sun.
 #[derive(Clone, Debug)]
 pub(super) struct Obstacles<E> {
     spheres: Vec<Circle<E>>,
@@ -279,7 +269,7 @@ pub(super) struct Obstacles<E> {
 }
 
 impl<E: Real> Obstacles<E> {
-    /// `axes` are the sun's [rounded](Sun::rounded) ones.
+    /// Makes the occluders. `axes` are the sun's [rounded](Sun::rounded) axes.
     pub(super) fn new(solids: &[Solid], sorted: &Sorted, axes: DMat3) -> Self {
         Self {
             spheres: each!(solids, &sorted.spheres, Sphere(sphere), _order => Circle::new(sphere, axes)),
@@ -290,14 +280,14 @@ impl<E: Real> Obstacles<E> {
     }
 }
 
-/// What the tests of each kind have in common for a packet of rays.
+/// The per-ray constants that the tests of each kind share.
 #[derive(Clone, Copy)]
-pub(super) struct Aimed<S: Simd, E: Real> {
-    cuboids: <Cuboid<E> as Aim<E>>::Aimed<S>,
-    triangles: <Triangle<E> as Aim<E>>::Aimed<S>,
+pub(super) struct RayPrecalculations<S: Simd, E: Real> {
+    cuboids: <Cuboid<E> as Precalculations<E>>::RayPrecalculations<S>,
+    triangles: <Triangle<E> as Precalculations<E>>::RayPrecalculations<S>,
 }
 
-impl<S: Simd, E: Real> Aimed<S, E> {
+impl<S: Simd, E: Real> RayPrecalculations<S, E> {
     #[inline(always)]
     pub(super) fn new(simd: S, ray: Ray<S, E>) -> Self {
         Self { cuboids: Cuboid::aim(simd, ray), triangles: Triangle::aim(simd, ray) }
@@ -305,15 +295,15 @@ impl<S: Simd, E: Real> Aimed<S, E> {
 }
 
 impl<E: Real> Shapes<E> {
-    /// Offers where rays meet some of the shapes of a kind. What the kind's tests have in common is worked out here unless
-    /// it is known.
+    /// Offers the hits of rays with some of the shapes of a kind. Computes the constants of the kind's tests if `aimed`
+    /// is `None`.
     #[inline(always)]
-    pub(super) fn meet<S: Simd, By: Formulas<E>, const EYE: bool>(
+    pub(super) fn intersect<S: Simd, By: Formulas<E>, const EYE: bool>(
         &self,
         simd: S,
         (kind, items): (Kind, impl Items),
         ray: Ray<S, E>,
-        aimed: Option<Aimed<S, E>>,
+        aimed: Option<RayPrecalculations<S, E>>,
         nearest: &mut Nearest<S, E>,
     ) {
         match kind {
@@ -336,21 +326,22 @@ impl<E: Real> Shapes<E> {
     }
 
     #[inline(always)]
-    fn meet_each<S: Simd, P: Aim<E>, By: Tests<P, E>, const EYE: bool>(
+    fn meet_each<S: Simd, P: Precalculations<E>, By: Tests<P, E>, const EYE: bool>(
         &self,
         simd: S,
         all: &[P],
         items: impl Items,
         ray: Ray<S, E>,
-        aimed: P::Aimed<S>,
+        aimed: P::RayPrecalculations<S>,
         nearest: &mut Nearest<S, E>,
     ) {
         for (at, shape) in items.of(all) {
-            By::meet::<S, EYE>(simd, shape, (&self.exact, at), ray, aimed, nearest);
+            By::intersect::<S, EYE>(simd, shape, (&self.exact, at), ray, aimed, nearest);
         }
     }
 
-    /// Whether the eye lies outside a convex shape: what rays from there see of it is not in its own shadow.
+    /// Returns whether the eye is outside a convex shape. Then the part that is visible from the eye is not in the
+    /// shape's own shadow.
     #[inline(always)]
     pub(super) fn is_seen_from_outside(&self, kind: Kind, at: usize) -> bool {
         match kind {
@@ -359,7 +350,7 @@ impl<E: Real> Shapes<E> {
         }
     }
 
-    /// The surface of a shape where rays meet it.
+    /// Returns the surface at the hits of rays with a shape.
     #[inline(always)]
     pub(super) fn surface<S: Simd, By: Formulas<E>, const EYE: bool>(
         &self,
@@ -376,13 +367,13 @@ impl<E: Real> Shapes<E> {
     }
 }
 
-/// What the tests of each kind have in common for a packet of points in the light of a sun.
+/// The per-point constants that the tests of each kind share in the light of a sun.
 #[derive(Clone, Copy)]
-pub(super) struct Faced<S: Simd, E: Real> {
-    spheres: <Sphere<E> as Obstructs<E>>::Faced<S>,
+pub(super) struct SunPrecalculations<S: Simd, E: Real> {
+    spheres: <Sphere<E> as Obstructs<E>>::SunPrecalculations<S>,
 }
 
-impl<S: Simd, E: Real> Faced<S, E> {
+impl<S: Simd, E: Real> SunPrecalculations<S, E> {
     #[inline(always)]
     pub(super) fn new(simd: S, sun: &Sun<E>, point: Vec3<S, E>) -> Self {
         Self { spheres: Sphere::face(simd, sun, point) }
@@ -397,15 +388,15 @@ pub(super) struct InLight<'a, E> {
 }
 
 impl<E: Real> InLight<'_, E> {
-    /// Which of the points that `lit` names stay lit behind some of the shapes of a kind. What the kind's tests have in
-    /// common is worked out here unless it is known.
+    /// Returns the points of `lit` that none of the given shapes of a kind occludes. Computes the constants of the
+    /// kind's tests if `faced` is `None`.
     #[inline(always)]
     pub(super) fn unoccluded<S: Simd>(
         &self,
         simd: S,
         (kind, items): (Kind, impl Items),
         point: Vec3<S, E>,
-        faced: Option<Faced<S, E>>,
+        faced: Option<SunPrecalculations<S, E>>,
         lit: Mask<S, E>,
     ) -> Mask<S, E> {
         let &Self { shapes, sun, obstacles } = self;

@@ -1,4 +1,4 @@
-//! Spheres.
+//! Spheres, with intersection tests that avoid cancellation.
 
 use std::ops::Range;
 
@@ -6,27 +6,28 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 
-use crate::fast::bounds::Bounds;
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::rounding::OFFSET;
 use crate::fast::lights::sun::Sun;
-use crate::fast::packet::{Nearest, Ray, Surface, no_lane};
-use crate::fast::placed::{self, Face, Sight};
-use crate::fast::predicate::Place;
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rounding::OFFSET;
-use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::rays::packet::{Nearest, Ray, Surface, no_lane};
+use crate::fast::rays::placed;
+use crate::fast::rays::placed::{Face, Sight};
+use crate::fast::rays::predicate::Place;
+use crate::fast::shapes::shape::{Items, Obstacles, Obstructs, Precalculations, Robust, Tests};
 use crate::reference::power;
 
 /// A sphere in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Placed {
+pub(in crate::fast) struct RenderSpaceSphere {
     pub(in crate::fast) center: DVec3,
     pub(in crate::fast) radius: f64,
-    /// That of the eye: |center|² - radius², as exact as a number can be.
+    /// The power of the eye: |center|² - radius², correctly rounded.
     pub(in crate::fast) power: f64,
 }
 
-impl Placed {
-    /// Moved so that `center` is the origin, and then scaled.
+impl RenderSpaceSphere {
+    /// Makes a sphere, moved so that `center` is the origin, and then scaled.
     pub(in crate::fast) fn new(sphere: &rayfold_scene::Sphere, center: DVec3, scale: f64) -> Self {
         Self {
             center: (sphere.center() - center) * scale,
@@ -36,12 +37,12 @@ impl Placed {
     }
 }
 
-/// The largest distance along an axis from `center` to a point of the sphere.
+/// Returns the largest distance along an axis from `center` to a point of the sphere.
 pub(in crate::fast) fn reach(sphere: &rayfold_scene::Sphere, center: DVec3) -> f64 {
     (sphere.center() - center).abs().max_element() + sphere.radius()
 }
 
-impl placed::Placed for Placed {
+impl placed::RenderSpaceShape for RenderSpaceSphere {
     fn bounds(&self) -> Bounds {
         (self.center - self.radius, self.center + self.radius)
     }
@@ -55,7 +56,7 @@ impl placed::Placed for Placed {
         let radius = self.radius + 2.0 * slack;
         (depth > radius).then(|| {
             let (angle, half) = (x.atan2(depth), (radius / x.hypot(depth)).asin());
-            // The rounding errors of the three functions, generously.
+            // A generous bound for the rounding errors of the three functions.
             ((angle - half).tan() * (1.0 + 1e-12) - 1e-12, (angle + half).tan() * (1.0 + 1e-12) + 1e-12)
         })
     }
@@ -72,7 +73,7 @@ impl placed::Placed for Placed {
         unreachable!("a sphere has no faces")
     }
 
-    /// `power` is the difference of two squares without cancellation.
+    /// Returns the difference of the two lengths. `power` is the difference of their squares without cancellation.
     fn nearest(&self) -> f64 {
         self.power.abs() / (self.center.length() + self.radius)
     }
@@ -81,8 +82,9 @@ impl placed::Placed for Placed {
         (self.center.dot(x).hypot(self.center.dot(y)) - self.radius).abs()
     }
 
-    /// An outline is off by the errors of a point on it, and what touches the sphere or is mirrored in it by where rays
-    /// start from it; a normal by the errors of the point for the radius.
+    /// Returns whether errors are invisible. An outline has the errors of a point on it. A shadow on the sphere or a
+    /// reflection in it has the errors of the start of a ray. A normal has the errors of the point divided by the
+    /// radius.
     fn is_fine(&self, sight: &Sight) -> bool {
         let &Self { center, radius, .. } = self;
         let (away, size) = (center.length(), center.length() + radius);
@@ -92,23 +94,26 @@ impl placed::Placed for Placed {
     }
 }
 
-/// A sphere as the kernels read it.
+/// A sphere as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Sphere<E> {
     pub(in crate::fast) center: [E; 3],
-    /// r²
+    /// The square of the radius, r².
     pub(in crate::fast) square: E,
-    /// Position in the script.
+    /// The position in the script.
     pub(in crate::fast) order: E,
-    /// |c|² - r² without cancellation: the power of the eye, for rays from there.
+    /// The power of the eye, |c|² - r² without cancellation, for rays from the eye.
     pub(in crate::fast) power: E,
-    /// Distance from the centre at which rays leave its outside and its inside.
+    /// The distances from the centre at which rays start on its outside and its inside.
     pub(in crate::fast) outer: E,
     inner: E,
 }
 
 impl<E: Real> Sphere<E> {
-    pub(in crate::fast) fn new(&Placed { center, radius, power }: &Placed, order: u32) -> Self {
+    pub(in crate::fast) fn new(
+        &RenderSpaceSphere { center, radius, power }: &RenderSpaceSphere,
+        order: u32,
+    ) -> Self {
         let offset = OFFSET * E::ROUNDOFF * (center.abs().max_element() + radius);
         Self {
             center: center.to_array().map(E::narrow),
@@ -120,15 +125,17 @@ impl<E: Real> Sphere<E> {
         }
     }
 
-    /// Whether the eye lies outside: then rays from there see it from without, and it is not in its own light.
+    /// Returns whether the eye is outside. Then rays from the eye hit it from outside, and the points that they hit are
+    /// not in its own shadow.
     #[inline(always)]
     pub(in crate::fast) fn is_outside_the_eye(&self) -> bool {
         self.power > E::narrow(0.0)
     }
 
-    /// Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems ch. 7.
+    /// Intersects rays from any origin (Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere
+    /// intersection", Ray Tracing Gems ch. 7).
     ///
-    /// The subtraction that is left costs no more than the origin's own rounding.
+    /// The remaining subtraction adds no more error than the rounding of the origin.
     #[inline(always)]
     fn meet_from_anywhere<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
@@ -145,7 +152,8 @@ impl<E: Real> Sphere<E> {
         }
     }
 
-    /// The same with the second root from the eye's power, so that a sphere next to the eye is as exact as one far away.
+    /// Intersects rays from the eye. The second root comes from the power of the eye, so that a sphere next to the eye
+    /// is as exact as one far away.
     #[inline(always)]
     fn meet_from_eye<S: Simd>(&self, simd: S, direction: Vec3<S, E>, nearest: &mut Nearest<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
@@ -161,7 +169,7 @@ impl<E: Real> Sphere<E> {
                 nearest.offer(simd, hit, power / (middle + rest.sqrt()), self.order);
             }
         } else {
-            // A sum without cancellation: every ray from within meets the sphere, grazing ones from its surface too.
+            // A sum without cancellation: every ray from within hits the sphere, also a grazing ray from its surface.
             let half_chord = middle.mul_add(middle, -power).sqrt();
             let far = ahead.select(middle + half_chord, middle - half_chord);
             let distance = ahead.select(far, power / far);
@@ -170,8 +178,8 @@ impl<E: Real> Sphere<E> {
     }
 }
 
-impl<E: Real> Aim<E> for Sphere<E> {
-    type Aimed<S: Simd> = ();
+impl<E: Real> Precalculations<E> for Sphere<E> {
+    type RayPrecalculations<S: Simd> = ();
 
     #[inline(always)]
     fn aim<S: Simd>(_: S, _: Ray<S, E>) {}
@@ -179,7 +187,7 @@ impl<E: Real> Aim<E> for Sphere<E> {
 
 impl<E: Real> Tests<Sphere<E>, E> for Robust {
     #[inline(always)]
-    fn meet<S: Simd, const EYE: bool>(
+    fn intersect<S: Simd, const EYE: bool>(
         simd: S,
         sphere: &Sphere<E>,
         _: Place,
@@ -194,8 +202,8 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
         }
     }
 
-    /// The point is worked out from the centre and the normal, so that it is off the sphere by the rounding of these
-    /// alone, and not by that of the distance.
+    /// Returns the surface. The point is computed from the centre and the normal, so that its distance from the sphere
+    /// is the rounding error of these alone, without that of the ray's distance.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -220,7 +228,7 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
             let zero = constant::<S, E>(simd, 0.0);
             zero.simd_eq(zero)
         } else {
-            // What starts on the surface and meets the sphere goes through it.
+            // A ray that starts on the surface and hits the sphere goes through it.
             to_center.dot(to_center).simd_le(splat::<S, E>(simd, sphere.square))
         };
         if !EYE && !inside.any_true() {
@@ -238,23 +246,23 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
 pub(in crate::fast) struct Circle<E> {
     /// The centre along the sun's axes.
     center: [E; 3],
-    /// r²
+    /// The square of the radius, r².
     square: E,
 }
 
 impl<E: Real> Circle<E> {
-    /// `axes` are the sun's [rounded](Sun::rounded) ones.
-    pub(in crate::fast) fn new(sphere: &Placed, axes: DMat3) -> Self {
+    /// Makes a circle. `axes` are the sun's [rounded](Sun::rounded) axes.
+    pub(in crate::fast) fn new(sphere: &RenderSpaceSphere, axes: DMat3) -> Self {
         Self {
             center: (axes * sphere.center).to_array().map(E::narrow),
             square: E::narrow(sphere.radius * sphere.radius),
         }
     }
 
-    /// Whether it keeps the light from points, which are in the sun's axes.
+    /// Returns the points that it occludes; they are given in the sun's axes.
     ///
-    /// `rest` is the square of half the chord; the far end of it is ahead when `z + √rest > 0`, which for `rest >= 0` is
-    /// `z·|z| > -rest`.
+    /// `rest` is the square of half the chord. The far end of the chord is ahead if `z + √rest > 0`, which for
+    /// `rest >= 0` is `z·|z| > -rest`.
     #[inline(always)]
     fn occludes<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Mask<S, E> {
         let Vec3 { x, y, z } = Vec3::splat(simd, self.center).sub(point);
@@ -267,7 +275,7 @@ impl<E: Real> Circle<E> {
 
 impl<E: Real> Obstructs<E> for Sphere<E> {
     type Obstacle = Circle<E>;
-    type Faced<S: Simd> = Vec3<S, E>;
+    type SunPrecalculations<S: Simd> = Vec3<S, E>;
 
     #[inline(always)]
     fn face<S: Simd>(simd: S, sun: &Sun<E>, point: Vec3<S, E>) -> Vec3<S, E> {

@@ -1,4 +1,4 @@
-//! Triangles.
+//! Triangles, intersected by Plücker coordinates.
 
 use std::ops::Range;
 
@@ -6,40 +6,41 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 
-use crate::fast::bounds::Bounds;
-use crate::fast::lights::sun::Sun;
-use crate::fast::packet::{Nearest, Ray, Surface, affine, no_lane, offset};
-use crate::fast::placed::{self, Face, Sight, across_corners, edge_nearest, nearest_within};
-use crate::fast::predicate::{Beside, Corners, Place, settle};
-use crate::fast::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rounding::{
-    CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE, SIDE_OF_PIXEL, VOLUME, distance_error,
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::rounding::{
+    CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE_OF_PIXEL, VOLUME, distance_error, side_of_going_on,
 };
-use crate::fast::shape::{Aim, Items, Obstacles, Obstructs, Robust, Tests};
+use crate::fast::lights::sun::Sun;
+use crate::fast::rays::bounds::Bounds;
+use crate::fast::rays::packet::{Nearest, Ray, Surface, affine, no_lane, offset};
+use crate::fast::rays::placed;
+use crate::fast::rays::placed::{Face, Sight, across_corners, edge_nearest, nearest_within};
+use crate::fast::rays::predicate::{Beside, Corners, Place, settle};
+use crate::fast::shapes::shape::{Items, Obstacles, Obstructs, Precalculations, Robust, Tests};
 use crate::reference::{normal_and_width, triangle_normal};
 
 /// A triangle in the kernels' coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Placed {
+pub(in crate::fast) struct RenderSpaceTriangle {
     pub(in crate::fast) vertices: [DVec3; 3],
     pub(in crate::fast) normal: DVec3,
     /// `normal · point` of its points.
     pub(in crate::fast) height: f64,
 }
 
-/// The width of a triangle, for its length, below which its normal is worked out from where its corners are rounded to.
+/// The ratio of a triangle's width to its length below which its normal is computed from its rounded corners.
 const NEEDLE: f64 = 0.1;
 
-impl Placed {
-    /// Moved so that `center` is the origin, and then scaled; none if it has no area, or if rounding leaves it none there:
-    /// then it is thinner than anything that can be seen.
+impl RenderSpaceTriangle {
+    /// Makes a triangle, moved so that `center` is the origin, and then scaled. Returns `None` if it has no area, or if
+    /// rounding leaves it none: then it is too thin to be visible.
     pub(in crate::fast) fn new(
         triangle: &rayfold_scene::Triangle,
         center: DVec3,
         scale: f64,
     ) -> Option<Self> {
         let vertices = triangle.vertices().map(|vertex| (vertex - center) * scale);
-        // Its own size decides whether it has an area, wherever it lies.
+        // Its own size decides whether it has an area, independent of its position.
         let (own, width) = normal_and_width(triangle.vertices());
         if own == DVec3::ZERO {
             return None;
@@ -48,19 +49,19 @@ impl Placed {
         if a == b || b == c || c == a {
             return None;
         }
-        // A needle turns when its corners are rounded; rays meet it as it is here.
+        // A needle rotates when its corners are rounded. Rays hit the rounded triangle.
         let normal = if width < NEEDLE { triangle_normal(&vertices) } else { own };
         let height = normal.dot(Ends::new(vertices).nearest());
         (normal != DVec3::ZERO).then_some(Self { vertices, normal, height })
     }
 }
 
-/// The largest distance along an axis from `center` to a corner.
+/// Returns the largest distance along an axis from `center` to a corner.
 pub(in crate::fast) fn reach(triangle: &rayfold_scene::Triangle, center: DVec3) -> f64 {
     triangle.vertices().iter().map(|v| (v - center).abs().max_element()).fold(0.0, f64::max)
 }
 
-impl placed::Placed for Placed {
+impl placed::RenderSpaceShape for RenderSpaceTriangle {
     fn bounds(&self) -> Bounds {
         let [a, b, c] = self.vertices;
         (a.min(b).min(c), a.max(b).max(c))
@@ -104,11 +105,11 @@ impl placed::Placed for Placed {
     }
 }
 
-/// Plücker coordinates of an edge: its direction and its moment, the cross product of its ends.
+/// The Plücker coordinates of an edge: its direction and its moment, the cross product of its ends.
 ///
-/// `d · moment + direction · (o × d)` tells on which side of the edge the ray from `o` along `d` passes, with an error
-/// below `slack.0 + slack.1 · |o|₁`: what is within the error belongs to the triangle unless it lies beyond its tips, so
-/// that meshes have no cracks, neither along edges nor at vertices.
+/// The sign of `d · moment + direction · (o × d)` gives the side of the edge on which the ray from `o` along `d`
+/// passes. Its error is below `slack.0 + slack.1 · |o|₁`. Points within the error belong to the triangle unless they
+/// are beyond its corners, so meshes have no cracks, neither along edges nor at vertices.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Edge<E> {
     pub(in crate::fast) direction: [E; 3],
@@ -117,7 +118,7 @@ pub(in crate::fast) struct Edge<E> {
 }
 
 impl<E: Real> Edge<E> {
-    /// The least and the most that the ray's side of the edge can be.
+    /// Returns the largest and the smallest value that the ray's side of the edge can have.
     #[inline(always)]
     fn side<S: Simd>(&self, simd: S, ray: Ray<S, E>, moment: Moment<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
         let side = Vec3::splat(simd, self.moment).dot(ray.direction);
@@ -128,13 +129,13 @@ impl<E: Real> Edge<E> {
     }
 }
 
-/// A triangle as the kernels read it.
+/// A triangle as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Triangle<E> {
     pub(in crate::fast) edges: [Edge<E>; 3],
-    /// The same edges for rays from the eye, in units of twice a bound on the error, turned so that what is visible is
-    /// not negative: below 0 is outside, from 0 to 1 in doubt. The last is a half, or less than zero where the eye lies in
-    /// the plane.
+    /// The edges for rays from the eye, in units of twice a bound on the error, with signs such that visible points are
+    /// not negative. Below 0 is outside; from 0 to 1 is in doubt. The last number is a half, or negative if the eye is
+    /// in the plane.
     from_eye: [([E; 3], E); 3],
     pub(in crate::fast) normal: [E; 3],
     /// `normal · point` of its points.
@@ -143,9 +144,12 @@ pub(in crate::fast) struct Triangle<E> {
 }
 
 impl<E: Real> Triangle<E> {
-    // Out of line, and below too, so that what is made of a million triangles is the same code whatever calls it.
+    // Out of line, and below too, so that the code that runs for a million triangles is the same for every caller.
     #[inline(never)]
-    pub(in crate::fast) fn new(&Placed { vertices, normal, height }: &Placed, order: u32) -> Self {
+    pub(in crate::fast) fn new(
+        &RenderSpaceTriangle { vertices, normal, height }: &RenderSpaceTriangle,
+        order: u32,
+    ) -> Self {
         let [a, b, c] = vertices;
         let ends = Ends::new(vertices);
         let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
@@ -154,8 +158,9 @@ impl<E: Real> Triangle<E> {
         let coordinates = vertices.iter().fold(DVec3::ZERO, |most, v| most.max(v.abs()));
         let noise = VOLUME * lengths.min(6.0 * coordinates.element_product());
         let sign = if volume.abs() > noise { volume.signum() } else { 0.0 };
-        // From elsewhere a cross product adds its errors.
-        let slack = |size: f64, noise: f64| E::narrow(2.0 * SIDE * E::ROUNDOFF * size + noise);
+        // From other origins a cross product adds its errors.
+        let slack =
+            |size: f64, noise: f64| E::narrow(2.0 * side_of_going_on::<E>() * E::ROUNDOFF * size + noise);
         let edge = |from: usize, to: usize| {
             let (direction, anchor) = (vertices[to] - vertices[from], ends.nearer(from, to));
             let moment = anchor.cross(direction);
@@ -176,9 +181,10 @@ impl<E: Real> Triangle<E> {
         }
     }
 
-    /// By the sides of its edges in Plücker coordinates, each with a bound on its error; what that leaves open is
-    /// [settled](settle). The distance is that of the plane, by the operations of a box's slab, so that one in the plane
-    /// of a face is met where the face is. A ray within the rounding error of the plane misses.
+    /// Intersects rays from any origin by the sides of the edges in Plücker coordinates, each with a bound on its
+    /// error. [`settle`] decides the rays that these bounds leave in doubt. The distance is that of the plane, computed
+    /// like that of a box's slab, so that a triangle in the plane of a face is hit at the face's distance. A ray within
+    /// the rounding error of the plane misses.
     #[inline(always)]
     fn meet_from_anywhere<S: Simd>(
         &self,
@@ -225,15 +231,15 @@ impl<E: Real> Triangle<E> {
         if inside.any_true() {
             let slope = Vec3::splat(simd, self.normal).dot(direction);
             let distance = splat::<S, E>(simd, self.height) * (constant::<S, E>(simd, 1.0) / slope);
-            // What is clear of the edges lies ahead: the sides are turned that way.
+            // A hit that is clear of the edges is ahead, because of the signs of the sides.
             let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
             let ray = (Vec3::zero(simd), direction, Beside::Eye);
             self.offer_settled(simd, place, ray, (inside, clear), (slope, distance), nearest);
         }
     }
 
-    /// Offers a `hit`; where it is not `clear` of the edges, or nearly in the plane, what comes of it when settled. A ray
-    /// within the rounding error of the plane misses.
+    /// Offers a `hit`. If it is not `clear` of the edges, or the ray is nearly in the plane, offers the settled result.
+    /// A ray within the rounding error of the plane misses.
     #[inline(always)]
     fn offer_settled<S: Simd>(
         &self,
@@ -250,7 +256,7 @@ impl<E: Real> Triangle<E> {
             return nearest.offer(simd, hit, distance, self.order);
         }
         let steep = slope.abs().simd_gt(constant::<S, E>(simd, GRAZING * E::ROUNDOFF));
-        // Put together here, so that only rays in doubt go through memory.
+        // Built here, so that only rays in doubt go through memory.
         let ray = Ray { origin, direction };
         let (met, settled) = settle(simd, place, ray, beside, (doubtful & steep, clear), distance);
         let distance = doubtful.select(settled, distance);
@@ -259,17 +265,17 @@ impl<E: Real> Triangle<E> {
     }
 }
 
-/// The triangle test's part of a ray.
+/// The per-ray constants of the triangle test.
 #[derive(Clone, Copy)]
 pub(in crate::fast) struct Moment<S: Simd, E: Real> {
-    /// origin x direction
+    /// The cross product origin × direction.
     pub(in crate::fast) moment: Vec3<S, E>,
-    /// |origin|₁
+    /// The sum norm |origin|₁.
     reach: Lanes<S, E>,
 }
 
-impl<E: Real> Aim<E> for Triangle<E> {
-    type Aimed<S: Simd> = Moment<S, E>;
+impl<E: Real> Precalculations<E> for Triangle<E> {
+    type RayPrecalculations<S: Simd> = Moment<S, E>;
 
     #[inline(always)]
     fn aim<S: Simd>(_: S, ray: Ray<S, E>) -> Moment<S, E> {
@@ -280,7 +286,7 @@ impl<E: Real> Aim<E> for Triangle<E> {
 
 impl<E: Real> Tests<Triangle<E>, E> for Robust {
     #[inline(always)]
-    fn meet<S: Simd, const EYE: bool>(
+    fn intersect<S: Simd, const EYE: bool>(
         simd: S,
         triangle: &Triangle<E>,
         place: Place,
@@ -295,7 +301,7 @@ impl<E: Real> Tests<Triangle<E>, E> for Robust {
         }
     }
 
-    /// The point is moved onto the plane by its height above it.
+    /// Returns the surface. The point is moved onto the plane by its height above it.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -319,20 +325,23 @@ impl<E: Real> Tests<Triangle<E>, E> for Robust {
     }
 }
 
-/// A triangle as an obstacle to one sun: affine functions of the ray's origin.
+/// A triangle as an occluder of one sun: affine functions of the ray's origin.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Prism<E> {
-    /// In units of twice a bound on the error: below 0 is outside the triangle, from 0 to 1 in doubt.
+    /// The sides, in units of twice a bound on the error. Below 0 is outside the triangle; from 0 to 1 is in doubt.
     sides: [([E; 3], E); 3],
-    /// The same for the side that the light does not shine on: below 0 is the other one.
+    /// The depth behind the plane, on the side away from the light, in the same units. Below 0 is the lit side.
     depth: ([E; 3], E),
 }
 
 impl<E: Real> Prism<E> {
-    /// From the Plücker coordinates of the ray through `o` along `d`: `d · moment + direction · (o × d)`. `axes` are the
-    /// sun's [rounded](Sun::rounded) ones.
+    /// Makes an occluder from the Plücker coordinates of the ray through `o` along `d`:
+    /// `d · moment + direction · (o × d)`. `axes` are the sun's [rounded](Sun::rounded) axes.
     #[inline(never)]
-    pub(in crate::fast) fn new(&Placed { vertices, normal, height }: &Placed, axes: DMat3) -> Self {
+    pub(in crate::fast) fn new(
+        &RenderSpaceTriangle { vertices, normal, height }: &RenderSpaceTriangle,
+        axes: DMat3,
+    ) -> Self {
         let towards = axes.row(2);
         let facing = normal.dot(towards);
         let sign = facing.signum();
@@ -343,9 +352,9 @@ impl<E: Real> Prism<E> {
             };
         }
         let ends = Ends::new(vertices);
-        // No point has a coordinate beyond 1, no corner is farther away than the root of 3.
+        // No point has a coordinate above 1, and no corner is farther away than the root of 3.
         let scale = |slope: DVec3, start: f64, noise: f64| {
-            0.5 / (SIDE * E::ROUNDOFF * (l1(slope) + start.abs()) + noise)
+            0.5 / (side_of_going_on::<E>() * E::ROUNDOFF * (l1(slope) + start.abs()) + noise)
         };
         let side = |from: usize, to: usize| {
             let edge = vertices[to] - vertices[from];
@@ -361,7 +370,7 @@ impl<E: Real> Prism<E> {
         }
     }
 
-    /// Whether points lie in the triangle's shadow: not below 0, certainly from 1.
+    /// Returns the depth of points in the triangle's shadow: negative outside, at least 1 if certainly inside.
     #[inline(always)]
     fn within<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Lanes<S, E> {
         let [a, b, c] = self.sides;
@@ -372,12 +381,13 @@ impl<E: Real> Prism<E> {
 
 impl<E: Real> Obstructs<E> for Triangle<E> {
     type Obstacle = Prism<E>;
-    type Faced<S: Simd> = ();
+    type SunPrecalculations<S: Simd> = ();
 
     #[inline(always)]
     fn face<S: Simd>(_: S, _: &Sun<E>, _: Vec3<S, E>) {}
 
-    /// By the most that any of the triangles says; what that leaves open is [settled](settle).
+    /// Returns the points that none of the triangles occludes, by the largest depth. [`settle`] decides the points in
+    /// doubt.
     #[inline(always)]
     fn unoccluded<S: Simd>(
         simd: S,
@@ -405,7 +415,7 @@ impl<E: Real> Obstructs<E> for Triangle<E> {
     }
 }
 
-/// Which of the doubtful points lie in the shadow of one of the triangles.
+/// Returns the points in doubt that are in the shadow of one of the triangles.
 #[cold]
 #[inline(never)]
 fn settle_shadows<S: Simd, E: Real>(
@@ -435,11 +445,11 @@ fn settle_shadows<S: Simd, E: Real>(
     )
 }
 
-/// A triangle's corners by how near they are to the eye: relative to the nearer one numbers are smaller, and rounded
-/// less.
+/// A triangle's corners with their distances from the eye. Relative to the nearer corner, numbers are smaller and have
+/// smaller rounding errors.
 struct Ends {
     vertices: [DVec3; 3],
-    /// Of their distances.
+    /// The squares of their distances.
     squares: [f64; 3],
 }
 

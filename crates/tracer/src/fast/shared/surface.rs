@@ -3,11 +3,11 @@
 use glam::DVec3;
 
 /// How far apart numbers may be that are meant to be the same, in roundoffs of the largest that took part.
-pub(super) const SAME: f64 = 64.0 * f64::EPSILON / 2.0;
+pub(crate) const SAME: f64 = 64.0 * f64::EPSILON / 2.0;
 
 /// A part of the surface of an object.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) enum Surface {
+pub(crate) enum Surface {
     Flat(Flat),
     Ball { center: DVec3, radius: f64 },
     Side(Side),
@@ -16,20 +16,20 @@ pub(in crate::fast) enum Surface {
 
 /// A flat part: a face, a cap, or all of what is flat.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Flat {
+pub(crate) struct Flat {
     /// Of length 1.
-    pub(in crate::fast) normal: DVec3,
+    pub(crate) normal: DVec3,
     /// `normal · point` of its points.
-    pub(in crate::fast) height: f64,
+    pub(crate) height: f64,
     /// The middle of a circle around it, and its radius.
-    pub(in crate::fast) center: DVec3,
-    pub(in crate::fast) radius: f64,
-    pub(in crate::fast) plain: Plain,
+    pub(crate) center: DVec3,
+    pub(crate) radius: f64,
+    pub(crate) plain: Plain,
 }
 
 /// By which formula rays meet a flat part: of the same numbers it makes the same distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::fast) enum Plain {
+pub(crate) enum Plain {
     Triangle,
     /// From the numbers of a plane that is square to an axis.
     ByAxis,
@@ -39,27 +39,27 @@ pub(in crate::fast) enum Plain {
 
 /// The side of a cone or a cylinder.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Side {
-    pub(in crate::fast) end: DVec3,
+pub(crate) struct Side {
+    pub(crate) end: DVec3,
     /// Of length 1.
-    pub(in crate::fast) axis: DVec3,
-    pub(in crate::fast) height: f64,
+    pub(crate) axis: DVec3,
+    pub(crate) height: f64,
     /// At the end, and at the other one.
-    pub(in crate::fast) radii: [f64; 2],
+    pub(crate) radii: [f64; 2],
 }
 
 /// The surface of a torus.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::fast) struct Ring {
-    pub(in crate::fast) center: DVec3,
+pub(crate) struct Ring {
+    pub(crate) center: DVec3,
     /// Of length 1.
-    pub(in crate::fast) axis: DVec3,
-    pub(in crate::fast) radius: f64,
-    pub(in crate::fast) thickness: f64,
+    pub(crate) axis: DVec3,
+    pub(crate) radius: f64,
+    pub(crate) thickness: f64,
 }
 
 /// A direction that is square to none that people write: it tells one side of a plane from the other.
-pub(super) const ASIDE: DVec3 = DVec3::new(0.577_215_664_9, 0.302_775_637_7, 0.141_592_653_6);
+pub(crate) const ASIDE: DVec3 = DVec3::new(0.577_215_664_9, 0.302_775_637_7, 0.141_592_653_6);
 
 /// Another such direction, along which places are sorted.
 const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.428_249_505_6);
@@ -67,7 +67,7 @@ const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.428_249_50
 impl Surface {
     /// Two numbers that are about the same for parts that lie in one surface: of what is flat one of its direction, and one of
     /// its place.
-    pub(super) fn key(&self) -> (f64, f64) {
+    pub(crate) fn key(&self) -> (f64, f64) {
         match self {
             Self::Flat(flat) => {
                 let side = flat.normal.dot(ASIDE).signum();
@@ -84,7 +84,7 @@ impl Surface {
     }
 
     /// The middle and the radius of a ball around it.
-    pub(super) fn ball(&self) -> (DVec3, f64) {
+    pub(crate) fn ball(&self) -> (DVec3, f64) {
         match self {
             Self::Flat(flat) => (flat.center, flat.radius),
             Self::Ball { center, radius } => (*center, *radius),
@@ -97,7 +97,7 @@ impl Surface {
     }
 
     /// Whether rays meet both at the same distance, bit for bit.
-    pub(super) fn is_met_with(&self, other: &Self) -> bool {
+    pub(crate) fn is_met_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Flat(one), Self::Flat(other)) => one.is_met_with(other),
             _ => false,
@@ -106,7 +106,7 @@ impl Surface {
 
     /// How large the numbers are that say where two parts lie, if they lie in one surface and may have a part of it in
     /// common; `sizes` are the largest numbers of both objects, along each axis.
-    pub(super) fn shared(&self, other: &Self, sizes: DVec3) -> Option<f64> {
+    pub(crate) fn shared(&self, other: &Self, sizes: DVec3) -> Option<f64> {
         match (self, other) {
             (Self::Flat(one), Self::Flat(other)) => {
                 if one.radius <= other.radius {
@@ -154,7 +154,7 @@ impl Flat {
         (above <= SAME * size && tilt <= SAME * size).then_some(size)
     }
 
-    fn is_met_with(&self, other: &Self) -> bool {
+    pub(crate) fn is_met_with(&self, other: &Self) -> bool {
         let is_equal = self.normal == other.normal && self.height == other.height
             || self.normal == -other.normal && self.height == -other.height;
         let is_square = || self.normal.abs().max_element() == 1.0;

@@ -1,10 +1,11 @@
-//! Cones, also cut off: frusta.
+//! Cones and truncated cones: frusta.
 
 use glam::DVec3;
-use rayfold_scene::{Cone, Object};
+use rayfold_scene::Cone;
 
+use super::double_double::Place;
 use super::frustum::Frustum;
-use super::{Shape, Surface};
+use super::{Shape, Sides, Surface};
 use crate::camera::Ray;
 
 fn frustum(cone: &Cone) -> Frustum {
@@ -24,9 +25,15 @@ impl Shape for Cone {
         frustum(self).surface(ray, distance)
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let ends = self.ends().map(|end| end - eye);
-        let placed = Self::new(self.radii(), ends, self.material().clone()).ok()?;
-        (frustum(self).sides(eye) == frustum(&placed).sides(DVec3::ZERO)).then_some(placed.into())
+    fn sides(&self, place: Place) -> Sides {
+        frustum(self).sides(place)
+    }
+
+    fn is_flat_at(&self, normal: DVec3) -> bool {
+        frustum(self).is_cap(normal)
+    }
+
+    fn face(&self, place: DVec3, _: DVec3) -> Option<(usize, f64)> {
+        frustum(self).cap(place)
     }
 }

@@ -1,9 +1,10 @@
 //! Boxes along the axes.
 
 use glam::DVec3;
-use rayfold_scene::{Cuboid, Object};
+use rayfold_scene::Cuboid;
 
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::Place;
+use super::{ROUNDOFF, Shape, Sides, Surface, nearer, sign};
 use crate::camera::Ray;
 
 impl Shape for Cuboid {
@@ -32,22 +33,48 @@ impl Shape for Cuboid {
         Surface { point, normal, offset: 16.0 * ROUNDOFF * largest, flat: true, within: !entering }
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        Object::from(self.clone()).placed(1.0, |corner| corner - eye).ok()
+    fn sides(&self, place: Place) -> Sides {
+        let [low, high] = [self.min(), self.max()].map(|corner| place.towards(corner).map(sign));
+        [low.x, low.y, low.z, high.x, high.y, high.z]
+    }
+
+    fn has_inside(&self) -> bool {
+        self.min().cmpne(self.max()).all()
+    }
+
+    fn is_flat_at(&self, _: DVec3) -> bool {
+        true
+    }
+
+    fn face(&self, place: DVec3, normal: DVec3) -> Option<(usize, f64)> {
+        let axis = largest(normal);
+        Some((axis, nearer(axis, place, [self.min(), self.max()])))
     }
 }
 
-/// The axis to which the box is square, if it is a rectangle: its sides have no area.
+/// Returns the axis of the largest component.
+fn largest(v: DVec3) -> usize {
+    let v = v.abs();
+    if v.x >= v.y && v.x >= v.z {
+        0
+    } else if v.y >= v.z {
+        1
+    } else {
+        2
+    }
+}
+
+/// Returns the axis to which the box is perpendicular, if it is a rectangle. The sides of a rectangle have no area.
 fn flat_axis(cuboid: &Cuboid) -> Option<usize> {
     let mut axes = (0..3).filter(|&axis| cuboid.min()[axis] == cuboid.max()[axis]);
     axes.next().filter(|_| axes.next().is_none())
 }
 
-/// Distances at which the ray enters and leaves the box, each with its axis: Kay and Kajiya's slabs, where the planes
-/// of a slab belong to it and a ray along them is inside for its whole length.
+/// Returns the distances at which the ray enters and leaves the box, each with its axis, by Kay and Kajiya's slabs. The
+/// planes of a slab belong to it, and a ray parallel to them is inside for its whole length.
 ///
-/// Leaving is put later by the rounding error of the divisions (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013), so
-/// that edges and corners belong to the box.
+/// The distance of leaving is increased by the rounding error of the divisions (Ize, "Robust BVH ray traversal", JCGT
+/// 2(2), 2013), so that edges and corners belong to the box.
 fn slabs(cuboid: &Cuboid, ray: Ray) -> Option<((f64, usize), (f64, usize))> {
     let (min, max) = (cuboid.min(), cuboid.max());
     let mut enter = (f64::NEG_INFINITY, 0);
@@ -75,7 +102,7 @@ fn slabs(cuboid: &Cuboid, ray: Ray) -> Option<((f64, usize), (f64, usize))> {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::Material;
+    use rayfold_scene::{Material, Object};
 
     use super::*;
     use crate::reference::shapes::distance;

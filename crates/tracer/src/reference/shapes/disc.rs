@@ -1,13 +1,14 @@
-//! Discs.
+//! Discs, intersected by the plane that contains them.
 
 use glam::DVec3;
+use rayfold_scene::Disc;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Disc, Object};
 
-use super::{ROUNDOFF, Shape, Surface, plane};
+use super::double_double::Place;
+use super::{ROUNDOFF, Shape, Sides, Surface, plane};
 use crate::camera::Ray;
 
-/// The rounding errors of a hit's distance from the middle, in roundoffs: its rim belongs to a disc.
+/// The rounding error of a hit's distance from the centre, in roundoffs. The rim belongs to the disc.
 const RIM: f64 = 4.0;
 
 impl Shape for Disc {
@@ -27,12 +28,20 @@ impl Shape for Disc {
         plane::surface(ray, distance, self.center(), self.normal())
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let center = self.center() - eye;
-        let placed = Self::new(self.radius(), center, self.normal(), self.material().clone()).ok()?;
-        let same = plane::side(eye, self.center(), self.normal())
-            == plane::side(DVec3::ZERO, placed.center(), placed.normal());
-        same.then_some(placed.into())
+    fn sides(&self, place: Place) -> Sides {
+        [plane::side(place, self.center(), self.normal()), 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    fn has_inside(&self) -> bool {
+        false
+    }
+
+    fn is_flat_at(&self, _: DVec3) -> bool {
+        true
+    }
+
+    fn face(&self, _: DVec3, _: DVec3) -> Option<(usize, f64)> {
+        plane::along_an_axis(self.normal()).map(|axis| (axis, self.center()[axis]))
     }
 }
 

@@ -1,19 +1,19 @@
-//! What is round about an axis, straight from end to end and closed by caps: cylinders and cones.
+//! Frusta: cylinders and cones, rotationally symmetric about an axis, with straight sides, closed by caps.
 //!
-//! With z the height over the end a, ρ the way from the axis and r(z) = Ra + k·z the radius there, the side is where
-//! f = |ρ|² - r² is 0; all that a ray has of the body is one stretch, for it is convex. Lengths are in units of the body,
-//! by a power of two, and a far origin is first brought near along the ray: what is decided of a ray then has errors of
-//! some roundoffs of the body's size.
+//! Let z be the height above the end a, ρ the vector from the axis, and r(z) = Ra + k·z the radius there. The side is
+//! the surface where f = |ρ|² - r² is 0. The body is convex, so a ray has one interval in it. Lengths are in units of
+//! the body, scaled by a power of two, and a distant origin is first moved near the body along the ray. So each
+//! decision about a ray has errors of some roundoffs of the body's size.
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
 
-use super::twofold::{Twofold, between, cross, dot};
-use super::{ROUNDOFF, Surface, plane};
+use super::double_double::{DoubleDouble, Place, between, cross, dot};
+use super::{ROUNDOFF, Sides, Surface, nearer, plane, sign};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
-/// The radii at the ends of an axis.
+/// A frustum: the radii at the ends of an axis.
 pub(super) struct Frustum {
     pub(super) radii: [f64; 2],
     pub(super) ends: [DVec3; 2],
@@ -23,24 +23,42 @@ pub(super) struct Frustum {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Part {
     Side,
-    /// That of the end a or b.
+    /// The cap at the end a or b.
     Cap(usize),
 }
 
-/// The stretch of a ray in the body: where it enters and leaves, in world units.
+/// The interval of a ray in the body: the distances at which it enters and leaves, in world units.
 struct Stretch {
     enter: (f64, Part),
     leave: (f64, Part),
 }
 
-/// An origin farther away than so many sizes of the body is brought near it.
+/// The distance, in sizes of the body, beyond which an origin is moved near it.
 const FAR: f64 = 8.0;
 
-/// Rounding errors of where a ray meets the side or a cap, in roundoffs of the body's size and of the place: edges belong
+/// The rounding error of a hit on the side or a cap, in roundoffs of the body's size and of the distance. Edges belong
 /// to the body.
 const EDGE: f64 = 8.0;
 
+/// The cosine above which a normal is that of a cap, which is the axis. A normal of a side is farther from the axis.
+const CAP: f64 = 1.0 - 1e-12;
+
 impl Frustum {
+    /// Returns whether a unit normal is that of a cap.
+    pub(super) fn is_cap(&self, normal: DVec3) -> bool {
+        let [a, b] = self.ends;
+        unit(b - a).dot(normal).abs() > CAP
+    }
+
+    /// Returns the axis along which the body's own axis runs, and the coordinate of the cap that is nearer to a point.
+    /// Returns `None` if it runs along no axis.
+    pub(super) fn cap(&self, place: DVec3) -> Option<(usize, f64)> {
+        let [a, b] = self.ends;
+        let mut differing = (0..3).filter(|&axis| a[axis] != b[axis]);
+        let axis = differing.next()?;
+        differing.next().is_none().then(|| (axis, nearer(axis, place, self.ends)))
+    }
+
     pub(super) fn extent(&self, origin: DVec3) -> f64 {
         let [a, b] = self.ends;
         let largest = a.abs().max(b.abs()).max(origin.abs()).max_element();
@@ -52,8 +70,8 @@ impl Frustum {
         Some(if enter.0 > 0.0 { enter.0 } else { leave.0 })
     }
 
-    /// The point has the roundings of its height, of its way from the axis, both no larger than the body, and of the sum with
-    /// a: fewer than 16 of the largest number.
+    /// Returns the surface. The point has the rounding errors of its height, of its vector from the axis, both no
+    /// larger than the body, and of the sum with a: fewer than 16 roundoffs of the largest number.
     pub(super) fn surface(&self, ray: Ray, distance: f64) -> Surface {
         let Some(Stretch { enter, leave }) = self.stretch(ray) else {
             unreachable!("the ray hits the body at {distance}")
@@ -82,7 +100,7 @@ impl Frustum {
         }
     }
 
-    /// The point of the side that is nearest to a place of the ray, and the normal there.
+    /// Returns the point of the side that is nearest to a point of the ray, and the normal there.
     fn side_at(&self, ray: Ray, distance: f64) -> (DVec3, DVec3) {
         let [a, b] = self.ends;
         let axis = unit(b - a);
@@ -93,40 +111,40 @@ impl Frustum {
         let height = from_a.dot(axis).clamp(0.0, length);
         let aside = from_a - height * axis;
         let aside = aside - aside.dot(axis) * axis;
-        // A tip has no direction of its own: it is taken from where the ray comes from.
+        // A tip has no normal. It gets one that points back along the ray.
         let aside = if aside == DVec3::ZERO { ray.direction.dot(axis) * axis - ray.direction } else { aside };
         let away = if aside == DVec3::ZERO { DVec3::ZERO } else { unit(aside) };
         let radius = self.radii[0] + slope * height;
         (a + height * axis + radius * away, unit(away - slope * axis))
     }
 
-    /// On which side of the infinite cone and of its ends a place is.
-    pub(super) fn sides(&self, place: DVec3) -> [f64; 3] {
+    /// Returns the sides of the infinite cone and of its ends on which a point is.
+    pub(super) fn sides(&self, place: Place) -> Sides {
         let size = self.size();
         let Exact { outside, heights } = self.exact(place, size);
-        [outside, heights[0], heights[1]].map(|x| if x == 0.0 { 0.0 } else { x.signum() })
+        [outside, heights[0], heights[1], 0.0, 0.0, 0.0].map(sign)
     }
 
-    /// What brings the body's size near 1.
+    /// Returns the scale that brings the body's size near 1.
     fn size(&self) -> f64 {
         let [a, b] = self.ends;
         below_inverse((b - a).abs().max_element().max(self.radii[0]).max(self.radii[1]))
     }
 
-    /// Decided with twice the precision: the place may lie on the surface.
-    fn exact(&self, place: DVec3, scale: f64) -> Exact {
+    /// Computes the side with twice the precision, because the point may be on the surface.
+    fn exact(&self, place: impl Into<Place>, scale: f64) -> Exact {
         let [a, b] = self.ends;
         let (axis, from_a) = (between(b, a, scale), between(place, a, scale));
         let (square, along) = (dot(axis, axis), dot(from_a, axis));
         let aside = cross(from_a, axis);
-        let [low, high] = self.radii.map(|radius| Twofold::from(radius * scale));
+        let [low, high] = self.radii.map(|radius| DoubleDouble::from(radius * scale));
         // |ρ|²·h² and r²·h⁴ for the height h of the body.
         let radius = low * square + (high - low) * along;
         let (far, near) = (dot(aside, aside) * square, radius * radius);
         let (length, apart) = (square.value().sqrt(), dot(from_a, from_a).value());
         let largest = apart * square.value() * square.value() + near.value();
         let outside = (far - near).beside(largest) / (square.value() * square.value());
-        let over = |height: Twofold| height.beside(apart.sqrt() * length + square.value()) / length;
+        let over = |height: DoubleDouble| height.beside(apart.sqrt() * length + square.value()) / length;
         Exact { outside, heights: [over(along), over(along - square)] }
     }
 
@@ -187,7 +205,7 @@ impl Frustum {
             }
         }
         let slack = EDGE * ROUNDOFF * (leave.0.abs() + height.max(low).max(high));
-        // A cap is as far as all else in its plane.
+        // A cap is hit at the same distance as any other flat shape in its plane.
         let world = |(at, part): (f64, Part)| match part {
             Part::Side => (near + at / scale, part),
             Part::Cap(end) => (plane::along(ray, self.ends[end], b - a), part),
@@ -196,14 +214,15 @@ impl Frustum {
     }
 }
 
-/// f at a place, and its heights over the ends, in units of 1 / scale; 0 exactly on the surface.
+/// The value of f at a point, and its heights above the ends, in units of 1 / scale. Exactly 0 on the surface.
 struct Exact {
     outside: f64,
     heights: [f64; 2],
 }
 
-/// From where to where A·t² + 2·B·t + C is not positive, on the half of a double cone in which its radius, which changes
-/// by `growth` a length of the ray, is not negative (or on the other half alone: the caps cut that off).
+/// Returns the interval in which A·t² + 2·B·t + C is not positive, on the half of a double cone whose radius is not
+/// negative. The radius changes by `growth` per length of the ray. The interval may be on the other half alone, which
+/// the caps cut off.
 fn inside([a, b, c]: [f64; 3], discriminant: f64, growth: f64) -> Option<(f64, f64)> {
     const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
     if a == 0.0 {
@@ -274,7 +293,7 @@ mod tests {
         assert_eq!(t([2.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), Some(4.0), "from the side inwards");
         assert_eq!(t([1.0, 3.0, 0.0], [0.0, 1.0, 0.0]), None, "from a cap");
         assert_eq!(t([1.0, 3.0, 0.0], [0.0, -1.0, 0.0]), Some(4.0), "from a cap inwards");
-        // On the side by numbers that round.
+        // On the side, by numbers that are rounded.
         assert_eq!(t([1.2, 0.0, 1.6], [0.6, 0.0, 0.8]), None);
     }
 

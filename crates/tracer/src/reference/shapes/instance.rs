@@ -4,13 +4,13 @@
 //! copy written out shows, bit for bit.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use glam::DVec3;
-use rayfold_scene::{
-    Cone, Cuboid, Cylinder, Disc, Instance, Object, Placement, Plane, Sphere, Torus, Triangle,
-};
+use rayfold_scene::{Instance, Motion, Object, Placement};
 
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::Place;
+use super::{ROUNDOFF, Shape, Sides, Surface};
 use crate::camera::Ray;
 
 impl Shape for Instance {
@@ -38,8 +38,73 @@ impl Shape for Instance {
         }
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        Object::from(self.clone()).placed(1.0, |place| place - eye).ok()
+    fn sides(&self, place: Place) -> Sides {
+        super::shape(self.object()).sides(place)
+    }
+}
+
+/// Returns the object in coordinates whose origin is the eye. Returns `None` if that is impossible, or if rounding
+/// would change which side of it the eye is on.
+pub(in crate::reference) fn seen_from(object: &Object, eye: DVec3) -> Option<Object> {
+    match object {
+        Object::Instance(instance) => of_group(instance, eye),
+        // Rounding would give it an area.
+        Object::Triangle(triangle) if triangle.is_degenerate() => Some(object.clone()),
+        _ => {
+            let placed = object.placed(1.0, |place| place - eye).ok()?;
+            let same =
+                super::shape(object).sides(eye.into()) == super::shape(&placed).sides(DVec3::ZERO.into());
+            same.then_some(placed)
+        }
+    }
+}
+
+/// Implements [`seen_from`] for an object of a group. If rounding would put the eye on another side of the surface, the object gets the group's
+/// own numbers relative to the eye, and its lengths grow or shrink by their last bits until the eye is on the right side.
+fn of_group(instance: &Instance, eye: DVec3) -> Option<Object> {
+    let placement = instance.placement();
+    let object = instance.object();
+    let exact = Place::in_group(eye, placement);
+    let sides = super::shape(object).sides(exact);
+    let drawn = Object::from(instance.clone()).placed(1.0, |place| place - eye).ok()?;
+    let Object::Instance(moved) = &drawn else { unreachable!("an instance stays one") };
+    let is_right = |object: &Object, place: DVec3| super::shape(object).sides(place.into()) == sides;
+    if is_right(object, moved.placement().local_point(DVec3::ZERO)) {
+        return Some(drawn);
+    }
+    let own = Placement::new(DVec3::ZERO, placement.rotation(), placement.scale()).ok()?;
+    let near = object.placed(1.0, |place| exact.towards(place)).ok()?;
+    let candidates: Vec<Object> = [0, 1, -1, 2, -2, 4, -4]
+        .into_iter()
+        .filter_map(|bits| near.moved(&Grown(bits), near.material().clone()).ok())
+        .collect();
+    // An eye that cannot be in the surface, and is no farther from it than the errors of twofold numbers, is outside.
+    let is_near = |object: &Object| {
+        let found = super::shape(object).sides(DVec3::ZERO.into());
+        found.iter().zip(sides).all(|(found, side)| *found == side || side == 0.0 && *found > 0.0)
+    };
+    let found = candidates.iter().find(|object| is_right(object, DVec3::ZERO));
+    let found = found.or_else(|| candidates.iter().find(|object| is_near(object))).cloned();
+    Some(found.map_or(drawn, |object| Instance::new(&vec![object].into(), 0, &Arc::new(own)).into()))
+}
+
+/// Makes all lengths larger by so many last bits.
+struct Grown(i64);
+
+impl Motion for Grown {
+    fn point(&self, position: DVec3) -> DVec3 {
+        position
+    }
+
+    fn direction(&self, direction: DVec3) -> DVec3 {
+        direction
+    }
+
+    fn length(&self, length: f64) -> f64 {
+        match length {
+            0.0 => 0.0,
+            _ => f64::from_bits(length.to_bits().saturating_add_signed(self.0)),
+        }
     }
 }
 
@@ -63,48 +128,28 @@ fn moved(instance: &Instance) -> Option<Object> {
     if !turns_axes_to_axes(placement) {
         return None;
     }
-    let material = instance.material().clone();
-    let place = |point| exactly_placed(placement, point);
-    let length = |length| exact_product(placement.scale(), length);
-    let turned = |direction| placement.rotation() * direction;
-    match instance.object() {
-        Object::Sphere(o) => {
-            Sphere::new(length(o.radius())?, place(o.center())?, material).ok().map(Object::from)
-        }
-        Object::Triangle(o) => {
-            let [u, v, w] = *o.vertices();
-            Triangle::new([place(u)?, place(v)?, place(w)?], material).ok().map(Object::from)
-        }
-        Object::Cuboid(o) => {
-            let [u, v] = *o.corners();
-            Cuboid::new([place(u)?, place(v)?], material).ok().map(Object::from)
-        }
-        Object::Plane(o) => {
-            Plane::new(place(o.point())?, turned(o.normal()), material).ok().map(Object::from)
-        }
-        Object::Disc(o) => {
-            let (radius, center) = (length(o.radius())?, place(o.center())?);
-            Disc::new(radius, center, turned(o.normal()), material).ok().map(Object::from)
-        }
-        Object::Cylinder(o) => {
-            let [a, b] = o.ends();
-            Cylinder::new(length(o.radius())?, [place(a)?, place(b)?], material).ok().map(Object::from)
-        }
-        Object::Cone(o) => {
-            let ([a, b], [low, high]) = (o.ends(), o.radii());
-            Cone::new([length(low)?, length(high)?], [place(a)?, place(b)?], material).ok().map(Object::from)
-        }
-        Object::Torus(o) => {
-            let (radius, thickness) = (length(o.radius())?, length(o.thickness())?);
-            let (center, normal) = (place(o.center())?, turned(o.normal()));
-            Torus::new(radius, thickness, center, normal, material).ok().map(Object::from)
-        }
-        Object::Instance(_) => None,
+    instance.object().moved(&Exactly(placement), instance.material().clone()).ok()
+}
+
+/// A placement that turns axes to axes, without any rounding: NaN where a result would need one.
+struct Exactly<'a>(&'a Placement);
+
+impl Motion for Exactly<'_> {
+    fn point(&self, position: DVec3) -> DVec3 {
+        exactly_placed(self.0, position).unwrap_or(DVec3::NAN)
+    }
+
+    fn direction(&self, direction: DVec3) -> DVec3 {
+        self.0.direction(direction)
+    }
+
+    fn length(&self, length: f64) -> f64 {
+        exact_product(self.0.scale(), length).unwrap_or(f64::NAN)
     }
 }
 
 /// Whether each axis becomes an axis.
-fn turns_axes_to_axes(placement: &Placement) -> bool {
+pub(crate) fn turns_axes_to_axes(placement: &Placement) -> bool {
     placement.rotation().to_cols_array().iter().all(|x| *x == 0.0 || x.abs() == 1.0)
 }
 
@@ -136,7 +181,7 @@ mod tests {
     use std::sync::Arc;
 
     use glam::DMat3;
-    use rayfold_scene::Material;
+    use rayfold_scene::{Cuboid, Cylinder, Material, Sphere};
 
     use super::*;
     use crate::reference::shapes::{distance, surface};
@@ -169,6 +214,47 @@ mod tests {
             ),
         ] {
             assert!(matches!(in_world(&inexact).into_owned(), Object::Instance(_)));
+        }
+    }
+
+    /// Numbers for which the rounded eye is on the other side than the exact one; found by fractions.
+    #[test]
+    fn an_eye_in_the_last_bit_of_a_surface_of_a_group_is_on_the_right_side() {
+        let tube =
+            || Object::from(Cylinder::new(2.0, [DVec3::NEG_Y, DVec3::Y], Material::default()).unwrap());
+        let ball = || {
+            let center = DVec3::new(0.3, 0.1, 0.2);
+            Object::from(Sphere::new(1.0, center, Material::default()).unwrap())
+        };
+        for (object, translation, scale, eye, is_inside) in [
+            (
+                tube(),
+                [-1.1120170754802343, -2.0006859019904732, -1.2342085990515996],
+                0.9726122251548087,
+                DVec3::new(0.05511759470553601, -1.5143797894130688, 0.32197096119609436),
+                true,
+            ),
+            (
+                ball(),
+                [-2.1050663766475184, -1.0518912582746451, 0.1902983644345193],
+                2.928646873193012,
+                DVec3::new(0.5307158092261925, -0.7590265709553439, 3.1189452376275315),
+                true,
+            ),
+            (
+                ball(),
+                [2.196265407243488, -3.2304437656319864, -3.058903089313224],
+                0.2832888118321436,
+                DVec3::new(2.4512253378924176, -3.202114884448772, -2.7756142774810804),
+                false,
+            ),
+        ] {
+            let Object::Instance(instance) = instance(object, translation, DMat3::IDENTITY, scale) else {
+                unreachable!("an instance")
+            };
+            let drawn = of_group(&instance, eye).unwrap();
+            let outwards = Ray { origin: DVec3::ZERO, direction: DVec3::new(0.6, 0.0, 0.8) };
+            assert_eq!(distance(&drawn, outwards).is_some(), is_inside, "{eye}");
         }
     }
 

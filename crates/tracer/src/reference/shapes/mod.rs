@@ -1,24 +1,26 @@
-//! Where a ray meets an object, and what it finds there.
+//! The intersection of a ray with an object, and the surface at the hit.
 //!
-//! A shape is a file. Bounds on rounding errors are multiples of the unit roundoff and of the largest number that took
-//! part.
+//! Each shape has a file. Bounds on rounding errors are multiples of the unit roundoff and of the largest number in the
+//! computation.
 
 mod cone;
 mod cuboid;
 mod cylinder;
 mod disc;
+mod double_double;
 mod frustum;
 mod instance;
 mod plane;
 mod sphere;
 mod torus;
 mod triangle;
-mod twofold;
 
 use glam::DVec3;
 use rayfold_scene::Object;
 
-pub(crate) use instance::in_world;
+pub(crate) use double_double::Place;
+pub(super) use instance::seen_from;
+pub(crate) use instance::{in_world, turns_axes_to_axes};
 pub(crate) use sphere::power;
 pub(crate) use triangle::{normal_and_width, triangle_normal};
 
@@ -31,34 +33,59 @@ const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 /// The surface at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// The hit, brought back onto the object.
+    /// The hit point, moved back onto the object.
     pub point: DVec3,
-    /// Unit normal, on the side that the ray came from.
+    /// The unit normal, on the side that the ray came from.
     pub normal: DVec3,
-    /// `point + offset * normal` lies outside the object for certain, whatever the rounding.
+    /// The offset of new rays: `point + offset * normal` is certainly outside the object, whatever the rounding.
     pub offset: f64,
     /// Whether it is a face, a cap or a flat object.
     pub flat: bool,
-    /// Whether the ray came there from within the object; never for what has no inside.
+    /// Whether the ray came from within the object. It is false for an object that has no inside.
     pub within: bool,
 }
 
-/// What the tracer asks of a shape.
+/// The interface of a shape.
 trait Shape {
-    /// The largest of the numbers that take part in what is asked for rays from `origin`.
+    /// Returns the largest of the numbers in the computations for rays from `origin`.
     fn extent(&self, origin: DVec3) -> f64;
 
-    /// Distance to the nearest hit in front of the origin. What is not a number, or not greater than zero, is no hit.
+    /// Returns the distance to the nearest hit in front of the origin. A value that is NaN, or not greater than zero,
+    /// is no hit.
     fn distance(&self, ray: Ray) -> Option<f64>;
 
-    /// The surface that the ray hits at `distance`.
+    /// Returns the surface that the ray hits at `distance`.
     fn surface(&self, ray: Ray, distance: f64) -> Surface;
 
-    /// As [`seen_from`].
-    fn seen_from(&self, eye: DVec3) -> Option<Object>;
+    /// Returns on which side of each of its surfaces a point lies, as signs; 0 in a surface.
+    fn sides(&self, place: Place) -> Sides;
+
+    /// Returns whether it has an inside, which glass fills.
+    fn has_inside(&self) -> bool {
+        true
+    }
+
+    /// Returns whether the surface with this unit normal is flat: a face or a cap.
+    fn is_flat_at(&self, _normal: DVec3) -> bool {
+        false
+    }
+
+    /// Returns, for the flat part with this normal at `place`, the axis that it is perpendicular to, and its coordinate
+    /// on that axis in the script. Returns `None` for a part that is perpendicular to no axis.
+    fn face(&self, _place: DVec3, _normal: DVec3) -> Option<(usize, f64)> {
+        None
+    }
 }
 
-/// The one place that tells shapes apart.
+/// The signs of a point for up to six surfaces.
+type Sides = [f64; 6];
+
+/// Returns 0 or the sign.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// Returns an object's shape. This is the only place that dispatches on the kind of an object.
 fn shape(object: &Object) -> &dyn Shape {
     match object {
         Object::Sphere(sphere) => sphere,
@@ -73,7 +100,7 @@ fn shape(object: &Object) -> &dyn Shape {
     }
 }
 
-/// Distance to the nearest hit in front of the origin.
+/// Returns the distance to the nearest hit in front of the origin.
 pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
     let scale = scale(object, ray);
     let distance = if scale == 1.0 {
@@ -85,10 +112,10 @@ pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
     (distance > 0.0 && distance.is_finite()).then_some(distance)
 }
 
-/// The surface of an object that the ray hits at `distance`.
+/// Returns the surface of an object that the ray hits at `distance`.
 ///
 /// # Panics
-/// When the ray does not hit the object.
+/// If the ray does not hit the object.
 pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
     let scale = scale(object, ray);
     if scale == 1.0 {
@@ -101,31 +128,47 @@ pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
     Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
 }
 
-/// The largest of the numbers that take part in where a ray meets an object.
+/// Returns the largest of the numbers in the intersection of a ray with an object.
 pub(super) fn extent(object: &Object, ray: Ray) -> f64 {
     shape(object).extent(ray.origin)
 }
 
-/// The largest exponent whose fourth power leaves room for sums of products.
+/// The largest exponent of two whose fourth power leaves room for sums of products.
 const ORDINARY: i32 = 200;
 
-/// The power of two that scales world units to such in which no product overflows or vanishes, 1 for most.
+/// Returns the power of two that scales world units so that no product overflows or underflows; 1 for most objects.
 fn scale(object: &Object, ray: Ray) -> f64 {
     let extent = shape(object).extent(ray.origin);
     let ordinary = extent == 0.0 || (2f64.powi(-ORDINARY)..=2f64.powi(ORDINARY)).contains(&extent);
     if ordinary { 1.0 } else { below_inverse(extent) }
 }
 
-/// Object and ray in units of 1 / scale; `None` for an object that is too small to be seen in the ray's units.
+/// Returns object and ray in units of 1 / scale, or `None` for an object that is too small to be visible in the ray's
+/// units.
 fn scaled(object: &Object, ray: Ray, scale: f64) -> Option<(Object, Ray)> {
     let object = object.placed(scale, |position| position * scale).ok()?;
     Some((object, Ray { origin: ray.origin * scale, ..ray }))
 }
 
-/// The object in coordinates whose origin is the eye; `None` where it has none, or where rounding would change which
-/// side of it the eye is on.
-pub(super) fn seen_from(object: &Object, eye: DVec3) -> Option<Object> {
-    shape(object).seen_from(eye)
+/// Returns whether an object, which is no instance, has an inside.
+pub(crate) fn has_inside(object: &Object) -> bool {
+    shape(object).has_inside()
+}
+
+/// Returns whether an object, which is no instance, is flat where it has this unit normal: a face or a cap.
+pub(crate) fn is_flat_at(object: &Object, normal: DVec3) -> bool {
+    shape(object).is_flat_at(normal)
+}
+
+/// Returns the axis to which a flat part of an object is perpendicular, and its coordinate on that axis in the script.
+pub(super) fn face(object: &Object, place: DVec3, normal: DVec3) -> Option<(usize, f64)> {
+    shape(object).face(place, normal)
+}
+
+/// Returns the one of two coordinates on an axis that is nearer to a point.
+fn nearer(axis: usize, place: DVec3, [a, b]: [DVec3; 2]) -> f64 {
+    let (a, b) = (a[axis], b[axis]);
+    if (place[axis] - a).abs() <= (place[axis] - b).abs() { a } else { b }
 }
 
 #[cfg(test)]

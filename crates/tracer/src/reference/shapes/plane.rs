@@ -1,11 +1,11 @@
-//! Planes, and what is asked of the plane of anything flat.
+//! Planes, and the plane of any flat shape.
 
 use glam::DVec3;
+use rayfold_scene::Plane;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Object, Plane};
 
-use super::twofold::{between, dot};
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::{Place, between, dot};
+use super::{ROUNDOFF, Shape, Sides, Surface, sign};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
@@ -22,16 +22,26 @@ impl Shape for Plane {
         surface(ray, distance, self.point(), self.normal())
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let placed = Self::new(self.point() - eye, self.normal(), self.material().clone()).ok()?;
-        let same =
-            side(eye, self.point(), self.normal()) == side(DVec3::ZERO, placed.point(), placed.normal());
-        same.then_some(placed.into())
+    fn sides(&self, place: Place) -> Sides {
+        [side(place, self.point(), self.normal()), 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    fn has_inside(&self) -> bool {
+        false
+    }
+
+    fn is_flat_at(&self, _: DVec3) -> bool {
+        true
+    }
+
+    fn face(&self, _: DVec3, _: DVec3) -> Option<(usize, f64)> {
+        along_an_axis(self.normal()).map(|axis| (axis, self.point()[axis]))
     }
 }
 
-/// How far along the ray a plane is met; not a finite number for a ray that runs along it, and 0 exactly for one that starts
-/// in it. Whatever lies in one plane square to an axis, faces of boxes too, is met at the same distance bit for bit.
+/// Returns the distance along the ray to a plane. It is not finite for a ray parallel to the plane, and exactly 0 for
+/// one that starts in it. All flat shapes in one plane perpendicular to an axis, faces of boxes too, are hit at the
+/// same distance bit for bit.
 pub(super) fn along(ray: Ray, point: DVec3, normal: DVec3) -> f64 {
     let largest = normal.abs().max_element();
     let square_to_an_axis = normal.to_array().iter().filter(|x| **x != 0.0).count() == 1;
@@ -39,28 +49,37 @@ pub(super) fn along(ray: Ray, point: DVec3, normal: DVec3) -> f64 {
     height(ray.origin, point, normal) / -ray.direction.dot(normal)
 }
 
-/// On which side of a plane a place is; 0 in it.
-pub(super) fn side(place: DVec3, point: DVec3, normal: DVec3) -> f64 {
+/// Returns the axis along which a direction runs exactly.
+pub(super) fn along_an_axis(direction: DVec3) -> Option<usize> {
+    let mut other = (0..3).filter(|&axis| direction[axis] != 0.0);
+    let axis = other.next()?;
+    other.next().is_none().then_some(axis)
+}
+
+/// Returns the side of a plane on which a point is; 0 in the plane.
+pub(super) fn side(place: impl Into<Place>, point: DVec3, normal: DVec3) -> f64 {
     let height = height(place, point, normal * below_inverse(normal.abs().max_element()));
-    if height == 0.0 { 0.0 } else { height.signum() }
+    sign(height)
 }
 
-/// `(place - point)·normal`, with an error of one rounding.
-fn height(place: DVec3, point: DVec3, normal: DVec3) -> f64 {
-    let scale = below_inverse(place.abs().max(point.abs()).max_element());
+/// Returns `(place - point)·normal`, with an error of one rounding.
+fn height(place: impl Into<Place>, point: DVec3, normal: DVec3) -> f64 {
+    let place = place.into();
+    let rounded = place.rounded();
+    let scale = below_inverse(rounded.abs().max(point.abs()).max_element());
     let height = dot(between(place, point, scale), normal.to_array().map(Into::into));
-    height.beside((place.abs() + point.abs()).dot(normal.abs()) * scale) / scale
+    height.beside((rounded.abs() + point.abs()).dot(normal.abs()) * scale) / scale
 }
 
-/// The surface of a plane where a ray meets it.
+/// Returns the surface of a plane at the hit of a ray.
 ///
-/// The hit and its way back onto the plane have roundings of the largest of their numbers: 3 in the hit, 1 in what is taken
-/// off it, and those of the height, which is no larger.
+/// The hit and its move back onto the plane have rounding errors relative to the largest of their numbers: 3 in the
+/// hit, 1 in the difference, and those of the height, which is no larger.
 pub(super) fn surface(ray: Ray, distance: f64, point: DVec3, normal: DVec3) -> Surface {
     let outward = unit(normal);
     let near = ray.origin + distance * ray.direction;
     let mut on = near - (near - point).dot(outward) * outward;
-    // Of a plane that is square to an axis one number is known.
+    // For a plane that is perpendicular to an axis, one coordinate is exact.
     for axis in 0..3 {
         if outward[axis].abs() == 1.0 {
             on[axis] = point[axis];
@@ -73,7 +92,7 @@ pub(super) fn surface(ray: Ray, distance: f64, point: DVec3, normal: DVec3) -> S
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::Material;
+    use rayfold_scene::{Material, Object};
 
     use super::*;
     use crate::reference::shapes::distance;
@@ -102,7 +121,7 @@ mod tests {
     fn a_ray_that_starts_in_a_slanted_plane_does_not_hit_it() {
         let normal = DVec3::new(0.1, 0.7, -0.3);
         let slanted = plane([0.0; 3], normal.to_array());
-        // Halves of a plane's directions: exactly in it, though no product is exact.
+        // A point exactly in the plane, though no product is exact: two coordinates of the normal, swapped.
         let within = DVec3::new(0.7, -0.1, 0.0);
         let r = Ray { origin: within, direction: DVec3::new(0.0, -0.6, 0.8) };
         assert_eq!(distance(&slanted, r), None);

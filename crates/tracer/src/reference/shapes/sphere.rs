@@ -1,17 +1,20 @@
-//! Spheres.
+//! Spheres, with an intersection test that avoids cancellation.
 
 use glam::DVec3;
-use rayfold_scene::{Object, Sphere};
+use rayfold_scene::Sphere;
 
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::{Place, between};
+use super::{ROUNDOFF, Shape, Sides, Surface, sign};
 use crate::camera::Ray;
+use crate::scale::below_inverse;
 
 impl Shape for Sphere {
     fn extent(&self, origin: DVec3) -> f64 {
         (self.center() - origin).abs().max_element().max(self.radius())
     }
 
-    /// Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems ch. 7.
+    /// Returns the distance by the method of Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere
+    /// intersection", Ray Tracing Gems ch. 7.
     fn distance(&self, ray: Ray) -> Option<f64> {
         let radius = self.radius();
         let from_center = ray.origin - self.center();
@@ -21,7 +24,7 @@ impl Shape for Sphere {
             return None;
         }
         let half_chord = ((radius - closest) * (radius + closest)).sqrt();
-        // The two solutions are `far` and `power / far`; neither subtracts numbers of the same sign.
+        // The two solutions are `far` and `power / far`. Neither subtracts numbers of the same sign.
         let far = if middle > 0.0 { middle + half_chord } else { middle - half_chord };
         let power = power(ray.origin, self, 1.0);
         if power > 0.0 {
@@ -42,19 +45,18 @@ impl Shape for Sphere {
         Surface { point, normal, offset: 16.0 * ROUNDOFF * largest, flat: false, within: !outside }
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let placed = Self::new(self.radius(), self.center() - eye, self.material().clone()).ok()?;
-        let side = |eye, sphere| power(eye, sphere, 1.0).partial_cmp(&0.0);
-        (side(eye, self) == side(DVec3::ZERO, &placed)).then_some(placed.into())
+    fn sides(&self, place: Place) -> Sides {
+        [sign(power(place, self, below_inverse(self.extent(DVec3::ZERO)))), 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 }
 
-/// `|point - center|² - radius²` of a sphere in units of 1 / scale, a power of two: positive outside, negative inside,
-/// right to a part in 10^30 of the squares, so that it is known on which side a point of the surface lies.
+/// Returns `|point - center|² - radius²` of a sphere in units of 1 / scale, a power of two: positive outside, negative
+/// inside. It is accurate to a part in 10^30 of the squares, so that the side of a point near the surface is certain.
 ///
-/// By sums and products with their errors (Dekker, "A floating-point technique for extending the available precision",
-/// 1971).
-pub(crate) fn power(point: DVec3, sphere: &Sphere, scale: f64) -> f64 {
+/// Uses sums and products with their errors (Dekker, "A floating-point technique for extending the available
+/// precision", 1971).
+pub(crate) fn power(point: impl Into<Place>, sphere: &Sphere, scale: f64) -> f64 {
+    let apart = between(point, sphere.center(), scale);
     let product = |a: f64| (a * a, a.mul_add(a, -(a * a)));
     let sum = |a: f64, b: f64| {
         let s = a + b;
@@ -64,7 +66,7 @@ pub(crate) fn power(point: DVec3, sphere: &Sphere, scale: f64) -> f64 {
     let (mut power, mut rest) = product(sphere.radius() * scale);
     (power, rest) = (-power, -rest);
     for axis in 0..3 {
-        let (apart, error) = sum(point[axis] * scale, -sphere.center()[axis] * scale);
+        let (apart, error) = (apart[axis].value(), apart[axis].rest());
         let (square, less) = product(apart);
         let (total, lost) = sum(power, square);
         power = total;
@@ -75,7 +77,7 @@ pub(crate) fn power(point: DVec3, sphere: &Sphere, scale: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::Material;
+    use rayfold_scene::{Material, Object};
 
     use super::*;
     use crate::reference::shapes::distance;
@@ -108,10 +110,10 @@ mod tests {
 
     #[test]
     fn the_side_of_a_point_on_the_surface_is_known() {
-        // 0.6² + 0.8² = 1 - 1.7e-17 for the numbers that are nearest to these decimals, ...
+        // 0.6² + 0.8² = 1 - 1.7e-17 for the numbers that are nearest to these decimals.
         let Object::Sphere(unit) = sphere(1.0, [0.0; 3]) else { panic!("a sphere") };
         let just_inside = power(DVec3::new(0.6, 0.8, 0.0), &unit, 1.0);
-        // ... by integers, as 2^-106 is what their squares are multiples of.
+        // In integers, because the squares are multiples of 2^-106.
         let square = |x: f64| ((x * 2f64.powi(53)) as i128).pow(2);
         let exact = square(0.6) + square(0.8) - square(1.0);
         assert_eq!(just_inside, exact as f64 * 2f64.powi(-106));

@@ -1,29 +1,30 @@
 //! Tori, in coordinates of their own.
 //!
-//! With ρ the distance from the axis and z the height over the circle, the surface is where s = √((ρ - R)² + z²) - r, the
-//! signed distance from it, is 0. Squared twice that is q, a quartic along the ray, which has the sign of s. Between two
-//! places where its derivative, a cubic, is 0, q has one root at most. So roots are bracketed: by those of the cubic, which
-//! are bracketed by those of its derivative. q itself is never computed: where s has another sign at both ends of such a
-//! stretch, there is the hit.
+//! With ρ the distance from the axis and z the height above the circle's plane, the surface is where the signed
+//! distance s = √((ρ - R)² + z²) - r is 0. Squaring twice gives q, a quartic along the ray, with the sign of s. Between
+//! two roots of its derivative, a cubic, q has at most one root. So the roots of the cubic bracket the hits, and the
+//! roots of the cubic's derivative bracket those of the cubic. The quartic q itself is never computed: if s has
+//! different signs at the ends of an interval, the hit is in it.
 //!
-//! s errs by some roundoffs of the torus's size, and a place of the cubic counts by its square: rays that touch the torus
-//! within such an error may miss it. Lengths are in units of the torus, by a power of two.
+//! The error of s is a few roundoffs of the torus's size, and the error of a root of the cubic enters by its square.
+//! Rays that touch the torus within such an error may miss it. Lengths are in units of the torus, scaled by a power of
+//! two.
 
 use std::cmp::Ordering;
 
 use glam::DVec3;
+use rayfold_scene::Torus;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Object, Torus};
 
-use super::twofold::{Twofold, between, dot};
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::{DoubleDouble, Place, between, dot};
+use super::{ROUNDOFF, Shape, Sides, Surface};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
-/// An origin farther away than so many sizes of the torus is outside for certain.
+/// The distance, in sizes of the torus, beyond which an origin is certainly outside.
 const FAR: f64 = 4.0;
 
-/// A bracket is narrowed so often at most: the last half of the steps halve it each.
+/// The largest number of steps that narrow a bracket. Each of the last half of them is a bisection.
 const STEPS: u32 = 120;
 
 impl Shape for Torus {
@@ -32,13 +33,15 @@ impl Shape for Torus {
     }
 
     fn distance(&self, ray: Ray) -> Option<f64> {
-        meet(self, ray).map(|(distance, _)| distance)
+        intersect(self, ray).map(|(distance, _)| distance)
     }
 
-    /// The point has the roundings of its way from the circle's middle to the circle and on to the surface, and of the sum
-    /// with the centre: fewer than 16 of the largest number.
+    /// Returns the surface. The point has the rounding errors of the vector from the centre to the circle and on to the
+    /// surface, and of the sum with the centre: fewer than 16 roundoffs of the largest number.
     fn surface(&self, ray: Ray, distance: f64) -> Surface {
-        let Some((_, within)) = meet(self, ray) else { unreachable!("the ray hits the torus at {distance}") };
+        let Some((_, within)) = intersect(self, ray) else {
+            unreachable!("the ray hits the torus at {distance}")
+        };
         let axis = unit(self.normal());
         let from_center = (ray.origin - self.center()) + distance * ray.direction;
         let aside = from_center - from_center.dot(axis) * axis;
@@ -54,39 +57,37 @@ impl Shape for Torus {
         }
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let center = self.center() - eye;
-        let material = self.material().clone();
-        let placed = Self::new(self.radius(), self.thickness(), center, self.normal(), material).ok()?;
-        (side(self, eye) == side(&placed, DVec3::ZERO)).then_some(placed.into())
+    fn sides(&self, place: Place) -> Sides {
+        [f64::from(side(self, place) as i8), 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 }
 
-/// Whether a place is outside (greater), inside (less) or on the surface; decided with twice the precision.
-fn side(torus: &Torus, place: DVec3) -> Ordering {
+/// Returns whether a point is outside (greater), inside (less) or on the surface. It is computed with twice the
+/// precision.
+fn side(torus: &Torus, place: impl Into<Place>) -> Ordering {
     let scale = below_inverse(torus.radius() + torus.thickness());
     let from_center = between(place, torus.center(), scale);
     let normal = torus.normal() * below_inverse(torus.normal().abs().max_element());
-    let normal = normal.to_array().map(Twofold::from);
-    let square = |x: Twofold| x * x;
-    let [ring, tube] = [torus.radius(), torus.thickness()].map(|r| square(Twofold::from(r * scale)));
+    let normal = normal.to_array().map(DoubleDouble::from);
+    let square = |x: DoubleDouble| x * x;
+    let [ring, tube] = [torus.radius(), torus.thickness()].map(|r| square(DoubleDouble::from(r * scale)));
     let (apart, along, of_normal) =
         (dot(from_center, from_center), dot(from_center, normal), dot(normal, normal));
     // (|p|² + R² - r²)²·n² - 4R²·(|p|²·n² - (p·n)²)
     let far = square(apart + ring - tube) * of_normal;
-    let near = Twofold::from(4.0) * ring * (apart * of_normal - square(along));
+    let near = DoubleDouble::from(4.0) * ring * (apart * of_normal - square(along));
     let largest = (apart.value() + ring.value()).powi(2) * of_normal.value();
     let side = (far - near).beside(largest);
     side.partial_cmp(&0.0).unwrap_or(Ordering::Greater)
 }
 
-/// The first hit in front of the origin, and whether the ray comes there from within.
-fn meet(torus: &Torus, ray: Ray) -> Option<(f64, bool)> {
+/// Returns the first hit in front of the origin, and whether the ray comes from within.
+fn intersect(torus: &Torus, ray: Ray) -> Option<(f64, bool)> {
     let scale = below_inverse(torus.radius() + torus.thickness());
     let (ring, tube) = (torus.radius() * scale, torus.thickness() * scale);
     let axis = unit(torus.normal());
     let from_center = ray.origin - torus.center();
-    // The place of the ray that is nearest to the middle; the origin lies at `-middle` from there.
+    // The point of the ray nearest to the centre. The origin is at `-middle` from it.
     let middle = -from_center.dot(ray.direction);
     let near = (from_center + middle * ray.direction) * scale;
     let middle = middle * scale;
@@ -110,7 +111,7 @@ fn meet(torus: &Torus, ray: Ray) -> Option<(f64, bool)> {
         let aside = (place - place.dot(axis) * axis).length();
         (aside - ring).hypot(z) - tube
     };
-    // The derivative of q, over 4: u³ + p·u + v.
+    // A quarter of the derivative of q: u³ + p·u + v.
     let p = near.length_squared() - ring * ring - tube * tube + 2.0 * ring * ring * rise * rise;
     let v = 2.0 * ring * ring * height * rise;
     let mut ends = [half_chord; 4];
@@ -127,12 +128,12 @@ fn meet(torus: &Torus, ray: Ray) -> Option<(f64, bool)> {
         let crossed = match from.1 {
             Ordering::Greater => to != Ordering::Greater,
             Ordering::Less => to != Ordering::Less,
-            // From the surface: q goes one way up to the end.
+            // From the surface: q is monotonic up to the end.
             Ordering::Equal => false,
         };
         if crossed {
             let within = from.1 == Ordering::Less;
-            // Where it only touches, the turn is known better than the root.
+            // If the ray only touches the surface, the turn is more accurate than the root.
             let touches = to == Ordering::Equal;
             let place = if touches { end } else { bracketed(apart, [from.0, end], within) };
             let distance = (place + middle) / scale;
@@ -147,10 +148,10 @@ fn sign(x: f64) -> Ordering {
     x.partial_cmp(&0.0).unwrap_or(Ordering::Greater)
 }
 
-/// Where u³ + p·u + v is 0 between `-most` and `most`, in order.
+/// Returns the roots of u³ + p·u + v between `-most` and `most`, in order.
 fn turns(p: f64, v: f64, most: f64) -> impl Iterator<Item = f64> {
     let cubic = move |u: f64| (u * u + p) * u + v;
-    // The cubic turns itself at ± this place, if anywhere.
+    // The cubic's own extrema are at ± this point, if it has any.
     let turn = (-p / 3.0).max(0.0).sqrt().min(most);
     [[-most, -turn], [-turn, turn], [turn, most]].into_iter().filter_map(move |[from, to]| {
         let (first, last) = (cubic(from), cubic(to));
@@ -158,9 +159,9 @@ fn turns(p: f64, v: f64, most: f64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Where a function is 0 that has a root between two places; it is negative before the root if `rises`.
+/// Returns a root of a function that has one between two points. The function is negative before the root if `rises`.
 ///
-/// Regula falsi with the weights of Illinois (Dowell and Jarratt 1971), then bisection.
+/// Uses regula falsi with the weights of the Illinois variant (Dowell and Jarratt 1971), then bisection.
 fn bracketed(f: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], rises: bool) -> f64 {
     let signed = |x: f64| if rises { f(x) } else { -f(x) };
     // At the ends the signs are known, whatever the rounding.
@@ -188,7 +189,7 @@ fn bracketed(f: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2], rises: bool)
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::Material;
+    use rayfold_scene::{Material, Object};
 
     use super::*;
     use crate::reference::shapes::{distance, surface};

@@ -1,10 +1,11 @@
-//! Triangles.
+//! Triangles, with a watertight intersection test.
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
+use rayfold_scene::Triangle;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Object, Triangle};
 
-use super::{ROUNDOFF, Shape, Surface};
+use super::double_double::Place;
+use super::{ROUNDOFF, Shape, Sides, Surface};
 use crate::camera::Ray;
 use crate::scale::below_inverse;
 
@@ -13,8 +14,8 @@ impl Shape for Triangle {
         self.vertices().iter().fold(origin.abs(), |m, v| m.max(v.abs())).max_element()
     }
 
-    /// Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013, says whether; the distance is that of
-    /// the plane, so that a triangle in the plane of a box's face is met where the face is.
+    /// Returns the distance to the plane, so that a triangle in the plane of a box's face is hit at the face's
+    /// distance. The hit test is that of Woop, Benthin, Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013.
     fn distance(&self, ray: Ray) -> Option<f64> {
         let edges = sheared(self, ray);
         let outside = edges.iter().any(|&e| e < 0.0) && edges.iter().any(|&e| e > 0.0);
@@ -33,21 +34,34 @@ impl Shape for Triangle {
         let corner = self.vertices()[0];
         let near = ray.origin + distance * ray.direction;
         let point = near - (near - corner).dot(normal) * normal;
-        // How far along its plane it reaches is no error: where the plane lies along axes, only what is square to it counts.
+        // The extent of the triangle along its plane adds no error. So a coordinate does not count if its axis is
+        // parallel to the plane.
         let across = DVec3::select(normal.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
         let here = ray.origin.abs().max(point.abs());
         let largest = self.vertices().iter().fold(here, |m, v| m.max(v.abs() * across)).max_element();
         Surface { point, normal, offset: 32.0 * ROUNDOFF * largest, flat: true, within: false }
     }
 
-    fn seen_from(&self, eye: DVec3) -> Option<Object> {
-        let object = Object::from(self.clone());
-        // Rounding would give it an area.
-        if self.is_degenerate() { Some(object) } else { object.placed(1.0, |vertex| vertex - eye).ok() }
+    fn sides(&self, _: Place) -> Sides {
+        [0.0; 6]
+    }
+
+    fn has_inside(&self) -> bool {
+        false
+    }
+
+    fn is_flat_at(&self, _: DVec3) -> bool {
+        true
+    }
+
+    fn face(&self, _: DVec3, _: DVec3) -> Option<(usize, f64)> {
+        let [u, v, w] = self.vertices();
+        let axis = (0..3).find(|&axis| u[axis] == v[axis] && v[axis] == w[axis])?;
+        Some((axis, u[axis]))
     }
 }
 
-/// In coordinates where the ray runs from the origin along z: the signed areas opposite the vertices.
+/// Returns the signed areas opposite the vertices, in coordinates where the ray runs from the origin along z.
 fn sheared(triangle: &Triangle, ray: Ray) -> [f64; 3] {
     let d = ray.direction;
     let to_ray = |v: DVec3| {
@@ -68,22 +82,22 @@ fn sheared(triangle: &Triangle, ray: Ray) -> [f64; 3] {
     [area(b, c), area(c, a), area(a, b)]
 }
 
-/// `a·b - c·d` with the products' rounding errors put back: its sign is right, and swapping the products negates it
-/// exactly, so that two triangles see their common edge alike.
+/// Returns `a·b - c·d` with the products' rounding errors added back. Its sign is right, and swapping the products
+/// negates it exactly, so that two triangles evaluate their common edge alike.
 fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let (ab, cd) = (a * b, c * d);
     (ab - cd) + (a.mul_add(b, -ab) - c.mul_add(d, -cd))
 }
 
-/// Unit normal of a triangle; zero where the area is nothing but rounding error.
+/// Returns the unit normal of a triangle; zero if the area is only rounding error.
 pub(crate) fn triangle_normal(vertices: &[DVec3; 3]) -> DVec3 {
     normal_and_width(vertices).0
 }
 
-/// [`triangle_normal`], and about how wide the triangle is for its length.
+/// Returns [`triangle_normal`], and the approximate ratio of the triangle's width to its length.
 ///
-/// The normal is right to a few roundoffs also for a needle: the rounding errors of its edges, which are large beside
-/// its width, are put back.
+/// The normal is accurate to a few roundoffs, also for a needle: the rounding errors of its edges, which are large
+/// relative to its width, are added back.
 pub(crate) fn normal_and_width(vertices: &[DVec3; 3]) -> (DVec3, f64) {
     let largest = vertices.iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
     let scale = below_inverse(largest);
@@ -105,10 +119,10 @@ pub(crate) fn normal_and_width(vertices: &[DVec3; 3]) -> (DVec3, f64) {
     (if sine > 8.0 * ROUNDOFF { unit(normal) } else { DVec3::ZERO }, width)
 }
 
-/// Below this sine of the angle between its edges, their rounding errors count.
+/// The sine of the angle between the edges below which their rounding errors matter.
 const SLIM: f64 = 0.25;
 
-/// The rounding error of `a - b` (Knuth).
+/// Returns the rounding error of `a - b` (Knuth).
 fn rest(a: DVec3, b: DVec3) -> DVec3 {
     let difference = a - b;
     let of_b = difference - a;
@@ -117,7 +131,7 @@ fn rest(a: DVec3, b: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_scene::Material;
+    use rayfold_scene::{Material, Object};
 
     use super::*;
     use crate::reference::shapes::distance;

@@ -63,6 +63,12 @@ impl Bits {
         self.words.iter().all(|&word| word == 0)
     }
 
+    /// Returns the number of its pixels in some rows.
+    pub(crate) fn count(&self, rows: core::ops::Range<usize>) -> u64 {
+        let words = &self.words[rows.start * self.stride..rows.end * self.stride];
+        words.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
     pub(super) fn add(&mut self, other: &Self) {
         for (word, other) in self.words.iter_mut().zip(&other.words) {
             *word |= other;

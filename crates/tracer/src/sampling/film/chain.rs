@@ -21,7 +21,7 @@ pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 1.0];
 const FEW_MOMENTS: u32 = 16;
 
 #[derive(Debug)]
-pub(super) struct Chain {
+pub(super) struct SampleSchedule {
     samples: Samples,
     /// No pass adds more samples to a pixel.
     pub(super) step: u32,
@@ -31,7 +31,7 @@ pub(super) struct Chain {
     limits: [[f64; u32::BITS as usize]; SPARED.len()],
 }
 
-impl Chain {
+impl SampleSchedule {
     pub(super) fn new(samples: Samples, tone: Tone, step: u32) -> Self {
         let limits = SPARED.map(|spared| {
             core::array::from_fn(|at| {

@@ -18,18 +18,18 @@ use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
 pub(crate) use self::bits::BitRows;
-use self::chain::Chain;
+use self::chain::SampleSchedule;
 pub(crate) use self::first::{First, FirstRows};
 pub(crate) use self::floors::{Difference, Floors};
 use self::pixel::ONE;
 pub(crate) use self::pixel::{Pixel, quantised};
 use self::plan::Plan;
-pub(crate) use self::plan::Wanted;
+pub(crate) use self::plan::{PassTargets, Work};
 use crate::parallel::CHANNELS;
 
 /// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
 /// it in the first look, one more for each time that it is decided who goes on, and those in which it is counted what varies.
-pub(crate) const MARGIN: u32 = 1 + plan::MOST_ROUNDS + density::ROWS as u32;
+pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32;
 
 /// An image of samples, or a band of one, its first row at the top.
 #[derive(Debug)]
@@ -75,7 +75,7 @@ impl Film {
             Vec::<Pixel>::new().try_reserve_exact(pixels).ok()?;
             None
         };
-        let plan = Plan::new(size, Chain::new(samples, tone, step))?;
+        let plan = Plan::new(size, SampleSchedule::new(samples, tone, step))?;
         Some(Self { size, side, first, tiles, plan })
     }
 
@@ -95,8 +95,13 @@ impl Film {
         self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref()))
     }
 
+    /// Returns the work of the pass that [`Self::plan`] planned, and of those after it.
+    pub(crate) fn work(&self) -> Work {
+        self.plan.work()
+    }
+
     /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
-    pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, Wanted<'_>) {
+    pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, PassTargets<'_>) {
         let (wanted, unsettled) = self.plan.split(self.side.1);
         let tiles = self.tiles.chunks_mut(self.size.0.div_ceil(self.side.0)).zip(unsettled);
         let bands = match &mut self.first {
@@ -188,7 +193,7 @@ impl Color {
 #[cfg(test)]
 mod tests {
     use super::chain::{SLOPE, SPARED};
-    use super::plan::{CONTRAST, MOST_ROUNDS};
+    use super::plan::{CONTRAST, MAX_ROUNDS};
     use super::*;
     use crate::reference::encoded;
 
@@ -242,7 +247,7 @@ mod tests {
         passes
     }
 
-    fn film_rows(wanted: Wanted<'_>) -> usize {
+    fn film_rows(wanted: PassTargets<'_>) -> usize {
         wanted.pixels.rows()
     }
 
@@ -381,7 +386,7 @@ mod tests {
                     + usize::from(3 * varying >= 2 * all)
             };
             let mut density = vec![0; counts.len()];
-            for round in 0..MOST_ROUNDS {
+            for round in 0..MAX_ROUNDS {
                 if round == 1 {
                     density = (0..counts.len()).map(|place| share(&unsettled, place)).collect();
                 }

@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 
 use super::bits::{BitRows, Bits, widened};
-use super::chain::Chain;
+use super::chain::SampleSchedule;
 use super::density::Density;
 use super::first::First;
 use super::floors::Floors;
@@ -22,15 +22,15 @@ pub(super) const CONTRAST: f64 = 1.5;
 
 /// How often it is decided who goes on, at most, so that no pixel depends on one that is farther away, and a band can be drawn
 /// by itself. The example scenes take up to 34 of them (docs/decisions/frames-in-bands.md).
-pub(super) const MOST_ROUNDS: u32 = 128;
+pub(super) const MAX_ROUNDS: u32 = 128;
 
 /// Rows that are looked at together.
 const BAND: usize = 16;
 
 /// What a pass gives to whom.
 #[derive(Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    chain: &'a Chain,
+pub(crate) struct PassTargets<'a> {
+    chain: &'a SampleSchedule,
     density: Option<&'a Density>,
     /// Who gets something.
     pub(crate) pixels: &'a Bits,
@@ -38,7 +38,7 @@ pub(crate) struct Wanted<'a> {
     pub(crate) is_first_look: bool,
 }
 
-impl Wanted<'_> {
+impl PassTargets<'_> {
     /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
     #[inline(always)]
     pub(crate) fn goal(&self, count: u32) -> u32 {
@@ -60,9 +60,18 @@ impl Wanted<'_> {
     }
 }
 
+/// Numbers of samples, over all pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Work {
+    /// The samples of this pass.
+    pub(crate) now: u64,
+    /// The samples of this pass and of later ones if all pixels that go on now take the largest number.
+    pub(crate) ahead: u64,
+}
+
 #[derive(Debug)]
 pub(super) struct Plan {
-    chain: Chain,
+    chain: SampleSchedule,
     /// Whose error is too large.
     unsettled: Bits,
     /// Who gets some number of samples in any case.
@@ -92,7 +101,7 @@ enum Stage {
 
 impl Plan {
     /// `None` where there is no memory for it.
-    pub(super) fn new(size: (usize, usize), chain: Chain) -> Option<Self> {
+    pub(super) fn new(size: (usize, usize), chain: SampleSchedule) -> Option<Self> {
         let none = || Bits::none(size);
         Some(Self {
             chain,
@@ -115,10 +124,10 @@ impl Plan {
     }
 
     /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
-    pub(super) fn split(&mut self, rows: usize) -> (Wanted<'_>, impl Iterator<Item = BitRows<'_>>) {
+    pub(super) fn split(&mut self, rows: usize) -> (PassTargets<'_>, impl Iterator<Item = BitRows<'_>>) {
         let is_first_look = self.stage == Stage::First && self.chain.has_error();
         let density = self.density.as_ref();
-        let wanted = Wanted { chain: &self.chain, density, pixels: &self.wanted, is_first_look };
+        let wanted = PassTargets { chain: &self.chain, density, pixels: &self.wanted, is_first_look };
         (wanted, self.unsettled.bands(rows))
     }
 
@@ -142,6 +151,27 @@ impl Plan {
                 self.want()
             }
         }
+    }
+
+    /// Returns the work of this pass and of those after it.
+    pub(super) fn work(&self) -> Work {
+        let mut work = Work::default();
+        let mut add = |pixels: &Bits, (from, to): (u32, u32)| {
+            let count = pixels.count(0..pixels.rows());
+            let (start, end) = self.part((from, to)).unwrap_or((to, to));
+            work.now += count * u64::from(end - start);
+            work.ahead += count * u64::from(self.chain.most() - start);
+        };
+        match self.stage {
+            Stage::Begins => {}
+            Stage::First => add(&self.wanted, (0, self.chain.number(0))),
+            Stage::Later => {
+                for (at, going) in self.going.iter().enumerate() {
+                    add(going, (self.chain.number(at), self.chain.number(at + 1)));
+                }
+            }
+        }
+        work
     }
 
     /// Gathers those that get something in this pass.
@@ -176,7 +206,7 @@ impl Plan {
             }
         }
         self.stage = Stage::Later;
-        if self.rounds == MOST_ROUNDS {
+        if self.rounds == MAX_ROUNDS {
             return None;
         }
         self.rounds += 1;

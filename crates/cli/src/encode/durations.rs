@@ -1,0 +1,34 @@
+//! `--durations`: how long frames are shown.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use rayfold_scene::parse_settings;
+use serde_json::Value;
+
+/// Reads the times of frames in seconds, by frame from 1: a JSON object of them, or an animation.json.
+///
+/// # Errors
+/// When the file cannot be read, or says something else.
+pub(super) fn read(path: &Path) -> anyhow::Result<BTreeMap<u64, f64>> {
+    let name = path.display().to_string();
+    let mut text = String::new();
+    rayfold_files::open(path)
+        .and_then(|mut file| file.read_to_string(&mut text))
+        .with_context(|| format!("cannot read {name}"))?;
+    let is_settings =
+        matches!(serde_json::from_str(&text), Ok(Value::Object(fields)) if fields.contains_key("durations"));
+    if !is_settings {
+        text = format!("{{\"durations\":\n{text}}}");
+    }
+    let parsed = parse_settings(&name, text.as_bytes());
+    if let Some(settings) = parsed.settings {
+        return Ok(settings.durations().clone());
+    }
+    let Some(fault) = parsed.diagnostics.first() else { bail!("cannot read {name}") };
+    let line = if is_settings { fault.line } else { fault.line.saturating_sub(1) };
+    let expected = fault.expected.as_deref().unwrap_or("expected seconds by frame, such as {\"5\": 0.5}");
+    bail!("{name}:{line}: {}: {expected}", fault.message)
+}

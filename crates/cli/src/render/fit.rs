@@ -1,0 +1,189 @@
+//! `--max-size`: the best quality that fits.
+//!
+//! A file gets smaller with fewer levels of each channel: neighbouring pixels are then more often alike, and pixels
+//! change less often. The frames are drawn once and kept in an unnamed temporary file.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Seek, Write};
+
+use anyhow::Context;
+use image::RgbImage;
+
+use super::movie::{self, Encoded, MovieError, Push, Written};
+use super::target::{Container, Format, Movie, Place};
+use crate::console::Console;
+use crate::interrupt;
+use crate::wording::Size;
+
+/// The numbers of levels of a channel, from the best quality to the worst.
+const LEVELS: [u16; 16] = [256, 129, 86, 65, 52, 43, 33, 26, 21, 17, 14, 11, 9, 7, 5, 4];
+
+/// The part of a step up to which a pixel may be off and keep its level, so that noise changes no pixel.
+const KEPT: f32 = 0.75;
+
+/// Writes an animation as [`movie::write`] does, in at most `limit` bytes.
+///
+/// # Errors
+/// The errors of [`movie::write`], and one when even the worst quality is larger.
+pub(crate) fn write(
+    place: &Place,
+    container: Container,
+    movie: Movie,
+    limit: u64,
+    console: &Console,
+    fill: impl FnOnce(Push<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<Written> {
+    let mut store = Store::new(place)?;
+    let (mut is_full, mut best) = (false, None);
+    let whole = movie::encode(place, container, movie, Some(limit), |push| {
+        fill(&mut |frame, seconds| {
+            store.add(&frame, seconds).map_err(MovieError::Store)?;
+            // The frames are still needed.
+            if is_full {
+                return Ok(());
+            }
+            match push(frame, seconds) {
+                Err(MovieError::Full) => {
+                    is_full = true;
+                    Ok(())
+                }
+                other => other,
+            }
+        })?;
+        anyhow::ensure!(!is_full, MovieError::Full);
+        Ok(())
+    });
+    if let Some(whole) = unless_full(whole)? {
+        return Ok(whole.keep(place)?);
+    }
+    // `worst` is the best quality known to fit, if any. No quality before `from` fits.
+    let (mut from, mut worst) = (1, LEVELS.len());
+    while from < worst {
+        let middle = if best.is_none() && from == 1 { 4 } else { (from + worst) / 2 };
+        let of_levels = movie::encode(place, container, movie, Some(limit), |push| {
+            let mut rounding = Rounding::new(LEVELS[middle]);
+            store.each(|frame, seconds| Ok(push(rounding.apply(frame), seconds)?))
+        });
+        match unless_full(of_levels)? {
+            Some(encoded) => (best, worst) = (Some((encoded, LEVELS[middle])), middle),
+            None => from = middle + 1,
+        }
+    }
+    let Some((encoded, levels)) = best else {
+        anyhow::bail!(
+            "it is larger than {} also with {} levels a channel: make it smaller with --size or --fps, or with fewer frames",
+            Size(limit),
+            LEVELS[LEVELS.len() - 1]
+        );
+    };
+    let written = encoded.keep(place)?;
+    console.note(format_args!("with {levels} levels a channel, of 256, it is at most {}", Size(limit)));
+    Ok(written)
+}
+
+/// Returns `None` if the limit was reached.
+fn unless_full(encoded: anyhow::Result<Encoded>) -> anyhow::Result<Option<Encoded>> {
+    match encoded {
+        Err(error) if matches!(error.downcast_ref(), Some(MovieError::Full)) => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+/// A temporary file with frames, as PNG.
+struct Store {
+    file: BufWriter<File>,
+    frames: Vec<(usize, Option<f64>)>,
+}
+
+impl Store {
+    fn new(place: &Place) -> anyhow::Result<Self> {
+        let folder = match place {
+            Place::File(path) => path.parent().filter(|folder| !folder.as_os_str().is_empty()),
+            Place::StandardOutput => None,
+        };
+        let file = match (folder, place) {
+            (Some(folder), _) => tempfile::tempfile_in(folder),
+            (None, Place::File(_)) => tempfile::tempfile_in("."),
+            (None, Place::StandardOutput) => tempfile::tempfile(),
+        };
+        let file = file.context("cannot make a temporary file")?;
+        Ok(Self { file: BufWriter::new(file), frames: Vec::new() })
+    }
+
+    fn add(&mut self, frame: &RgbImage, seconds: Option<f64>) -> anyhow::Result<()> {
+        let file = Format::Png.encode(frame)?;
+        self.file.write_all(&file).context("cannot write a temporary file")?;
+        self.frames.push((file.len(), seconds));
+        Ok(())
+    }
+
+    fn each(
+        &mut self,
+        mut take: impl FnMut(RgbImage, Option<f64>) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let cannot = "cannot read a temporary file";
+        self.file.flush().context(cannot)?;
+        let file = self.file.get_mut();
+        file.rewind().context(cannot)?;
+        let mut file = BufReader::new(file);
+        for (length, seconds) in &self.frames {
+            anyhow::ensure!(!interrupt::stopping(), "interrupted");
+            let mut bytes = vec![0; *length];
+            file.read_exact(&mut bytes).context(cannot)?;
+            take(Format::Png.decode(&bytes).context(cannot)?, *seconds)?;
+        }
+        Ok(())
+    }
+}
+
+/// Rounds the levels of frames in order.
+struct Rounding {
+    /// The step from one level to the next, and the nearest level of each.
+    step: f32,
+    nearest: [u8; 256],
+    before: Option<RgbImage>,
+}
+
+impl Rounding {
+    fn new(levels: u16) -> Self {
+        let step = 255.0 / f32::from(levels - 1);
+        let nearest = std::array::from_fn(|level| ((level as f32 / step).round() * step).round() as u8);
+        Self { step, nearest, before: None }
+    }
+
+    fn apply(&mut self, mut frame: RgbImage) -> RgbImage {
+        let Self { step, nearest, before } = self;
+        match before.as_ref().filter(|before| before.dimensions() == frame.dimensions()) {
+            Some(before) => {
+                for (level, before) in frame.iter_mut().zip(before.iter()) {
+                    let is_kept = f32::from(level.abs_diff(*before)) <= KEPT * *step;
+                    *level = if is_kept { *before } else { nearest[usize::from(*level)] };
+                }
+            }
+            None => frame.iter_mut().for_each(|level| *level = nearest[usize::from(*level)]),
+        }
+        *before = Some(frame.clone());
+        frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_and_white_stay_and_noise_goes() {
+        for levels in LEVELS {
+            let mut rounding = Rounding::new(levels);
+            assert_eq!((rounding.nearest[0], rounding.nearest[255]), (0, 255));
+            let image = |level: u8| RgbImage::from_pixel(1, 1, image::Rgb([level; 3]));
+            let shown = [100, 101, 99, 100, 250].map(|level| rounding.apply(image(level)).into_raw()[0]);
+            let off = |shown: u8, meant: u8| f32::from(shown.abs_diff(meant));
+            assert!(
+                off(shown[3], 100) <= KEPT * rounding.step + 0.5
+                    && off(shown[4], 250) <= 0.5 * rounding.step + 0.5
+            );
+            assert!(levels > 52 || shown[..4].iter().all(|level| *level == shown[0]), "{levels}: {shown:?}");
+        }
+    }
+}

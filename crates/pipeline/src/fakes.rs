@@ -1,0 +1,217 @@
+//! A renderer and an animator for tests, small enough to simulate a million runs: a script is one line, a frame is a
+//! line that names what it shows, an animation is the list of its frames.
+//!
+//! | script      | gives                                   |
+//! | ----------- | --------------------------------------- |
+//! | `frame N`   | one frame                               |
+//! | `split K N` | K frames                                |
+//! | `bad N`     | a fault                                 |
+//! | `hang N`    | nothing, ever: the deadline comes       |
+//! | `crash N`   | the death of the process that draws it  |
+//! | `big …`     | the same, each frame of it in bands     |
+
+use std::num::NonZeroU64;
+use std::time::Duration;
+
+use bytes::Bytes;
+use rayfold_scene::AnimationSettings;
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+use crate::keys::{Band, Part, ScriptName};
+use crate::manifest::Reason;
+use crate::render::{BandJoiner, Drawing, Renderer};
+
+/// What a script asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Play {
+    /// One frame.
+    Frame,
+    /// A script of this many frames.
+    Split(NonZeroU64),
+    /// A fault.
+    Bad,
+    /// A drawing that never ends.
+    Hang,
+    /// The death of the process that draws.
+    Crash,
+}
+
+impl Play {
+    /// Reads a script.
+    pub fn of(script: &[u8]) -> Play {
+        let text = String::from_utf8_lossy(script);
+        let mut words = text.strip_prefix(BIG).unwrap_or(&text).split(' ');
+        match words.next() {
+            Some("frame") => Play::Frame,
+            Some("split") => words.next().and_then(|count| count.parse().ok()).map_or(Play::Bad, Play::Split),
+            Some("hang") => Play::Hang,
+            Some("crash") => Play::Crash,
+            _ => Play::Bad,
+        }
+    }
+}
+
+/// What a script starts with whose frames are too big for one invocation.
+pub const BIG: &str = "big ";
+
+/// Whether a script's frames are to be drawn in bands.
+pub fn is_big(script: &[u8]) -> bool {
+    script.starts_with(BIG.as_bytes())
+}
+
+/// A band of a picture.
+fn strip(name: &ScriptName, script: &[u8], part: Part, band: Band) -> String {
+    format!("{band} of {}", picture(name, script, part))
+}
+
+/// Bands being laid one below the other. What they show is the picture if they are all of its bands; else it is torn.
+pub struct Paste {
+    picture: String,
+    strips: Vec<String>,
+}
+
+impl Paste {
+    fn of(name: &ScriptName, script: &[u8], part: Part) -> Self {
+        Paste { picture: picture(name, script, part), strips: Vec::new() }
+    }
+}
+
+impl BandJoiner for Paste {
+    async fn push(&mut self, band: Bytes) -> Result<(), Reason> {
+        if band == GARBLED {
+            return Err(Reason::new("no picture"));
+        }
+        self.strips.push(String::from_utf8_lossy(&band).into_owned());
+        Ok(())
+    }
+
+    async fn finish(self) -> Result<Bytes, Reason> {
+        let Paste { picture, strips } = self;
+        let (last, count) = (strips.last(), strips.len());
+        let is_whole = last.is_some_and(|last| last.starts_with(&format!("{count}-of-{count} ")))
+            && strips.iter().zip(1..).all(|(strip, k)| *strip == format!("{k}-of-{count} of {picture}"));
+        Ok(if is_whole { picture } else { format!("{picture}, torn: {}", strips.join("; ")) }.into())
+    }
+}
+
+/// What strangers put in the place of a frame.
+pub const GARBLED: &str = "garbled";
+
+/// The picture of a frame.
+pub fn picture(name: &ScriptName, script: &[u8], part: Part) -> String {
+    let number = part.map_or(0, NonZeroU64::get);
+    format!("{name}:{number}:{}", String::from_utf8_lossy(script))
+}
+
+/// The file of an animation.
+pub fn film(settings: &AnimationSettings, pictures: &[String]) -> String {
+    first_line((settings.fps(), settings.loops())) + &lines(pictures)
+}
+
+fn first_line((fps, loops): (f64, u16)) -> String {
+    format!("fps {fps} loop {loops}\n")
+}
+
+fn lines(pictures: &[String]) -> String {
+    pictures.iter().flat_map(|picture| [picture, "\n"]).collect()
+}
+
+/// Draws at once.
+pub struct InstantRenderer {
+    /// Of a frame that is too big: with one it is drawn whole.
+    pub bands: NonZeroU64,
+}
+
+impl Renderer for InstantRenderer {
+    type BandJoiner = Paste;
+
+    fn most_bytes(&self) -> u64 {
+        1_000
+    }
+
+    async fn draw(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        _: Option<Duration>,
+    ) -> Result<Drawing> {
+        Ok(match (Play::of(&script), part) {
+            (Play::Frame, None) | (Play::Split(_), Some(_)) if is_big(&script) && self.bands.get() > 1 => {
+                Drawing::Cut(self.bands)
+            }
+            (Play::Frame, None) | (Play::Split(_), Some(_)) => {
+                Drawing::Frame(picture(name, &script, part).into())
+            }
+            (Play::Split(count), None) => Drawing::Split(count),
+            (Play::Bad | Play::Hang | Play::Crash | Play::Frame, _) => {
+                Drawing::Fault(Reason::new(format!("{name}.txt:1:1: bad")))
+            }
+        })
+    }
+
+    async fn draw_band(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        band: Band,
+    ) -> Result<Result<Bytes, Reason>> {
+        Ok(Ok(strip(name, &script, part, band).into()))
+    }
+
+    async fn join(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        _: NonZeroU64,
+    ) -> Result<Result<Paste, Reason>> {
+        Ok(Ok(Paste::of(name, &script, part)))
+    }
+}
+
+/// What of it another process needs.
+#[derive(Serialize, Deserialize)]
+pub struct Listed {
+    settings: (f64, u16),
+    is_begun: bool,
+    pictures: Vec<String>,
+}
+
+impl Listed {
+    /// An animation without frames.
+    pub fn new(settings: &AnimationSettings) -> Self {
+        Listed { settings: (settings.fps(), settings.loops()), is_begun: false, pictures: Vec::new() }
+    }
+
+    /// Adds a frame.
+    pub fn push(&mut self, frame: &[u8]) {
+        self.pictures.push(String::from_utf8_lossy(frame).into_owned());
+    }
+
+    /// What has not gone out.
+    pub fn take(&mut self) -> Bytes {
+        let pictures = std::mem::take(&mut self.pictures);
+        let mut text = lines(&pictures);
+        if !std::mem::replace(&mut self.is_begun, true) {
+            text.insert_str(0, &first_line(self.settings));
+        }
+        text.into()
+    }
+
+    /// # Errors
+    ///
+    /// Never, in fact.
+    pub fn suspend(&self) -> Result<Bytes, Reason> {
+        serde_json::to_vec(self).map(Bytes::from).map_err(|error| Reason::new(error.to_string()))
+    }
+
+    /// # Errors
+    ///
+    /// When it is none.
+    pub fn resume(state: &[u8]) -> Result<Self, Reason> {
+        serde_json::from_slice(state).map_err(|error| Reason::new(error.to_string()))
+    }
+}

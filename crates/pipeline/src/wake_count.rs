@@ -1,0 +1,50 @@
+//! How often frames were woken, as the objects below `retries/` and the receipts of those that began say.
+
+use std::collections::BTreeMap;
+
+use crate::invocation::Invocation;
+use crate::keys::{Animation, Key, Part, Receipt, ScriptName};
+use crate::observe::Observation;
+use crate::store::{ETag, ListRequest, Listed, Store};
+use crate::{Clock, Result, Timestamp};
+
+/// How often and when last a frame was woken.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct WakeCount {
+    /// The last one's number.
+    pub(crate) attempts: u64,
+    pub(crate) last: Timestamp,
+    /// To how many of them an invocation has begun. The others may wait behind a thousand frames.
+    pub(crate) begun: u64,
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// How often each frame of an animation was woken.
+    pub(crate) async fn wakings(
+        &self,
+        animation: &Animation,
+        observation: &Observation,
+    ) -> Result<BTreeMap<(ScriptName, ETag, Part), WakeCount>> {
+        let mut wakings: BTreeMap<_, WakeCount> = BTreeMap::new();
+        for listed in self.retries(animation).await? {
+            if let Ok(Key::Retry { name, tag, part, attempt, .. }) = listed.key.parse() {
+                let waking = wakings.entry((name, tag.version, part)).or_default();
+                waking.attempts = waking.attempts.max(attempt.get());
+                waking.last = waking.last.max(listed.modified);
+            }
+        }
+        for found in &observation.results.receipts {
+            if let Receipt::Begun { name, tag, part, .. } = &found.receipt {
+                wakings.entry((name.clone(), tag.version.clone(), *part)).or_default().begun += 1;
+            }
+        }
+        Ok(wakings)
+    }
+
+    /// The objects below `retries/<animation>/` that are this animation's, not one's below it.
+    pub(crate) async fn retries(&self, animation: &Animation) -> Result<Vec<Listed>> {
+        let mut listed = self.list_ranges(ListRequest::all(animation.retries()), Vec::new()).await?;
+        listed.retain(|listed| listed.key.parse::<Key>().is_ok_and(|key| key.animation() == animation));
+        Ok(listed)
+    }
+}

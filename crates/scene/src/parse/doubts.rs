@@ -1,0 +1,219 @@
+//! Warnings about valid lines that do not have the effect that was probably meant.
+//!
+//! No such warning is reported in a script with errors before it: the missing part may be in a faulty line.
+
+use std::ops::Range;
+
+use super::line::{Statement, decimal_comma};
+use super::{Parser, wording};
+use crate::command::{Command, Effect};
+use crate::form::{Form, Kind};
+use crate::model::{Camera, Clause, Light, Material, Parameter};
+use crate::report::Line;
+use crate::row::{Number, Row};
+use crate::script::{ClauseLine, Value};
+
+/// The bound from which a coefficient of a surface is probably a level from 0 to 255.
+const FAR_ABOVE_ONE: f64 = 10.0;
+
+/// The bound from which a colour of a light is probably a level from 0 to 255. It is higher, because bright lights are
+/// usual.
+const FAR_TOO_BRIGHT: f64 = 32.0;
+
+/// The field of view below which it is probably in radians.
+const NARROWEST: f64 = 2.0;
+
+/// The smallest number of triangles that can close a body.
+const CLOSED_BODY: usize = 4;
+
+type Place<'a> = (Line<'a>, Range<usize>);
+
+/// The lines whose effect is in doubt.
+#[derive(Default)]
+pub(super) struct Doubts<'a> {
+    /// The line of the lens, if it was not rendered yet; then those of the shutter and of a light of the scene. All
+    /// three need several rays per pixel.
+    lens: Option<Place<'a>>,
+    shutter: Option<Place<'a>>,
+    light: Option<Place<'a>>,
+    /// The number of glass triangles so far, and the first of them.
+    panes: usize,
+    first_pane: Option<Place<'a>>,
+    /// Whether an object of the scene has a colour that needs light.
+    needs_light: bool,
+    is_dark_told: bool,
+}
+
+/// The properties of a material on which warnings depend.
+#[derive(Clone, Copy)]
+pub(super) struct Looks {
+    pub(super) is_diffuse: bool,
+    pub(super) refracts: bool,
+}
+
+impl Looks {
+    /// Returns the looks of a material with these clauses. `other` are the looks of its pattern's material.
+    pub(super) fn of(clauses: &[ClauseLine], other: Option<Self>) -> Self {
+        let has = |clause| clauses.iter().find(|line| line.clause == clause);
+        let is_bright = |line: &ClauseLine| (0..3).any(|i| line.row.largest(i) != Some(0.0));
+        let is_diffuse = [Clause::Diffuse, Clause::Shine].into_iter().filter_map(has).any(is_bright);
+        let refracts = has(Clause::Glass)
+            .is_some_and(|line| !matches!(line.row.numbers().get(3), Some(Number::Constant(1.0))));
+        Self { is_diffuse: is_diffuse || other.is_some_and(|other| other.is_diffuse), refracts }
+    }
+}
+
+impl<'a> Parser<'a> {
+    /// Warns of colours far above 1, of a comment that is glued to a word, and of a field of view in radians.
+    pub(super) fn doubt_line(&mut self, s: &Statement<'a, '_>) {
+        let is_comma = s.row.is_none() && decimal_comma(s.text, s.command, s.words).is_some();
+        if !is_comma && !matches!(s.command.effect(), Effect::Material) {
+            let count = s.words.count() - usize::from(s.surface.is_some());
+            self.doubt_colors(
+                s,
+                s.command.form(),
+                |i| match &s.row {
+                    Some(row) => row.largest(i),
+                    None => (i < count).then(|| s.values[i].abs()),
+                },
+                |numbers| s.words.span(numbers),
+            );
+        }
+        if let Some(at) = memchr::memchr(b'#', s.text.as_bytes())
+            && (wording::color_at(&s.text[at..]).is_some()
+                || !matches!(s.text.as_bytes().get(at.wrapping_sub(1)), Some(b' ' | b'\t' | b',')))
+        {
+            let comment = &s.text[at..];
+            let end = comment.find([' ', '\t']).unwrap_or(comment.len());
+            self.report.warning(s.line, at..at + end, || wording::glued_comment(wording::color_at(comment)));
+        }
+    }
+
+    /// Warns of colours far above 1. `largest` returns an upper bound of each number.
+    pub(super) fn doubt_colors(
+        &mut self,
+        s: &Statement<'a, '_>,
+        form: &'static Form,
+        largest: impl Fn(usize) -> Option<f64>,
+        place: impl Fn(Range<usize>) -> Range<usize>,
+    ) {
+        for (i, field) in form.fields.iter().enumerate() {
+            let least = match (field.kind, field.parameter) {
+                (Kind::Color, Parameter::LightColor) => FAR_TOO_BRIGHT,
+                (Kind::Color | Kind::Coefficients, _) => FAR_ABOVE_ONE,
+                _ => continue,
+            };
+            let numbers = form.span(i);
+            let is_above = numbers.clone().any(|i| largest(i).is_some_and(|value| value >= least));
+            // With a reach, the colour is the one at a distance that the script chooses.
+            let reach = form.numbers().position(|(_, field)| field.parameter == Parameter::Reach);
+            if !is_above || reach.and_then(&largest).is_some_and(|reach| reach > 0.0) {
+                continue;
+            }
+            let span = place(numbers);
+            let written = String::from_utf8_lossy(&s.line.bytes[span.clone()]);
+            self.report.warning(s.line, span, || wording::far_above_one(&written));
+        }
+    }
+
+    /// Warns of a camera whose field of view is probably in radians.
+    pub(super) fn doubt_camera(&mut self, s: &Statement<'a, '_>, camera: &Value<Camera>) {
+        let widest = match camera {
+            Value::Constant(Camera::Look(look)) => look.field_of_view(),
+            Value::Animated(template) if template.command == Command::Look => {
+                template.row.largest(6).unwrap_or(NARROWEST)
+            }
+            Value::Constant(Camera::Pinhole(_) | Camera::Orthographic) | Value::Animated(_) => return,
+        };
+        if widest < NARROWEST {
+            self.report.warning(s.line, s.words.span(6..7), || wording::narrow_view(widest));
+        }
+    }
+
+    pub(super) fn doubt_lens(&mut self, s: &Statement<'a, '_>, is_point: bool) {
+        self.doubts.lens = (!is_point).then(|| s.place());
+    }
+
+    pub(super) fn doubt_shutter(&mut self, s: &Statement<'a, '_>) {
+        self.doubts.shutter = (self.recorder.shutter.open() > 0.0).then(|| s.place());
+    }
+
+    pub(super) fn doubt_light(&mut self, s: &Statement<'a, '_>, light: &Value<Light>) {
+        let is_soft = match light {
+            Value::Constant(Light::Directional(sun)) => sun.angle() > 0.0,
+            Value::Constant(Light::Lamp(lamp)) => lamp.radius() > 0.0,
+            Value::Animated(template) => template.row.largest(6).is_some_and(|size| size > 0.0),
+        };
+        if is_soft && self.doubts.light.is_none() {
+            self.doubts.light = Some((s.line, s.words.span(6..7)));
+        }
+    }
+
+    /// Records an object with `looks`, which is drawn or part of a group.
+    pub(super) fn doubt_object(&mut self, s: &Statement<'a, '_>, looks: Looks) {
+        match &mut self.group {
+            Some(group) => group.needs_light |= looks.is_diffuse,
+            None => self.doubts.needs_light |= looks.is_diffuse,
+        }
+        if !looks.refracts || s.command != Command::Triangle {
+            return;
+        }
+        self.doubts.panes += 1;
+        let first = self.doubts.first_pane.get_or_insert_with(|| s.place());
+        if self.doubts.panes == CLOSED_BODY {
+            let (line, span) = first.clone();
+            self.report.warning(line, span, wording::glass_panes);
+        }
+    }
+
+    /// Records a group that is drawn.
+    pub(super) fn doubt_group(&mut self, needs_light: bool) {
+        match &mut self.group {
+            Some(group) => group.needs_light |= needs_light,
+            None => self.doubts.needs_light |= needs_light,
+        }
+    }
+
+    pub(super) fn doubt_no_more_of_scene(&mut self) {
+        (self.doubts.light, self.doubts.needs_light) = (None, false);
+    }
+
+    /// Warns of settings and lights without an effect in the picture that is rendered now, each only once.
+    pub(super) fn doubt_picture(&mut self, s: &Statement<'a, '_>) {
+        let Doubts { lens, shutter, light, .. } = &mut self.doubts;
+        let (lens, shutter, light) = (lens.take(), shutter.take(), light.take());
+        if self.has_errors() {
+            return;
+        }
+        if self.recorder.samples.most() == 1 {
+            let lens = lens.filter(|_| self.picture.has_lens_effect());
+            let found = [(lens, "the lens"), (shutter, "the shutter"), (light, "the size of the light")];
+            for (place, what) in found {
+                let Some((line, span)) = place else { continue };
+                self.report.warning(line, span, || wording::needs_samples(what));
+            }
+        }
+        if self.lights == 0
+            && self.doubts.needs_light
+            && !std::mem::replace(&mut self.doubts.is_dark_told, true)
+        {
+            self.report.warning(s.line, s.words.command.clone(), wording::no_light);
+        }
+    }
+}
+
+/// Returns the looks of an object whose coefficients are numbers of its line.
+pub(super) fn looks_of(material: &Material) -> Looks {
+    Looks {
+        is_diffuse: material.diffuse() != glam::DVec3::ZERO
+            || material.finish().is_some_and(|finish| finish.shine.is_some() || finish.pattern.is_some()),
+        refracts: material.finish().and_then(|finish| finish.glass).is_some_and(|glass| glass.ior() != 1.0),
+    }
+}
+
+/// Returns the looks of an object whose coefficients are in `row`.
+pub(super) fn looks_in(form: &Form, row: &Row) -> Looks {
+    let mut diffuse =
+        form.numbers().enumerate().filter(|(_, (_, field))| field.parameter == Parameter::Diffuse);
+    Looks { is_diffuse: diffuse.any(|(i, _)| row.largest(i) != Some(0.0)), refracts: false }
+}

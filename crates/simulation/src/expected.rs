@@ -1,0 +1,156 @@
+//! What a bucket must hold once everything has come to rest, worked out from its scripts alone; and what may follow on a
+//! manifest.
+
+use std::num::NonZeroU64;
+
+use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
+
+use rayfold_pipeline::fakes::{Play, film, picture};
+use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
+use rayfold_pipeline::manifest::{FrameState, Head, Manifest, Status};
+use rayfold_pipeline::store::{Bucket, ETag, Object};
+
+/// What an animation must have come to.
+pub(super) struct Expected {
+    /// Frames in order.
+    frames: Vec<Shot>,
+    settings: Option<AnimationSettings>,
+}
+
+/// A frame as it must be.
+struct Shot {
+    script: ScriptName,
+    version: ETag,
+    part: Part,
+    /// `None` when it cannot be drawn.
+    picture: Option<String>,
+}
+
+impl Expected {
+    pub(super) fn of(bucket: &Bucket, animation: &Animation) -> Self {
+        let mut scripts: Vec<(ScriptName, ETag, Vec<u8>)> = Vec::new();
+        let mut settings = Some(AnimationSettings::default());
+        for key in bucket.keys().filter(|key| key.starts_with("scripts/")) {
+            let Ok(Object { info, body }) = bucket.get(key) else { continue };
+            match key.parse() {
+                Ok(Key::Script { animation: of, name }) if of == *animation => {
+                    scripts.push((name, info.etag, body.to_vec()));
+                }
+                Ok(Key::Settings { animation: of }) if of == *animation => {
+                    settings = parse_settings(SETTINGS_FILE, &body).settings;
+                }
+                _ => {}
+            }
+        }
+        // The names in these stories are numbers, with letters after them at most.
+        scripts.sort_by_key(|(name, ..)| {
+            let digits: String = name.as_str().chars().take_while(char::is_ascii_digit).collect();
+            (digits.parse::<u64>().unwrap_or(u64::MAX), name.clone())
+        });
+        let mut frames = Vec::new();
+        for (script, version, body) in scripts {
+            let shot = |part: Part, is_drawn: bool| Shot {
+                script: script.clone(),
+                version: version.clone(),
+                part,
+                picture: is_drawn.then(|| picture(&script, &body, part)),
+            };
+            match Play::of(&body) {
+                Play::Frame => frames.push(shot(None, true)),
+                Play::Split(count) => {
+                    frames.extend((1..=count.get()).map(|number| shot(NonZeroU64::new(number), true)));
+                }
+                Play::Bad | Play::Hang | Play::Crash => frames.push(shot(None, false)),
+            }
+        }
+        Expected { frames, settings }
+    }
+
+    fn status(&self) -> Status {
+        let expects = self.settings.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
+        if self.frames.is_empty() {
+            Status::Empty
+        } else if (self.frames.len() as u64) < expects {
+            Status::Waiting
+        } else if self.settings.is_none() || self.frames.iter().any(|shot| shot.picture.is_none()) {
+            Status::Failed
+        } else {
+            Status::Done
+        }
+    }
+
+    /// Frames that the manifest says cannot be drawn though they can, and a GIF that cannot be made though it can.
+    pub(super) fn wrongly_given_up(&self, manifest: &Manifest) -> usize {
+        let good =
+            |name: &ScriptName| self.frames.iter().any(|shot| shot.script == *name && shot.picture.is_some());
+        let failed = |state: &FrameState| matches!(state, FrameState::Failed(_));
+        let refused = usize::from(manifest.head.status == Status::Refused);
+        refused + manifest.frames.iter().filter(|frame| failed(&frame.state) && good(&frame.script)).count()
+    }
+
+    /// Says what differs.
+    pub(super) fn check(&self, bucket: &Bucket, animation: &Animation) -> Result<(), String> {
+        let manifest = match bucket.get(&animation.manifest()) {
+            Ok(object) => Some(Manifest::decode(animation, &object.body).map_err(|error| error.to_string())?),
+            Err(_) => None,
+        };
+        let status = self.status();
+        let gif = bucket.get(&animation.gif()).ok();
+        let Some(manifest) = manifest else {
+            return match (self.frames.is_empty(), gif) {
+                (true, None) => Ok(()),
+                _ => Err("there is no manifest".to_owned()),
+            };
+        };
+        let listed: Vec<_> = manifest
+            .frames
+            .iter()
+            .map(|frame| {
+                (&frame.script, &frame.version, frame.part, matches!(frame.state, FrameState::Done { .. }))
+            })
+            .collect();
+        let wanted: Vec<_> = self
+            .frames
+            .iter()
+            .map(|shot| (&shot.script, &shot.version, shot.part, shot.picture.is_some()))
+            .collect();
+        if listed != wanted {
+            return Err(format!("the manifest has the frames {listed:?}, not {wanted:?}"));
+        }
+        if let Some(frame) = manifest.frames.iter().find(|frame| frame.state == FrameState::Pending) {
+            return Err(format!("{} is pending for ever", frame.script));
+        }
+        if manifest.head.status != status {
+            return Err(format!("the manifest is {:?}, not {status:?}", manifest.head.status));
+        }
+        let film = self.settings.as_ref().filter(|_| status == Status::Done).map(|settings| {
+            let pictures: Vec<String> = self.frames.iter().filter_map(|shot| shot.picture.clone()).collect();
+            film(settings, &pictures)
+        });
+        match (film, gif) {
+            (Some(film), Some(gif)) if gif.body != film => Err(format!(
+                "the GIF is from another set:\n{}\nnot\n{film}",
+                String::from_utf8_lossy(&gif.body)
+            )),
+            (Some(_), None) => Err("there is no GIF".to_owned()),
+            // While more frames are to be uploaded the last GIF stays.
+            (None, Some(_)) if status != Status::Waiting => {
+                Err(format!("there is a GIF of what is {status:?}"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A manifest takes another one's place as its next revision, or with nothing new but which GIF is there.
+pub(super) fn follows(next: &Manifest, before: Option<&Manifest>) -> Result<(), String> {
+    let revision = before.map_or(0, |before| before.head.revision);
+    let is_record = before.is_some_and(|before| {
+        let head = Head { gif: next.head.gif.clone(), ..before.head.clone() };
+        next.head.gif != before.head.gif && next.head == head && next.frames == before.frames
+    });
+    if next.head.revision == revision + 1 || is_record {
+        return Ok(());
+    }
+    Err(format!("revision {} follows {revision}", next.head.revision))
+}

@@ -1,0 +1,192 @@
+//! Small worlds searched instead of drawn by lot: all interleavings of the real steps, or those that provoke most.
+//!
+//! [`explore`] visits every state that a [`World`] can come to: invocations' requests in any order, and within the world's
+//! budget kills before and after any request, writes that land after their sender's death, lost answers, and events that
+//! come twice or never. States are told apart by a hash of 64 bits; a request that can meet no other is taken alone
+//! (partial-order reduction: in a world that always comes to rest nothing is missed by it). States that few preemptions lead
+//! to come first. [`provoke`] runs schedules that are chosen to provoke, with preemptions and faults aimed at writes.
+//!
+//! What must hold is what [`super::run`] checks: revisions grow by one, no function writes below `scripts/`, no GIF gives
+//! way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps where something
+//! happened that only they heal.
+//!
+//! Not searched: listings that mix two moments, time (the store's clock moves with the user's acts alone, others stand still), the deadline. The seeds of
+//! [`super::run`] have these.
+
+mod order;
+mod process;
+mod search;
+mod state;
+#[cfg(test)]
+mod tests;
+mod worlds;
+
+use order::{Kind, MAX_WRITES, Order, pick};
+use process::Memo;
+use rayfold_pipeline::{Mutation, Randomness};
+pub use search::explore;
+use state::{Choice, Fate, Offer, State};
+pub use worlds::{World, provoking, worlds};
+
+/// How often what may go wrong in a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Budget {
+    /// Invocations killed.
+    pub kills: u8,
+    /// Of these, writes that land after their sender is dead.
+    pub ghosts: u8,
+    /// Answers to writes lost.
+    pub losses: u8,
+    /// Events that come twice.
+    pub doubles: u8,
+    /// Events that never come.
+    pub drops: u8,
+}
+
+/// What a search has seen.
+#[derive(Debug, Clone, Default)]
+pub struct Explored {
+    /// States that differ.
+    pub states: u64,
+    /// States in which nothing is left to happen.
+    pub rests: u64,
+    /// Situations that differ: what the bucket holds, and what every invocation asks for next.
+    pub situations: u64,
+    /// A hash of all these.
+    pub all_situations: u64,
+    /// Steps from one state to another.
+    pub steps: u64,
+    /// The most steps to a state of rest, by the way that it was reached first.
+    pub depth: usize,
+    /// What preemptions and faults weigh at most on the way to a state, by the way that it was reached first: 1 before a
+    /// write, 2 elsewhere. If the search ended at its limit, what they weigh on the cheapest way that it did not go.
+    pub price: usize,
+    /// There was no more to see; else the search ended at its limit.
+    pub complete: bool,
+}
+
+impl Explored {
+    /// Whether both searches have come to the same situations, and to as many states of rest.
+    pub fn saw_the_same_as(&self, other: &Explored) -> bool {
+        let seen = |of: &Explored| (of.situations, of.all_situations, of.rests);
+        seen(self) == seen(other)
+    }
+}
+
+/// A guarantee that does not hold, and how it came to that.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{world}: {what}\n{}", steps.join("\n"))]
+pub struct Counterexample {
+    /// The world.
+    pub world: &'static str,
+    /// What does not hold.
+    pub what: String,
+    /// What happened, one thing after the other.
+    pub steps: Vec<String>,
+    /// How many states were seen before; none by a schedule.
+    pub states: u64,
+    /// What preemptions and faults weigh on the way; not counted in a schedule.
+    pub price: usize,
+}
+
+/// Schedules of each kind that a seed runs in each world.
+const SCHEDULES: usize = 2;
+
+/// Runs a few schedules of each kind in each world.
+///
+/// # Errors
+///
+/// The first guarantee that does not hold.
+pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Result<(), Box<Counterexample>> {
+    let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x70_6374);
+    worlds.iter().try_for_each(|world| {
+        let mut memo = Memo::new(world, mutation);
+        let begin = State::begin(world, &mut memo);
+        let begin = begin.map_err(|what| counterexample_of_schedule(world, what, &[]))?;
+        let kinds = Kind::ALL.repeat(SCHEDULES);
+        kinds.into_iter().try_for_each(|kind| {
+            schedule(world, begin.clone(), &mut memo, Order::new(&random, kind), &random)
+        })
+    })
+}
+
+/// When something goes wrong that may.
+enum Aim {
+    /// Once in so many steps.
+    Anywhere(u64),
+    /// In this write, counted from 0.
+    Write(u64),
+}
+
+impl Aim {
+    fn new(random: &Randomness) -> Self {
+        match random.one_in(2) {
+            true => Aim::Write(random.below(MAX_WRITES)),
+            false => Aim::Anywhere(1 + random.below(12)),
+        }
+    }
+
+    /// Whether it is now, `writes` having been begun before.
+    fn is_met(&self, is_write: bool, writes: u64, random: &Randomness) -> bool {
+        match self {
+            Aim::Anywhere(seldom) => random.one_in(*seldom),
+            Aim::Write(number) => is_write && writes == *number,
+        }
+    }
+}
+
+fn counterexample_of_schedule(world: &World, what: String, steps: &[String]) -> Box<Counterexample> {
+    Box::new(Counterexample { world: world.name, what, steps: steps.to_vec(), states: 0, price: 0 })
+}
+
+fn schedule(
+    world: &World,
+    mut state: State,
+    memo: &mut Memo,
+    mut order: Order,
+    random: &Randomness,
+) -> Result<(), Box<Counterexample>> {
+    let mut steps = Vec::new();
+    let failed = |what: String, steps: &[String]| counterexample_of_schedule(world, what, steps);
+    let (aim, mut writes) = (Aim::new(random), 0);
+    let lands_last = random.one_in(2);
+    loop {
+        let Offer { mut choices, is_alone } = state.offer(world);
+        if lands_last && choices.iter().any(|choice| !matches!(choice, Choice::Ghost(_))) {
+            choices.retain(|choice| !matches!(choice, Choice::Ghost(_)));
+        }
+        // What meets nobody is no turn of its own.
+        let alone = choices.first().filter(|_| is_alone).map(|choice| state.actor(*choice));
+        let Some(actor) = alone.or_else(|| order.next(&state, &choices, random)) else { break };
+        let mine = choices.into_iter().filter(|choice| state.actor(*choice) == actor);
+        let (plain, mut awkward): (Vec<Choice>, Vec<Choice>) = mine.partition(|choice| is_plain(*choice));
+        // Whoever wants a write to land last wants it to be on its way.
+        if lands_last && awkward.iter().any(|choice| is_late(*choice)) {
+            awkward.retain(|choice| is_late(*choice));
+        }
+        let is_write = plain.iter().any(|choice| state.is_write(*choice));
+        let is_awkward = !awkward.is_empty() && (plain.is_empty() || aim.is_met(is_write, writes, random));
+        writes += u64::from(is_write);
+        let choice = pick(if is_awkward { &awkward } else { &plain }, random);
+        let Some(choice) = choice.copied() else { break };
+        order.done(&state, choice);
+        steps.push(state.describe(world, choice));
+        state = state.after(world, memo, choice).map_err(|what| failed(what, &steps))?;
+    }
+    state.judge(world, memo).map_err(|what| failed(what, &steps))
+}
+
+/// Whether a write is on its way after it.
+fn is_late(choice: Choice) -> bool {
+    matches!(choice, Choice::Request { fate: Fate::KilledAndLate, .. })
+}
+
+/// Whether nothing goes wrong in it.
+fn is_plain(choice: Choice) -> bool {
+    use state::Delivery;
+    match choice {
+        Choice::User(delivery) => delivery == Delivery::Once,
+        Choice::Request { fate, .. } => fate == Fate::Answered(Delivery::Once),
+        Choice::Ghost(_) => true,
+    }
+}

@@ -1,0 +1,121 @@
+//! Who goes on next in a schedule that is to provoke.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::state::{Choice, State};
+use rayfold_pipeline::Randomness;
+
+/// How often priorities change in a schedule.
+const CHANGES: u32 = 4;
+
+/// The most preemptions of a schedule that has few.
+const FEW: u64 = 2;
+
+/// Writes of a schedule that preemptions and faults are aimed at: in most of the worlds all of them.
+pub(super) const MAX_WRITES: u64 = 12;
+
+/// Priorities that are drawn by lot are above this, those that have changed below.
+const DRAWN: u64 = 1 << 63;
+
+/// A way to choose who goes on.
+#[derive(Debug)]
+pub(super) enum Order {
+    /// Whoever has the highest priority. Priorities are drawn by lot, the user's anew after each act, and fall below all
+    /// others a few times, mostly before a write (probabilistic concurrency testing; Burckhardt et al., ASPLOS 2010).
+    Priorities { priorities: BTreeMap<u64, u64>, changes: u32, lowest: u64, pauses: Pauses },
+    /// Whoever went on before, up to a pause; then whoever the lot falls on.
+    Turns { current: Option<u64>, pauses: Pauses },
+    /// Whoever went on before, up to the end, but for a few writes before which the lot falls on another one (context
+    /// bounding; Musuvathi and Qadeer, PLDI 2007). `writes` are counted as they come up.
+    Few { current: Option<u64>, preempted: Vec<u64>, writes: u64 },
+}
+
+/// The kinds of orders.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Kind {
+    Priorities,
+    Turns,
+    Few,
+}
+
+impl Kind {
+    pub(super) const ALL: [Kind; 3] = [Kind::Priorities, Kind::Turns, Kind::Few];
+}
+
+/// How seldom somebody is put off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pauses {
+    before_writes: u64,
+    elsewhere: u64,
+}
+
+impl Order {
+    pub(super) fn new(random: &Randomness, kind: Kind) -> Self {
+        let pauses = Pauses { before_writes: 2 + random.below(3), elsewhere: 15 + random.below(80) };
+        match kind {
+            Kind::Priorities => {
+                Order::Priorities { priorities: BTreeMap::new(), changes: CHANGES, lowest: DRAWN - 1, pauses }
+            }
+            Kind::Turns => Order::Turns { current: None, pauses },
+            Kind::Few => {
+                let preempted = (0..random.below(FEW + 1)).map(|_| random.below(MAX_WRITES)).collect();
+                Order::Few { current: None, preempted, writes: 0 }
+            }
+        }
+    }
+
+    /// Who goes on; nobody when nothing is left to happen.
+    pub(super) fn next(&mut self, state: &State, choices: &[Choice], random: &Randomness) -> Option<u64> {
+        let actors: BTreeSet<u64> = choices.iter().map(|choice| state.actor(*choice)).collect();
+        let actors: Vec<u64> = actors.into_iter().collect();
+        let is_writing = |actor: u64| {
+            choices.iter().any(|choice| state.actor(*choice) == actor && state.is_write(*choice))
+        };
+        let pauses = |actor: u64, pauses: &Pauses| {
+            random.one_in(if is_writing(actor) { pauses.before_writes } else { pauses.elsewhere })
+        };
+        match self {
+            Order::Turns { current, pauses: at } => {
+                let stays = current.filter(|current| actors.contains(current) && !pauses(*current, at));
+                *current = stays.or_else(|| pick(&actors, random).copied());
+                *current
+            }
+            Order::Few { current, preempted, writes } => {
+                let goes_on = current.filter(|current| actors.contains(current));
+                let first = goes_on.or_else(|| pick(&actors, random).copied())?;
+                let is_preempted = is_writing(first) && preempted.contains(writes);
+                *writes += u64::from(is_writing(first));
+                let others: Vec<u64> = actors.iter().copied().filter(|actor| *actor != first).collect();
+                *current = pick(&others, random).copied().filter(|_| is_preempted).or(Some(first));
+                *current
+            }
+            Order::Priorities { priorities, changes, lowest, pauses: at } => loop {
+                let priority = |actor: &u64| {
+                    (*priorities.entry(*actor).or_insert_with(|| random.bits() | DRAWN), *actor)
+                };
+                let (_, first) = actors.iter().map(priority).max()?;
+                if *changes == 0 || !pauses(first, at) {
+                    return Some(first);
+                }
+                *changes -= 1;
+                *lowest -= 1;
+                priorities.insert(first, *lowest);
+            },
+        }
+    }
+
+    /// Says what has been chosen.
+    pub(super) fn done(&mut self, state: &State, choice: Choice) {
+        if let Choice::User(_) = choice {
+            match self {
+                Order::Priorities { priorities, .. } => _ = priorities.remove(&state.actor(choice)),
+                Order::Turns { current, .. } | Order::Few { current, .. } => *current = None,
+            }
+        }
+    }
+}
+
+/// Any of them; none if there is none.
+pub(super) fn pick<'a, T>(from: &'a [T], random: &Randomness) -> Option<&'a T> {
+    from.get(usize::try_from(random.below(from.len() as u64)).unwrap_or(0))
+}

@@ -1,0 +1,151 @@
+//! The [fakes](rayfold_pipeline::fakes) in simulated time.
+
+use std::num::NonZeroU64;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use rayfold_scene::AnimationSettings;
+
+use super::bucket::{Fate, SimEnvironment};
+use super::engine::Engine;
+use rayfold_pipeline::Result;
+use rayfold_pipeline::fakes::{GARBLED, InstantRenderer, Listed, Paste, Play, is_big};
+use rayfold_pipeline::keys::{Band, Part, ScriptName};
+use rayfold_pipeline::manifest::Reason;
+use rayfold_pipeline::render::{Drawing, Renderer};
+use rayfold_pipeline::{Animator, Encoding, Unfit};
+
+/// Draws in simulated time.
+pub(super) struct TimedRenderer {
+    pub(super) env: Arc<SimEnvironment>,
+    pub(super) fate: Arc<Fate>,
+    pub(super) die: Arc<dyn Fn() + Send + Sync>,
+    /// Milliseconds that a frame takes, from and to.
+    pub(super) draw_ms: (u64, u64),
+}
+
+impl TimedRenderer {
+    async fn take_time(&self) {
+        self.env.engine.sleep(self.env.between_ms(self.draw_ms.0..self.draw_ms.1)).await;
+    }
+
+    /// Measured anew it is not always cut the same, and a frame at the edge is drawn after all.
+    fn drawer(&self, script: &[u8]) -> InstantRenderer {
+        let bands = if is_big(script) { self.env.random.below(6) } else { 1 };
+        InstantRenderer { bands: NonZeroU64::new(bands).unwrap_or(NonZeroU64::MIN) }
+    }
+}
+
+impl Renderer for TimedRenderer {
+    type BandJoiner = Paste;
+
+    fn most_bytes(&self) -> u64 {
+        InstantRenderer { bands: NonZeroU64::MIN }.most_bytes()
+    }
+
+    async fn draw(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        time: Option<Duration>,
+    ) -> Result<Drawing> {
+        self.take_time().await;
+        match Play::of(&script) {
+            Play::Hang => std::future::pending().await,
+            Play::Crash => {
+                let (fate, die) = (self.fate.clone(), self.die.clone());
+                self.env.engine.after(Duration::ZERO, move || {
+                    fate.kill();
+                    die();
+                });
+                std::future::pending().await
+            }
+            Play::Frame | Play::Split(_) | Play::Bad => {
+                self.drawer(&script).draw(name, script, part, time).await
+            }
+        }
+    }
+
+    async fn draw_band(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        band: Band,
+    ) -> Result<Result<Bytes, Reason>> {
+        self.take_time().await;
+        self.drawer(&script).draw_band(name, script, part, band).await
+    }
+
+    async fn join(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        part: Part,
+        bands: NonZeroU64,
+    ) -> Result<Result<Paste, Reason>> {
+        self.drawer(&script).join(name, script, part, bands).await
+    }
+}
+
+/// The pace at which an animation is assembled.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pace {
+    /// The time that a frame takes.
+    pub(super) push: Duration,
+    /// Whether a frame goes out when the next one comes, as of a GIF; else all do at the end.
+    pub(super) is_eager: bool,
+}
+
+/// Lists frames, in simulated time.
+pub(super) struct FakeAnimator {
+    pub(super) engine: Engine,
+    pub(super) pace: Pace,
+}
+
+/// A list in the making.
+pub(super) struct List {
+    engine: Engine,
+    pace: Pace,
+    listed: Listed,
+}
+
+impl Animator for FakeAnimator {
+    type Encoding = List;
+
+    fn begin(&self, settings: &AnimationSettings) -> Result<List, Reason> {
+        Ok(self.list(Listed::new(settings)))
+    }
+
+    async fn resume(&self, state: Bytes) -> Result<List, Reason> {
+        Listed::resume(&state).map(|listed| self.list(listed))
+    }
+}
+
+impl FakeAnimator {
+    fn list(&self, listed: Listed) -> List {
+        List { engine: self.engine.clone(), pace: self.pace, listed }
+    }
+}
+
+impl Encoding for List {
+    async fn push(&mut self, frame: Bytes) -> Result<Bytes, Unfit> {
+        self.engine.sleep(self.pace.push).await;
+        if frame == GARBLED {
+            return Err(Unfit::Corrupt(Reason::new("no picture")));
+        }
+        let before = if self.pace.is_eager { self.listed.take() } else { Bytes::new() };
+        self.listed.push(&frame);
+        Ok(before)
+    }
+
+    async fn finish(mut self) -> Result<Bytes, Reason> {
+        Ok(self.listed.take())
+    }
+
+    async fn suspend(self) -> Result<Bytes, Reason> {
+        self.listed.suspend()
+    }
+}

@@ -1,0 +1,83 @@
+// Parameters in people's words. One that is not here has the name of the language.
+
+const WORDS: Readonly<Record<string, string>> = {
+  "ambient coefficient": "glow",
+  "diffuse coefficient": "colour",
+  "mirror coefficient": "mirror",
+  "glass coefficient": "clearness",
+  "light's colour": "light",
+  "light's direction": "direction",
+  "lamp's position": "position",
+  "lamp's radius": "size of the lamp",
+  "lamp's reach": "reach",
+  "sun's angle": "softness",
+  "shine": "highlight",
+  "exponent n": "polish",
+  "index of refraction": "refraction",
+  "size s": "pattern size",
+  "start a": "from",
+  "end b": "to",
+  "axis's end": "end",
+  "radius Ra": "radius at the start",
+  "radius Rb": "radius at the end",
+  "thickness r": "thickness",
+  "view-up": "up",
+  "window's distance s": "window distance",
+  "window's corner": "window corner",
+  "number of samples": "samples",
+  "error e": "allowed noise",
+  "lens's radius": "blur",
+  "lens's distance": "focus distance",
+  "width nx": "width",
+  "height ny": "height",
+  "first frame a": "first frame",
+  "last frame b": "last frame",
+};
+
+/** What a parameter does, for its tooltip, where its name does not say it. */
+const MEANINGS: Readonly<Record<string, string>> = {
+  "ambient coefficient": "The colour without any light",
+  "diffuse coefficient": "The share of light that it scatters",
+  "mirror coefficient": "The share of its surroundings that it reflects",
+  "sun's angle": "The angle of the sun in degrees: shadows get softer with it",
+  "exponent n": "Larger numbers make highlights smaller, as on polished surfaces",
+};
+
+export function wordOf(label: string): string {
+  return WORDS[label] ?? label;
+}
+
+export function meaningOf(label: string): string {
+  return MEANINGS[label] ?? label;
+}
+
+/** Short names of a number among those of a parameter: `x` for `cx`, `red` for `rr`. */
+export function shortOf(name: string, kind: string): string {
+  const last = name.at(-1) ?? "";
+  if (kind === "colour" || kind === "coefficients") return { r: "red", g: "green", b: "blue" }[last] ?? name;
+  return "xyz".includes(last) && name.length <= 3 ? last : name;
+}
+
+/** Commands and clauses in people's words. */
+const NAMES: Readonly<Record<string, string>> = {
+  Screen: "Picture",
+  Samples: "Smooth edges",
+  Depth: "Bounces",
+  Shutter: "Motion blur",
+  Camera: "through a window",
+  Look: "looks at a target",
+  Orthocamera: "parallel",
+  ambient: "glow",
+  diffuse: "colour",
+  shine: "highlight",
+};
+
+export function nameOf(command: string): string {
+  return NAMES[command] ?? command;
+}
+
+const UNITS: Readonly<Record<string, string>> = { degrees: "°", pixels: "px" };
+
+export function unitOf(unit: string): string {
+  return UNITS[unit] ?? "";
+}

@@ -1,0 +1,144 @@
+// The text of the editor and the server's lines. Each change here is sent at once. A change of the server (a drag, undo,
+// another program) is rebased under those that the server has not accepted yet, which are then sent again.
+
+import { collab, receiveUpdates, sendableUpdates } from "@codemirror/collab";
+import { ChangeSet, type ChangeSpec, type Extension, Text, Transaction } from "@codemirror/state";
+import { EditorView } from "@codemirror/view";
+
+import type { LineState, ServerMessage, TextChange } from "../protocol";
+import { ask, lines, playing } from "../store";
+
+const PAGE = "page";
+const STUDIO = "studio";
+
+export interface Sync {
+  /** The extension that sends changes; made anew with each state. */
+  readonly extension: () => Extension;
+  /** Takes a message of the server about the text. */
+  readonly hear: (view: EditorView, tell: ServerMessage, reset: (text: Text) => void) => void;
+}
+
+export function sync(): Sync {
+  let synced = Text.empty;
+  let [file, version] = [0, 0];
+
+  const send = (before: Text, changes: ChangeSet, after: Text): void => {
+    ask({ ask: "edit", file, version, changes: lineChanges(before, changes, after) });
+  };
+
+  const extension = (): Extension => [
+    collab({ clientID: PAGE }),
+    EditorView.updateListener.of((update) => {
+      for (const transaction of update.transactions) {
+        if (!transaction.docChanged || transaction.annotation(Transaction.remote)) continue;
+        playing.value = false;
+        send(transaction.startState.doc, transaction.changes, transaction.newDoc);
+      }
+    }),
+  ];
+
+  const take = (view: EditorView, changes: ChangeSet, clientID: string): void => {
+    const transaction = receiveUpdates(view.state, [{ changes, clientID }]);
+    view.dispatch(transaction);
+  };
+
+  const hear = (view: EditorView, tell: ServerMessage, reset: (text: Text) => void): void => {
+    if (tell.lines && tell.text) {
+      ({ file, version } = tell.text);
+      synced = Text.of(textLines(tell.lines, tell.text.ends));
+      reset(synced);
+      return;
+    }
+    if (tell.accepted === true) {
+      const [first] = sendableUpdates(view.state);
+      if (!first) return;
+      synced = first.changes.apply(synced);
+      take(view, first.changes, PAGE);
+      return;
+    }
+    if (!tell.splices || !tell.text) return;
+    version = tell.text.version;
+    const changes = serverChanges(synced, tell.splices, tell.text.ends);
+    synced = changes.apply(synced);
+    take(view, changes, STUDIO);
+    let before = synced;
+    for (const update of sendableUpdates(view.state)) {
+      const after = update.changes.apply(before);
+      send(before, update.changes, after);
+      before = after;
+    }
+  };
+  return { extension, hear };
+}
+
+/** The lines that an editor shows of a script: after a line end at its end there is an empty one. */
+export function textLines(of: readonly LineState[], ends: boolean): readonly string[] {
+  const texts = of.map(({ text }) => text);
+  return ends || texts.length === 0 ? [...texts, ""] : texts;
+}
+
+/** Changes as replaced lines, each with the line number that the ones before it leave. */
+export function lineChanges(before: Text, changes: ChangeSet, after: Text): readonly TextChange[] {
+  const spans: { fromA: number; toA: number; fromB: number; toB: number }[] = [];
+  changes.iterChangedRanges((fromA, toA, fromB, toB) => {
+    const span = {
+      fromA: before.lineAt(fromA).number,
+      toA: before.lineAt(toA).number,
+      fromB: after.lineAt(fromB).number,
+      toB: after.lineAt(toB).number,
+    };
+    const last = spans.at(-1);
+    if (last && span.fromA <= last.toA) [last.toA, last.toB] = [span.toA, span.toB];
+    else spans.push(span);
+  });
+  return spans.map(({ fromA, toA, fromB, toB }) => ({
+    at: fromB - 1,
+    removed: toA - fromA + 1,
+    lines: Array.from({ length: toB - fromB + 1 }, (_, row) => after.line(fromB + row).text),
+  }));
+}
+
+/** The changes of a text by the server's splices, as small as they can be, so that the caret stays. */
+export function serverChanges(text: Text, splices: NonNullable<ServerMessage["splices"]>, ends: boolean): ChangeSet {
+  let doc = text;
+  let all = ChangeSet.empty(doc.length);
+  const change = (spec: ChangeSpec): void => {
+    const changes = ChangeSet.of(spec, doc.length);
+    doc = changes.apply(doc);
+    all = all.compose(changes);
+  };
+  for (const { at, removed, lines: inserted } of splices) change(spliceChange(doc, at, removed, inserted.map((line) => line.text)));
+  const count = lines.value.length;
+  const wanted = ends || count === 0 ? count + 1 : count;
+  if (doc.lines > wanted) change({ from: doc.line(wanted).to, to: doc.length });
+  if (doc.lines < wanted) change({ from: doc.length, insert: Text.of(["", ""]) });
+  return all;
+}
+
+function spliceChange(doc: Text, at: number, removed: number, inserted: readonly string[]): ChangeSpec {
+  if (removed === inserted.length) {
+    return inserted.map((text, row) => {
+      const line = doc.line(at + row + 1);
+      return { from: line.from, to: line.to, insert: text };
+    }).flatMap((whole) => smallest(doc, whole));
+  }
+  if (removed === 0) {
+    if (at < doc.lines) return { from: doc.line(at + 1).from, insert: Text.of([...inserted, ""]) };
+    return { from: doc.length, insert: Text.of(["", ...inserted]) };
+  }
+  const from = doc.line(at + 1).from;
+  if (inserted.length > 0) return { from, to: doc.line(at + removed).to, insert: Text.of(inserted) };
+  if (at + removed < doc.lines) return { from, to: doc.line(at + removed + 1).from };
+  return { from: Math.max(0, from - 1), to: doc.length };
+}
+
+/** A change of one line without the characters that stay. */
+function smallest(doc: Text, { from, to, insert }: { from: number; to: number; insert: string }): readonly ChangeSpec[] {
+  const old = doc.sliceString(from, to);
+  if (old === insert) return [];
+  const most = Math.min(old.length, insert.length);
+  let [same, rest] = [0, 0];
+  while (same < most && old[same] === insert[same]) same += 1;
+  while (rest < most - same && old[old.length - 1 - rest] === insert[insert.length - 1 - rest]) rest += 1;
+  return [{ from: from + same, to: to - rest, insert: Text.of([insert.slice(same, insert.length - rest)]) }];
+}

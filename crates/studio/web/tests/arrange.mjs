@@ -1,0 +1,134 @@
+// The start page and the tour, and what editors have: copies as text, alignment, boxes, search, curves, motion paths.
+
+import assert from "node:assert/strict";
+import { existsSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { test } from "node:test";
+
+import { audit, drag, open, openStart, over, row, shot, until } from "./stage.mjs";
+
+const SCENE =
+  "Screen 320 180\nLook 0 3 9  0 0.5 0  40\nIlight 1 1 1 1 -1 -1   # sun\nMaterial red diffuse 1 0 0\n" +
+  "Sphere 0.4  -2 0.4 0  red   # left\nSphere 0.6  1.5 1.5 0  red   # right\nTrace\n";
+const ANIMATED = SCENE.replace("Trace", "Sphere 0.3  (smooth 1:-1 10:1) 0.3 1  .1 .1 .1 .2 .4 .9   # runner\nFrames 10\nTrace");
+const x = (text, name) => text.split("\n").find((line) => line.endsWith(`# ${name}`)).split(/\s+/)[2];
+
+test("the start page opens copies of examples, an empty scene and recent scenes, and the tour can be left", async (t) => {
+  const { page, folder, address } = await openStart(t);
+  await until(() => page.locator("img").first().evaluate((image) => image.complete && image.naturalWidth > 0));
+  await until(() => page.locator("img").nth(1).evaluate((image) => image.complete && image.naturalWidth > 0));
+  assert.deepEqual(await audit(page), []);
+  await shot(page, "start");
+  await page.getByText("hello", { exact: true }).click();
+  await page.locator("canvas[data-picture]").waitFor();
+  assert.ok(existsSync(join(folder, "hello.txt")));
+  await page.goto(address);
+  await page.getByText("Empty scene").click();
+  await page.locator("canvas[data-picture]").waitFor();
+  assert.ok(existsSync(join(folder, "scene.txt")));
+  await page.getByRole("button", { name: "Keys" }).click();
+  await page.getByRole("button", { name: "Tour" }).click();
+  const tour = page.getByRole("dialog", { name: "Tour" });
+  for (let step = 1; step <= 5; step += 1) {
+    await tour.getByText(`${step} of 5`).waitFor();
+    await tour.getByRole("button", { name: step < 5 ? "Next" : "Done" }).click();
+  }
+  await tour.waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "Keys" }).click();
+  await page.getByRole("button", { name: "Tour" }).click();
+  await page.keyboard.press("Escape");
+  await tour.waitFor({ state: "detached" });
+});
+
+test("objects are pasted as text with what they name, and aligned", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page, context } = studio;
+  await context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  await (await row(page, ".item", { hasText: "left" })).click();
+  await page.locator(".viewport").focus();
+  await page.keyboard.press("Control+c");
+  const copied = "Material red diffuse 1 0 0\nSphere 0.4  -2 0.4 0  red   # left\n";
+  await until(async () => (await page.evaluate(() => navigator.clipboard.readText())) === copied);
+  await page.keyboard.press("Control+v");
+  await until(async () => (await studio.saved()).match(/# left/g).length === 2);
+  assert.equal((await studio.saved()).match(/^Material/gm).length, 1);
+  await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === SCENE);
+  await (await row(page, ".item", { hasText: "left" })).click();
+  await (await row(page, ".item", { hasText: "right" })).click({ modifiers: ["Control"] });
+  await page.getByLabel("Align").selectOption("0 middle");
+  await until(async () => x(await studio.saved(), "left") === x(await studio.saved(), "right"));
+  studio.check();
+});
+
+test("a box selects what is in it, and the axes turn the view", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page } = studio;
+  await studio.settled();
+  await page.keyboard.down("Control");
+  await page.keyboard.down("Shift");
+  await drag(page, await over(page, 0.02, 0.02), await over(page, 0.98, 0.98));
+  await page.keyboard.up("Shift");
+  await page.keyboard.up("Control");
+  await until(async () => (await page.locator(".item[aria-selected=true]").count()) === 2);
+  assert.equal(readFileSync(studio.path, "utf8"), SCENE);
+  await page.locator(".cube .axis-y circle").click();
+  await until(async () => (await page.getByRole("button", { name: "Camera", exact: true }).getAttribute("aria-pressed")) === "false");
+  studio.check();
+});
+
+test("the search runs actions, adds and selects", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page } = studio;
+  const search = async (text) => {
+    await page.locator(".viewport").focus();
+    await page.keyboard.press("Control+k");
+    await page.getByRole("combobox", { name: "Search" }).fill(text);
+  };
+  await search("right");
+  await page.locator(".search .item", { hasText: "right" }).first().waitFor();
+  assert.deepEqual(await audit(page), []);
+  await shot(page, "search");
+  await page.locator(".search .item", { hasText: /^rightSphere/ }).click();
+  await page.locator(".item[aria-selected=true]", { hasText: "right" }).waitFor();
+  await search("dupl");
+  await page.keyboard.press("Enter");
+  await until(async () => (await studio.saved()).includes("right copy"));
+  await search("add torus");
+  await page.keyboard.press("Enter");
+  await until(async () => (await studio.saved()).includes("Torus"));
+  studio.check();
+});
+
+test("a key is dragged as a point of a curve, and as a point of the motion path", async (t) => {
+  const studio = await open(t, { text: ANIMATED });
+  const { page } = studio;
+  await (await row(page, ".item", { hasText: "runner" })).click();
+  await page.getByRole("button", { name: "Curves" }).click();
+  const key = page.locator(".curves .key").last();
+  const at = await key.boundingBox();
+  await shot(page, "curves");
+  await drag(page, [at.x + 12, at.y + 12], [at.x + 12, at.y + 60]);
+  const last = async () => /smooth 1:-1 (\d+):([-.\d]+)\)/.exec(await studio.saved())?.slice(1).map(Number);
+  await until(async () => (await last())?.[1] < 1);
+  assert.equal((await last())[0], 10, "the frame stays");
+  const value = (await last())[1];
+  await studio.settled();
+  const dot = await page.locator("[data-grip=key] .dot").last().boundingBox();
+  await drag(page, [dot.x + 5, dot.y + 5], [dot.x + 65, dot.y + 5]);
+  await until(async () => Math.abs((await last())?.[1] - value) > 0.1);
+  assert.equal((await last())[0], 10);
+  assert.deepEqual(await audit(page), []);
+  studio.check();
+});
+
+test("the sun turns by its angles", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page } = studio;
+  await (await row(page, ".item", { hasText: "sun" })).click();
+  const height = page.getByRole("spinbutton", { name: "sun height" });
+  await height.fill("90");
+  await height.press("Enter");
+  await until(async () => /Ilight 1 1 1 (-?0) -1 (-?0)/.test(await studio.saved()));
+  studio.check();
+});

@@ -1,0 +1,70 @@
+// What the page's parts compute, without a browser.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { join } from "node:path";
+
+import { createServer } from "vite";
+
+const root = join(import.meta.dirname, "..");
+let server;
+before(async () => {
+  server = await createServer({ root, configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
+});
+after(() => server?.close());
+const load = (path) => server.ssrLoadModule(`/src/${path}`);
+
+test("copied lines bring the materials and groups that they name, in the order of the script", async () => {
+  const { scriptOf } = await load("clipboard.ts");
+  const lines = [
+    { text: "Screen 4 3", role: "setting", command: "Screen" },
+    { text: "Material grain diffuse .1 .1 .1", role: "material", command: "Material", subject: "grain" },
+    { text: "Material wood diffuse 1 0 0 noise .5 grain", role: "material", command: "Material", subject: "wood" },
+    { text: "Material red diffuse 1 0 0", role: "material", command: "Material", subject: "red" },
+    { text: "Group leg", role: "group", command: "Group", subject: "leg" },
+    { text: "Box 0 0 0  1 1 1  wood", role: "object", command: "Box" },
+    { text: "End", role: "setting", command: "End" },
+    { text: "Use leg 1 2 3 # red", role: "use", command: "Use", subject: "leg" },
+    { text: "Sphere 1  0 0 0  red # leg", role: "object", command: "Sphere" },
+  ];
+  const texts = (...of) => of.map((at) => `${lines[at].text}\n`).join("");
+  assert.equal(scriptOf(lines, [8]), texts(3, 8));
+  assert.equal(scriptOf(lines, [7]), texts(1, 2, 4, 5, 6, 7));
+  assert.equal(scriptOf(lines, [8, 7, 99]), texts(1, 2, 3, 4, 5, 6, 7, 8));
+});
+
+test("a sun's direction and its angles are the same", async () => {
+  const { sunAngles, sunDirection } = await load("inspector/sun.ts");
+  assert.deepEqual(sunAngles(0, -1, 0), { azimuth: 0, height: 90 });
+  assert.deepEqual(sunDirection({ azimuth: 90, height: 0 }), [-1, 0, 0], "light from the right goes to the left");
+  for (const azimuth of [-179, -90, -45, 0, 12.5, 90, 180]) {
+    for (const height of [-60, 0, 30, 89]) {
+      const again = sunAngles(...sunDirection({ azimuth, height }));
+      assert.ok(Math.abs(again.azimuth - azimuth) <= 0.1 && Math.abs(again.height - height) <= 0.1, JSON.stringify([azimuth, height, again]));
+    }
+  }
+});
+
+test("curves go through their keys, with the slopes of smooth ones", async () => {
+  const { pathOf, valuesOf } = await load("timeline/curves.tsx");
+  const track = (mode, slopes = []) => ({ line: 0, number: 1, label: "x", mode, cycle: false, slopes, keys: [[1, 0], [4, 3], [7, 3]] });
+  assert.equal(pathOf(track("linear")), "M1 0L4 3L7 3");
+  assert.equal(pathOf(track("step")), "M1 0H4V3H7V3");
+  assert.equal(pathOf(track("smooth", [2, 1, 0])), "M1 0C2 2 3 2 4 3C5 4 6 3 7 3");
+  const [low, high] = valuesOf([track("linear")]);
+  assert.ok(low < 0 && high > 3);
+});
+
+test("the search finds what has all words, also in another order", async () => {
+  const { matching } = await load("top/search.tsx");
+  const all = [{ text: "Add Sphere", note: "Sphere" }, { text: "Duplicate", note: "Ctrl+D" }, { text: "small sphere", note: "Sphere" }];
+  assert.deepEqual(matching(all, "sphere small").map(({ text }) => text), ["small sphere"]);
+  assert.equal(matching(all, "").length, 3);
+  assert.equal(matching(all, "ctrl+d")[0].text, "Duplicate");
+});
+
+test("a number is read with a comma or a point, and nothing else is one", async () => {
+  const { parsed } = await load("parts/number.tsx");
+  assert.deepEqual(["1,5", "-.5", "−2", "1e3", " 4 "].map(parsed), [1.5, -0.5, -2, 1000, 4]);
+  for (const text of ["", "1,2,3", "1.5,2", "x", "Infinity", "0x10"]) assert.ok(Number.isNaN(parsed(text)), text);
+});

@@ -1,0 +1,24 @@
+import { defineConfig } from "vite";
+
+import { privateNames } from "./shorten.mjs";
+
+// Fixed names: three files, which the server knows.
+export default defineConfig({
+  base: "./",
+  build: {
+    modulePreload: false,
+    cssCodeSplit: false,
+    // `light-dark()` stays, which follows the page's own choice of a theme.
+    target: ["chrome123", "firefox120", "safari17.5"],
+    rollupOptions: {
+      // The parsers of other languages, of which the editor's commands import a name, are left out.
+      treeshake: { moduleSideEffects: (id) => !id.includes("/@lezer/") },
+      output: {
+        entryFileNames: "studio.js",
+        assetFileNames: "studio[extname]",
+        codeSplitting: false,
+        minify: { compress: true, mangle: true, mangleProps: { include: privateNames() }, codegen: { removeWhitespace: true } },
+      },
+    },
+  },
+});

@@ -1,0 +1,70 @@
+//! The traversal of a tree by a packet of rays.
+
+use fearless_simd::Simd;
+
+use crate::fast::acceleration::tree::{Content, Node, Tree};
+use crate::fast::arithmetic::real::{Real, Vec3};
+use crate::fast::rays::kind::Kind;
+
+/// The number of nodes on the stack: enough for a tree of 2³⁰ objects, with room for an unbalanced one.
+const WAITING: usize = 128;
+
+/// The stack of the traversal. It is aligned like the widest registers, so that the compiler aligns the call stack, and
+/// with it the registers that are spilled there. Unaligned, each of those would span two cache lines.
+#[repr(align(64))]
+struct RayQueues([u32; WAITING]);
+
+/// Visits the leaves for whose boxes `intersects` returns true. Nearer children come first, by the direction of the first
+/// lane.
+#[inline(always)]
+pub(crate) fn descend<E: Real>(
+    tree: &Tree<E>,
+    backwards: [bool; 3],
+    mut intersects: impl FnMut(&Node<E>) -> bool,
+    mut visit: impl FnMut(Kind, core::ops::Range<usize>) -> bool,
+) {
+    let RayQueues(waiting) = &mut RayQueues([0; WAITING]);
+    let mut spilled = Vec::new();
+    let mut count = 1;
+    loop {
+        if count == 0 {
+            match spilled.pop() {
+                Some(node) => {
+                    waiting[0] = node;
+                    count = 1;
+                }
+                None => return,
+            }
+        }
+        count -= 1;
+        let node = &tree.nodes[waiting[count] as usize];
+        if !intersects(node) {
+            continue;
+        }
+        match node.content() {
+            Content::Leaf(kind, items) => {
+                if !visit(kind, items) {
+                    return;
+                }
+            }
+            Content::Children(first, axis) => {
+                // The first child is the one that comes first along the axis.
+                let far_first = u32::from(backwards[axis]);
+                if count + 2 > WAITING {
+                    spilled.extend_from_slice(&waiting[..count]);
+                    count = 0;
+                }
+                waiting[count] = first + 1 - far_first;
+                waiting[count + 1] = first + far_first;
+                count += 2;
+            }
+        }
+    }
+}
+
+/// Returns whether the first lane goes backwards along each axis.
+#[inline(always)]
+pub(crate) fn backwards<S: Simd, E: Real>(direction: Vec3<S, E>) -> [bool; 3] {
+    let zero = E::narrow(0.0);
+    [direction.x[0] < zero, direction.y[0] < zero, direction.z[0] < zero]
+}

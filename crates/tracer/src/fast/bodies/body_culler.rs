@@ -1,0 +1,62 @@
+//! Culls up to 64 bodies by a bit mask: a tile tests only the bodies that its rays or shadow rays can hit.
+//!
+//! Each packet first tests only the bounding spheres of these bodies, which takes no division.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+
+use super::Solid;
+use crate::fast::acceleration::candidates::MASKED;
+use crate::fast::arithmetic::real::{Mask, Real, Vec3, constant, splat};
+use crate::fast::rays::packet::Ray;
+use crate::fast::shapes::Shape;
+
+/// The tolerance of a bounding sphere's squared radius, in roundoffs. The squares of lengths of about 1 that are
+/// compared with it have errors of some roundoffs.
+const WIDER: f64 = 64.0;
+
+/// The bounding volumes of the bodies, in the order of the bits.
+#[derive(Debug)]
+pub(super) struct BodyCuller<E> {
+    pub(super) boxes: Vec<Shape>,
+    balls: Vec<Ball<E>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Ball<E> {
+    center: [E; 3],
+    square: E,
+}
+
+impl<E: Real> BodyCuller<E> {
+    /// Returns `None` if there are no bodies, or more than a mask has bits.
+    pub(super) fn new(solids: &[Solid]) -> Option<Self> {
+        if solids.is_empty() || solids.len() > MASKED {
+            return None;
+        }
+        let boxes: Option<Vec<Shape>> =
+            solids.iter().map(|solid| solid.bounds().map(Shape::of_box)).collect();
+        let balls = solids.iter().map(|solid| Ball::around(solid.ball())).collect();
+        Some(Self { boxes: boxes?, balls })
+    }
+
+    /// Returns the rays that come near the body of this bit.
+    #[inline(always)]
+    pub(super) fn are_near<S: Simd>(&self, simd: S, bit: usize, ray: Ray<S, E>) -> Mask<S, E> {
+        let Ball { center, square } = self.balls[bit];
+        let to = Vec3::splat(simd, center).sub(ray.origin);
+        let along = to.dot(ray.direction);
+        let apart = to.dot(to) - along * along;
+        apart.simd_le(splat::<S, E>(simd, square) + to.dot(to) * constant::<S, E>(simd, WIDER * E::ROUNDOFF))
+    }
+}
+
+impl<E: Real> Ball<E> {
+    fn around((center, radius): (DVec3, f64)) -> Self {
+        let square = radius * radius * (1.0 + WIDER * E::ROUNDOFF);
+        // The effect of the centre's rounding error.
+        let shift = WIDER * E::ROUNDOFF * (center.length() * (radius + center.length()));
+        Self { center: center.to_array().map(E::narrow), square: E::narrow(square + shift) }
+    }
+}

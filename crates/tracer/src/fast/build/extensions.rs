@@ -1,0 +1,72 @@
+//! Features that few scenes use: other shapes, lamps, highlights, patterns, glass. Separate code draws them, so that
+//! scenes without them run no extra instructions.
+
+use rayfold_scene::Scene;
+
+use crate::fast::arithmetic::real::Real;
+use crate::fast::bodies::Bodies;
+use crate::fast::build::features::BUILT;
+use crate::fast::lights::lamp::Lamp;
+use crate::fast::materials::finish::Finishes;
+use crate::fast::materials::glass::Glass;
+use crate::fast::placement::geometry::Geometry;
+use crate::parts;
+
+/// The features that few scenes use.
+#[derive(Debug)]
+pub(crate) struct Extensions<E> {
+    bodies: Option<Bodies<E>>,
+    lamps: Vec<Lamp<E>>,
+    finishes: Option<Finishes>,
+    glass: Option<Glass<E>>,
+}
+
+impl<E: Real> Extensions<E> {
+    /// Returns `None` for a scene that uses none of these features.
+    pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
+        is_needed(geometry).then(|| Self {
+            bodies: (!geometry.bodies.is_empty()).then(|| Bodies::new(&geometry.bodies)),
+            lamps: geometry.lamps.iter().map(Lamp::new).collect(),
+            finishes: Finishes::new(scene, geometry),
+            glass: Glass::new(scene),
+        })
+    }
+
+    /// Returns the bodies, if there are any.
+    #[inline(always)]
+    pub(crate) fn bodies(&self) -> Option<&Bodies<E>> {
+        self.bodies.as_ref()
+    }
+
+    /// Returns the glass, if there is any.
+    #[inline(always)]
+    pub(crate) fn glass(&self) -> Option<&Glass<E>> {
+        if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    #[inline(always)]
+    pub(crate) fn lamps(&self) -> &[Lamp<E>] {
+        if parts::BUILT.lamps { &self.lamps } else { &[] }
+    }
+
+    /// Returns the finishes, if any surface has highlights.
+    #[inline(always)]
+    pub(crate) fn glossy(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.highlights && finishes.has_highlights)
+    }
+
+    /// Returns the finishes, if any surface has a pattern.
+    #[inline(always)]
+    pub(crate) fn patterned(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.patterns && finishes.has_patterns)
+    }
+
+    pub(crate) fn has_glass(&self) -> bool {
+        self.glass.is_some()
+    }
+}
+
+/// Returns whether the scene uses any of these features. If it does, it is drawn in `f64`.
+pub(crate) fn is_needed(geometry: &Geometry) -> bool {
+    !geometry.bodies.is_empty() || !geometry.lamps.is_empty() || geometry.is_finished
+}

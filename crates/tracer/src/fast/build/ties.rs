@@ -1,0 +1,63 @@
+//! Which of equal hits counts: one without glass goes before one with it, and among those the first in the script.
+//!
+//! The kernels take the hit of the lowest order. So they are given the objects in the order in which they count.
+
+use std::borrow::Cow;
+
+use rayfold_scene::{Object, Scene};
+
+/// A scene whose objects stand in the order in which equal hits count.
+#[derive(Debug)]
+pub(crate) struct Ranked<'a> {
+    pub(crate) scene: Cow<'a, Scene>,
+    /// Positions in the script, if they are others.
+    places: Option<Vec<usize>>,
+}
+
+impl<'a> Ranked<'a> {
+    pub(crate) fn new(scene: &'a Scene) -> Self {
+        if scene.objects.is_sorted_by_key(is_glass) {
+            return Self { scene: Cow::Borrowed(scene), places: None };
+        }
+        let mut places: Vec<usize> = (0..scene.objects.len()).collect();
+        places.sort_by_key(|&place| is_glass(&scene.objects[place]));
+        let objects = places.iter().map(|&place| scene.objects[place].clone()).collect();
+        Self { scene: Cow::Owned(Scene { objects, ..scene.clone() }), places: Some(places) }
+    }
+
+    /// The position in the script of an object.
+    pub(crate) fn in_script(&self, order: usize) -> usize {
+        self.places.as_ref().map_or(order, |places| places[order])
+    }
+}
+
+fn is_glass(object: &Object) -> bool {
+    object.material().finish().is_some_and(|finish| finish.glass.is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rayfold_scene::model::{Finish, Glass};
+    use rayfold_scene::{Camera, Coefficients, Material, Screen, Sphere};
+
+    use super::*;
+
+    #[test]
+    fn glass_counts_last() {
+        let glass = Some(Glass::new(DVec3::ONE, 1.5).unwrap());
+        let glass = Material::finished(Coefficients::default(), Finish { glass, ..Finish::default() });
+        let ball = |radius: f64, material: &Material| {
+            Object::from(Sphere::new(radius, DVec3::ZERO, material.clone()).unwrap())
+        };
+        let opaque = Material::default();
+        let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Orthographic);
+        scene.objects = vec![ball(1.0, &opaque), ball(2.0, &glass)].into();
+        assert!(matches!(Ranked::new(&scene).scene, Cow::Borrowed(_)));
+        scene.objects =
+            vec![ball(1.0, &glass), ball(2.0, &opaque), ball(3.0, &glass), ball(4.0, &opaque)].into();
+        let ranked = Ranked::new(&scene);
+        assert_eq!([0, 1, 2, 3].map(|order| ranked.in_script(order)), [1, 3, 0, 2]);
+        assert_eq!(ranked.scene.objects[2], scene.objects[0]);
+    }
+}

@@ -1,0 +1,184 @@
+//! What few surfaces have beyond coefficients: highlights, and patterns of other coefficients.
+//!
+//! Both are worked out lane by lane, with the functions of the plain tracer: they are powers and lattices of few pixels,
+//! which must be the same bytes everywhere. Patterns are read off the numbers of the script, so that a hit is taken back
+//! to where the script has it.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+use rayfold_scene::{Coefficients, Object, Scene};
+
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::placement::geometry::Geometry;
+use crate::fast::rays::bounce::{Column, Hits, ROOM, RayBatch};
+use crate::fast::rays::packet::Ray;
+use crate::reference::{self, coefficients, highlight};
+
+/// The surfaces of a scene that has some of these.
+#[derive(Debug)]
+pub(crate) struct Finishes {
+    scene: Scene,
+    center: DVec3,
+    scale: f64,
+    pub(crate) has_patterns: bool,
+    pub(crate) has_highlights: bool,
+}
+
+/// The highlights of a packet of hits.
+pub(crate) struct Gloss<'a> {
+    finishes: &'a Finishes,
+    sum: [DVec3; 16],
+    /// Whether any light adds something.
+    pub(crate) is_seen: bool,
+}
+
+impl Finishes {
+    /// None if no object has any.
+    pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
+        let finishes = || scene.objects.iter().filter_map(|object| object.material().finish());
+        finishes().next()?;
+        let has_patterns = finishes().any(|finish| finish.pattern.is_some());
+        let has_highlights = finishes().any(|finish| finish.shine.is_some());
+        let (center, scale) = (geometry.center, geometry.scale);
+        Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights })
+    }
+
+    /// Mixes the coefficients of patterns into the colours and diffuse coefficients of the hits, and notes the mirror
+    /// coefficients of all; `EYE` says that the rays count for 1.
+    #[inline(never)]
+    pub(crate) fn paint<E: Real, const EYE: bool>(
+        &self,
+        queue: &RayBatch<E>,
+        hits: &mut Hits<E>,
+        lanes: usize,
+    ) {
+        for column in &mut hits.mirror {
+            column.resize(ROOM, E::narrow(0.0));
+        }
+        for &(at, _) in &hits.packets {
+            for lane in at..at + lanes {
+                if !hits.is_hit(lane) {
+                    continue;
+                }
+                let order = hits.order.0[lane].to_index();
+                let read = |columns: &[Column<E>; 3]| {
+                    DVec3::new(
+                        columns[0].0[lane].widen(),
+                        columns[1].0[lane].widen(),
+                        columns[2].0[lane].widen(),
+                    )
+                };
+                let weight = if EYE { DVec3::ONE } else { read(&queue.weight) };
+                let material = self.scene.objects[order].material();
+                let is_painted = material.finish().is_some_and(|finish| finish.pattern.is_some());
+                let seen = if is_painted {
+                    let origin = if EYE { DVec3::ZERO } else { read(&queue.origin) };
+                    let ray = (origin, read(&queue.direction));
+                    self.coefficients_at(order, ray, (read(&hits.start), read(&hits.normal)))
+                } else {
+                    material.coefficients()
+                };
+                if is_painted {
+                    write(&mut hits.color, lane, seen.ambient() * weight);
+                    write(&mut hits.diffuse, lane, seen.diffuse() * weight);
+                }
+                write(&mut hits.mirror, lane, seen.mirror() * weight);
+            }
+        }
+    }
+
+    /// Along an axis to which the ray is square a hit lies where the ray starts, so that walls between cells are met where
+    /// they are.
+    fn coefficients_at(
+        &self,
+        order: usize,
+        (origin, direction): (DVec3, DVec3),
+        (start, normal): (DVec3, DVec3),
+    ) -> Coefficients {
+        let place = DVec3::select(direction.cmpeq(DVec3::ZERO), origin, start);
+        let world = place / self.scale + self.center;
+        let (object, place, normal) = match &self.scene.objects[order] {
+            Object::Instance(instance) => {
+                let placement = instance.placement();
+                let normal = placement.rotation().transpose() * normal;
+                (instance.object(), placement.local_point(world), normal)
+            }
+            object => (object, world, normal),
+        };
+        let flat = reference::is_flat_at(object, normal);
+        let surface = reference::Surface { point: world, normal, offset: 0.0, flat, within: false };
+        coefficients(object, place, normal, &surface)
+    }
+
+    /// Which lanes meet a surface with highlights; `orders` are those of what they meet.
+    #[inline(always)]
+    pub(crate) fn shines<S: Simd, E: Real>(&self, simd: S, orders: &[E]) -> Mask<S, E> {
+        let mut shines = [E::narrow(0.0); 16];
+        for (lane, order) in orders.iter().enumerate() {
+            let object = self.scene.objects.get(order.to_index());
+            let finish = object.and_then(|object| object.material().finish());
+            if finish.is_some_and(|finish| finish.shine.is_some()) {
+                shines[lane] = E::narrow(1.0);
+            }
+        }
+        let shines = Lanes::<S, E>::from_slice(simd, &shines[..Lanes::<S, E>::LEN]);
+        shines.simd_gt(constant::<S, E>(simd, 0.0))
+    }
+
+    pub(crate) fn gloss(&self) -> Gloss<'_> {
+        Gloss { finishes: self, sum: [DVec3::ZERO; 16], is_seen: false }
+    }
+}
+
+fn write<E: Real>(columns: &mut [impl AsMut<[E]>; 3], lane: usize, color: DVec3) {
+    for (column, value) in columns.iter_mut().zip(color.to_array()) {
+        column.as_mut()[lane] = E::narrow(value);
+    }
+}
+
+/// A surface in a light.
+#[derive(Clone, Copy)]
+pub(crate) struct Lit<S: Simd, E: Real> {
+    /// Which lanes it reaches.
+    pub(crate) lanes: Mask<S, E>,
+    /// The unit vector towards it.
+    pub(crate) towards: Vec3<S, E>,
+    /// What arrives of its colour.
+    pub(crate) color: Vec3<S, E>,
+}
+
+impl Gloss<'_> {
+    /// Adds the highlights of a light; `ray` are the rays that see them, `orders` what they meet.
+    #[inline(never)]
+    pub(crate) fn add<S: Simd, E: Real>(
+        &mut self,
+        Lit { lanes, towards, color }: Lit<S, E>,
+        (ray, normal): (Ray<S, E>, Vec3<S, E>),
+        orders: &[E],
+    ) {
+        let mut bits = lanes.to_bitmask();
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let material = self.finishes.scene.objects[orders[lane].to_index()].material();
+            let Some(shine) = material.finish().and_then(|finish| finish.shine) else { continue };
+            let at = |v: Vec3<S, E>| DVec3::new(v.x[lane].widen(), v.y[lane].widen(), v.z[lane].widen());
+            let seen = highlight(&shine, at(normal), at(towards), -at(ray.direction));
+            self.sum[lane] += at(color) * shine.color() * seen;
+            self.is_seen = true;
+        }
+    }
+
+    /// The sum of all highlights.
+    #[inline(always)]
+    pub(crate) fn sum<S: Simd, E: Real>(&self, simd: S) -> Vec3<S, E> {
+        let mut columns = [[E::narrow(0.0); 16]; 3];
+        for (lane, color) in self.sum.iter().enumerate() {
+            for (column, channel) in columns.iter_mut().zip(color.to_array()) {
+                column[lane] = E::narrow(channel);
+            }
+        }
+        Vec3::load(simd, &columns, 0)
+    }
+}

@@ -1,0 +1,7 @@
+//! Materials beyond ambient, diffuse and mirror: highlights, patterns, glass; and the sky behind all.
+//!
+//! In: materials of the scene. Out: tables that the steps of [`super::transport`] read. Read [`finish`] first.
+
+pub(crate) mod finish;
+pub(crate) mod glass;
+pub(crate) mod sky;

@@ -1,0 +1,165 @@
+//! A scene in the coordinates of the kernels.
+//!
+//! The origin is moved to the eye, so that numbers are small for objects that are near. Lengths are scaled by a power
+//! of two, so that everything is in -1..=1: no product overflows, and a scene scaled by a power of two is the same
+//! scene bit for bit. All of it is `f64` and independent of the precision of the kernels.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayfold_scene::model::unit;
+use rayfold_scene::{Camera, Lamp, Light, Object, Scene};
+
+use crate::RenderError;
+use crate::fast::acceleration::tree::{Branches, Copies, Part, group};
+use crate::fast::bodies;
+use crate::fast::lights::lamp::Place;
+use crate::fast::lights::sun::Direction;
+use crate::fast::placement::lens::Lens;
+use crate::fast::placement::planes;
+use crate::fast::rays::bounds::{Bounds, join};
+use crate::fast::rays::placed::{RenderSpaceShape, nearest_within};
+use crate::fast::rays::view::{View, middle, view};
+use crate::fast::shapes::{Shape, Solid, reach};
+use crate::fast::shared::SharedSurfaces;
+use crate::parallel::map;
+use crate::sampling::places::spread;
+use crate::scale::below_inverse;
+
+/// A scene, recentred and scaled.
+#[derive(Clone, Debug)]
+pub(crate) struct Geometry {
+    pub(crate) view: View,
+    /// The solids, in the order of the script or in that of `branches`.
+    pub(crate) solids: Arc<Vec<Solid>>,
+    /// The grouping of the solids by a tree, if one is used to find them.
+    pub(crate) branches: Option<Branches>,
+    /// The shapes that have their own axes, in the order of the script.
+    pub(crate) bodies: Vec<bodies::Solid>,
+    pub(crate) suns: Vec<Direction>,
+    pub(crate) lamps: Vec<Place>,
+    /// The lens, if rays do not all start at the eye: in pictures of several samples per pixel.
+    pub(crate) lens: Option<Lens>,
+    /// Whether any surface has a finish in addition to its coefficients.
+    pub(crate) is_finished: bool,
+    /// The objects that share surfaces, after [the search for them](Self::with_shared_surfaces).
+    pub(crate) shared: Option<SharedSurfaces>,
+    /// A length of the scene times this is a length in these coordinates.
+    pub(crate) scale: f64,
+    /// The origin of these coordinates in the scene: `(point - center) * scale` is a point in these coordinates.
+    pub(crate) center: DVec3,
+}
+
+impl Geometry {
+    /// Converts a scene. `tree` sets whether objects are found by a tree, if it matters.
+    ///
+    /// # Errors
+    /// If the scene is so large that its size is not a finite number.
+    pub(crate) fn new(scene: &Scene, tree: Option<bool>) -> Result<Self, RenderError> {
+        let center = match &scene.camera {
+            Camera::Pinhole(pinhole) => pinhole.eye(),
+            Camera::Look(look) => look.eye(),
+            Camera::Orthographic => middle(scene.screen),
+        };
+        let reaches = map(&scene.objects, |object| reach(object, center));
+        let reach = reaches.into_iter().fold(0.0, f64::max);
+        let has_bodies = scene.objects.iter().any(is_body);
+        let of_bodies =
+            scene.objects.iter().filter(|_| has_bodies).map(|object| bodies::reach(object, center));
+        let of_lamps =
+            lamps(scene).map(|lamp| (lamp.position() - center).abs().max_element() + lamp.radius());
+        let lens = Lens::of(scene);
+        let of_lens = lens.map(|lens| lens.radius);
+        let reach = of_bodies.chain(of_lamps).chain(of_lens).fold(reach, f64::max);
+        let reach = match scene.camera {
+            Camera::Pinhole(_) | Camera::Look(_) => reach,
+            Camera::Orthographic => reach.max(center.max_element()),
+        };
+        if !reach.is_finite() {
+            return Err(RenderError::TooVast);
+        }
+        let scale = below_inverse(reach);
+        let view = view(scene, scale);
+        let shapes = map(&scene.objects, |object| Shape::new(object, center, scale));
+        let solids = shapes.into_iter().enumerate();
+        let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
+        let mut solids: Vec<Solid> = solids.collect();
+        let is_finished = scene.objects.iter().any(|object| object.material().finish().is_some());
+        // If objects are at the same distance, one that is not glass is visible.
+        let copies = if is_finished { Copies::Kept } else { Copies::Dropped };
+        let branches = group(&mut solids, tree, copies);
+        let orders = scene.objects.iter().filter(|_| has_bodies).zip(0..);
+        let bodies =
+            orders.filter_map(|(object, order)| bodies::body(object, order, center, scale)).collect();
+        let lamps = lamps(scene).map(|lamp| Place::new(lamp, center, scale)).collect();
+        let suns = scene.lights.iter().filter_map(|light| match light {
+            Light::Directional(light) => Some(Direction {
+                towards: -unit(light.direction()),
+                color: light.color(),
+                spread: spread(light.angle()),
+            }),
+            Light::Lamp(_) => None,
+        });
+        Ok(Self {
+            view,
+            solids: solids.into(),
+            branches,
+            bodies,
+            suns: suns.collect(),
+            lamps,
+            lens: lens.map(|lens| lens.scaled(scale)),
+            is_finished,
+            shared: None,
+            scale,
+            center,
+        })
+    }
+}
+
+impl Geometry {
+    /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.
+    pub(crate) fn with_shared_planes(mut self, scene: &Scene) -> Self {
+        let first = scene.objects.first().map(Object::material);
+        if scene.objects.iter().any(|object| Some(object.material()) != first) {
+            let solids: &mut Vec<Solid> = Arc::make_mut(&mut self.solids);
+            planes::share(solids);
+        }
+        self
+    }
+
+    /// Returns a lower bound of the distance between the origin and a solid's surface.
+    pub(crate) fn nearest(&self) -> f64 {
+        let of = |solids: &[Solid]| solids.iter().map(|s| s.shape.nearest()).fold(f64::INFINITY, f64::min);
+        let Some(branches) = &self.branches else { return of(&self.solids) };
+        let (mut nearest, mut pending) = (f64::INFINITY, vec![0]);
+        while let Some(at) = pending.pop() {
+            if nearest_within(branches.bounds(at)) < nearest {
+                match branches.part(at) {
+                    Part::Solids(range) => nearest = nearest.min(of(&self.solids[range])),
+                    Part::Children(first, second) => pending.extend([first, second]),
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Returns the bounding box of all solids.
+    pub(crate) fn whole(&self) -> Bounds {
+        match &self.branches {
+            Some(branches) => branches.bounds(0),
+            None => self.solids.iter().map(|solid| solid.shape.bounds()).reduce(join).unwrap_or_default(),
+        }
+    }
+}
+
+/// Returns whether an object may be a body.
+fn is_body(object: &Object) -> bool {
+    !matches!(object, Object::Sphere(_) | Object::Triangle(_) | Object::Cuboid(_))
+}
+
+fn lamps(scene: &Scene) -> impl Iterator<Item = &Lamp> {
+    scene.lights.iter().filter_map(|light| match light {
+        Light::Lamp(lamp) => Some(lamp),
+        Light::Directional(_) => None,
+    })
+}

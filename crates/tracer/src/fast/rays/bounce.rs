@@ -1,0 +1,206 @@
+//! Buffers for the rays and hits of a tile, as structures of arrays. Each step reads what the step before wrote.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3};
+use crate::fast::rays::packet::Nearest;
+
+/// The largest number of pixels in a tile.
+pub(crate) const PIXELS: usize = 256;
+
+/// The length of a column: a tile's pixels, and room for a packet that begins at the last of them.
+pub(crate) const ROOM: usize = PIXELS + 16;
+
+/// A column of a structure of arrays: a number for each ray of a tile.
+#[derive(Clone)]
+#[repr(align(64))]
+pub(crate) struct Column<E>(pub(crate) [E; ROOM]);
+
+impl<E> AsRef<[E]> for Column<E> {
+    #[inline(always)]
+    fn as_ref(&self) -> &[E] {
+        &self.0
+    }
+}
+
+impl<E> AsMut<[E]> for Column<E> {
+    #[inline(always)]
+    fn as_mut(&mut self) -> &mut [E] {
+        &mut self.0
+    }
+}
+
+pub(crate) type Columns<E> = [Column<E>; 3];
+
+impl<E: Real> Column<E> {
+    pub(crate) fn new() -> Self {
+        Self([E::narrow(0.0); ROOM])
+    }
+}
+
+pub(crate) fn columns<E: Real>() -> Columns<E> {
+    [Column::new(), Column::new(), Column::new()]
+}
+
+/// A batch of rays to be traced.
+pub(crate) struct RayBatch<E> {
+    pub(crate) origin: Columns<E>,
+    pub(crate) direction: Columns<E>,
+    /// The factor of their colour in the colour of the pixel.
+    pub(crate) weight: Columns<E>,
+    pub(crate) pixel: Column<E>,
+    pub(crate) count: usize,
+}
+
+impl<E: Real> RayBatch<E> {
+    pub(crate) fn new() -> Self {
+        Self { origin: columns(), direction: columns(), weight: columns(), pixel: Column::new(), count: 0 }
+    }
+
+    /// Fills the last packet up to `lanes` lanes with copies of the last ray that belong to no pixel.
+    #[inline(always)]
+    pub(crate) fn fill_up(&mut self, lanes: usize) {
+        let last = self.count - 1;
+        let end = self.count.next_multiple_of(lanes);
+        for columns in [&mut self.origin, &mut self.direction, &mut self.weight] {
+            for column in columns {
+                let value = column.0[last];
+                column.0[last + 1..end].fill(value);
+            }
+        }
+        self.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+    }
+}
+
+/// The hits of a tile's rays.
+pub(crate) struct Hits<E> {
+    /// The distances along the rays.
+    pub(crate) distance: Column<E>,
+    /// The object's position in the script.
+    pub(crate) order: Column<E>,
+    pub(crate) start: Columns<E>,
+    pub(crate) normal: Columns<E>,
+    /// The offset of the start from the surface, and a side: 1 for rays that come from within the object, 0 for the
+    /// others. Filled only for scenes with glass.
+    pub(crate) sides: [Column<E>; 2],
+    /// The diffuse coefficient times the ray's weight.
+    pub(crate) diffuse: Columns<E>,
+    pub(crate) color: Columns<E>,
+    /// The mirror coefficient times the ray's weight. Filled only for scenes with patterns.
+    pub(crate) mirror: [Vec<E>; 3],
+    /// For each packet with hits: its first index, and the spheres that can occlude its light, as bits.
+    pub(crate) packets: Vec<(usize, u64)>,
+    /// For each packet with mirrors: its first index, and the lanes that hit them, as bits.
+    pub(crate) mirrors: Vec<(usize, u64)>,
+}
+
+impl<E: Real> Hits<E> {
+    pub(crate) fn new() -> Self {
+        Self {
+            distance: Column::new(),
+            order: Column::new(),
+            start: columns(),
+            normal: columns(),
+            sides: [Column::new(), Column::new()],
+            diffuse: columns(),
+            color: columns(),
+            mirror: [vec![], vec![], vec![]],
+            packets: Vec::with_capacity(PIXELS),
+            mirrors: Vec::new(),
+        }
+    }
+
+    /// Stores the hits of a packet of rays. If none hits anything, stores the background as their colour.
+    #[inline(always)]
+    pub(crate) fn add<S: Simd>(
+        &mut self,
+        simd: S,
+        at: usize,
+        found: Nearest<S, E>,
+        background: impl FnOnce() -> Vec3<S, E>,
+    ) {
+        if !found.hit(simd).any_true() {
+            return background().store(&mut self.color, at);
+        }
+        let end = at + Lanes::<S, E>::LEN;
+        found.distance.store_slice(&mut self.distance.0[at..end]);
+        found.order.store_slice(&mut self.order.0[at..end]);
+        // There is room for all packets of a tile. The assertion lets the compiler leave out the code that grows the
+        // vector.
+        assert!(self.packets.len() < self.packets.capacity());
+        self.packets.push((at, u64::MAX));
+    }
+
+    /// Whether the ray in a lane of one of the `packets` meets anything: the distance of a miss is [`Real::FAR`], rounded.
+    #[inline(always)]
+    pub(crate) fn is_hit(&self, lane: usize) -> bool {
+        self.distance.0[lane].widen() < E::narrow(E::FAR).widen()
+    }
+}
+
+/// Returns the columns and rows of a packet's pixels.
+#[inline(always)]
+pub(crate) fn packet_shape<S: Simd, E: Real>() -> (usize, usize) {
+    match Lanes::<S, E>::LEN {
+        16 => (4, 4),
+        8 => (4, 2),
+        4 => (2, 2),
+        n => (n, 1),
+    }
+}
+
+/// Returns consecutive numbers from `from`, one per lane.
+#[inline(always)]
+pub(crate) fn count_from<S: Simd, E: Real>(simd: S, from: usize) -> Lanes<S, E> {
+    Lanes::<S, E>::from_slice(simd, &E::COUNT[..Lanes::<S, E>::LEN]) + E::narrow(from as f64)
+}
+
+/// Returns the index of each lane modulo `width`, which is a power of two.
+#[inline(always)]
+pub(crate) fn lanes_modulo<S: Simd, E: Real>(simd: S, width: usize) -> Lanes<S, E> {
+    let mut numbers = E::COUNT;
+    for (lane, number) in numbers.iter_mut().enumerate() {
+        *number = E::COUNT[lane & (width - 1)];
+    }
+    Lanes::<S, E>::from_slice(simd, &numbers[..Lanes::<S, E>::LEN])
+}
+
+/// Returns a colour times the weights of a packet's rays. The weight of a camera ray is 1.
+#[inline(always)]
+pub(crate) fn weigh<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    color: [E; 3],
+    queue: &RayBatch<E>,
+    at: usize,
+) -> Vec3<S, E> {
+    let color = Vec3::splat(simd, color);
+    if EYE { color } else { color.mul(Vec3::load(simd, &queue.weight, at)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level;
+
+    use super::*;
+    use crate::fast::arithmetic::dispatch::on;
+    use crate::fast::arithmetic::real::constant;
+
+    fn lanes_without_a_hit_are_known<E: Real>() {
+        let mut hits = Hits::<E>::new();
+        on!(Level::new(), simd => {
+            let mut found = Nearest::none(simd);
+            let lanes = count_from::<_, E>(simd, 0);
+            let near = constant::<_, E>(simd, 0.5);
+            found.offer(simd, lanes.simd_lt(near), near, E::narrow(7.0));
+            hits.add(simd, 0, found, || Vec3::zero(simd));
+        });
+        assert_eq!([0, 1].map(|lane| hits.is_hit(lane)), [true, false]);
+    }
+
+    #[test]
+    fn lanes_without_a_hit_are_known_in_single_and_double_precision() {
+        lanes_without_a_hit_are_known::<f32>();
+        lanes_without_a_hit_are_known::<f64>();
+    }
+}

@@ -1,0 +1,138 @@
+//! Surfaces that objects share, and which of them is seen: that of the object that comes first.
+//!
+//! Two objects may have a part of their surfaces in common: a label and its bottle, a picture and the wall it hangs on. A
+//! ray meets each at a distance of its own, some roundoffs apart, so that the nearest hit alone would be a matter of chance.
+//! Before the first pixel the pairs of such objects are found by their numbers, in `f64` (`pairs`). When a
+//! ray has met an object of a pair, those that come before it are asked again: the first that is met within the bound on
+//! the rounding errors of both is what the ray meets (`settle`). So what is seen depends on neither the
+//! order in which objects are looked for nor what is looked for besides.
+//!
+//! Objects whose hits are the same bit for bit need no pair: faces that are square to an axis, and triangles whose planes
+//! have the same numbers.
+
+pub(super) mod surface;
+
+pub(super) use self::surface::{Flat, Plain, Ring, Side, Surface};
+use crate::fast::arithmetic::real::Real;
+
+/// How far apart hits may be that count as equal, in roundoffs of the numbers of both objects and of the distance: as far as
+/// surfaces may lie apart that are meant to be one ([`surface::SAME`]), and as far again as the tests of bodies may err.
+pub(super) const EQUAL: f64 = 128.0;
+
+/// The objects that share surfaces.
+#[derive(Clone, Debug)]
+pub(super) struct SharedSurfaces {
+    /// Where the list of each object begins, and the end of the last.
+    starts: Vec<u32>,
+    /// For each object those that come before it and share a surface with it, in order.
+    earlier: Vec<Earlier>,
+    /// For each object the size of the largest numbers of itself and those that share a surface with it; 0 for all others.
+    sizes: Vec<f64>,
+}
+
+/// An object that shares a surface with one that comes later.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Earlier {
+    pub(super) order: u32,
+    /// How large the numbers are that say where the surface lies, of both.
+    pub(super) size: f64,
+}
+
+/// Two objects that share a surface, by their positions in the script.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pair {
+    pub(super) first: u32,
+    pub(super) second: u32,
+    /// How large the numbers are that say where the surface lies.
+    pub(super) size: f64,
+}
+
+impl SharedSurfaces {
+    /// The objects of a scene of `count` that share surfaces, by their pairs, sorted by the second object and then by the first.
+    pub(super) fn of_pairs(pairs: &[Pair], count: usize) -> Self {
+        let mut starts = vec![0u32; count + 1];
+        let mut sizes = vec![0f64; count];
+        let mut earlier = Vec::with_capacity(pairs.len());
+        for &Pair { first, second, size } in pairs {
+            starts[second as usize + 1] += 1;
+            earlier.push(Earlier { order: first, size });
+            for order in [first, second] {
+                sizes[order as usize] = sizes[order as usize].max(size);
+            }
+        }
+        for at in 0..count {
+            starts[at + 1] += starts[at];
+        }
+        Self { starts, earlier, sizes }
+    }
+
+    /// Those that share a surface with an object and come before it.
+    pub(super) fn earlier(&self, order: usize) -> &[Earlier] {
+        &self.earlier[self.starts[order] as usize..self.starts[order + 1] as usize]
+    }
+
+    /// How much farther off an object than its own numbers say new rays start, so that they are off all that shares its
+    /// surface.
+    pub(super) fn offset<E: Real>(&self, order: E) -> E {
+        E::narrow(EQUAL * E::ROUNDOFF * self.sizes[order.to_index()])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rayfold_scene::{Camera, Disc, Material, Object, Scene, Screen, Torus, Triangle};
+
+    use crate::probe::nearest_hits;
+    use crate::{Precision, RenderOptions, precision};
+
+    fn scene(objects: Vec<Object>) -> Scene {
+        let mut scene = Scene::new(Screen::new(4, 3).unwrap(), Camera::Orthographic);
+        scene.objects = objects.into();
+        scene
+    }
+
+    #[test]
+    fn a_ring_is_met_at_the_same_distance_whatever_else_is_met() {
+        let ring = || -> Object {
+            Torus::new(0.8, 0.25, DVec3::Y * 0.4, DVec3::Z, Material::default()).unwrap().into()
+        };
+        let wall = |z: f64| -> Object {
+            Disc::new(9.0, DVec3::Z * z, DVec3::new(0.0, 0.01, 1.0), Material::default()).unwrap().into()
+        };
+        let mut rng = fastrand::Rng::with_seed(34);
+        let mut random = || DVec3::new(rng.f64(), rng.f64(), rng.f64()) * 2.0 - 1.0;
+        let rays: Vec<_> = (0..4000)
+            .map(|_| {
+                let (origin, target) = (DVec3::new(0.0, 0.0, 5.0) + random(), random());
+                (origin, (target - origin).normalize())
+            })
+            .collect();
+        let options = RenderOptions::default();
+        let hits = |objects| nearest_hits(&scene(objects), &rays, &options).unwrap();
+        // The discs are met first, as they come first in the tree.
+        let alone = hits(vec![ring()]);
+        for z in [-0.3, -0.1, 0.0, 0.1] {
+            let beside = hits(vec![wall(z), ring()]);
+            let both = alone.iter().zip(&beside).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
+            let met: Vec<_> = both.filter(|(_, b)| b.object == 1).collect();
+            assert!(met.len() > 300, "{}", met.len());
+            assert!(met.iter().all(|(a, b)| a.distance == b.distance), "before a wall at {z}");
+        }
+    }
+
+    #[test]
+    fn faces_in_one_plane_whose_numbers_differ_in_single_precision_are_drawn_in_double() {
+        let card = |depth: f64, level: f64| -> Object {
+            let material = Material::new(DVec3::splat(level), DVec3::ZERO, DVec3::ZERO).unwrap();
+            let corners = [[-3.0, -3.0], [9.0, -3.0], [3.0, 9.0]].map(|[x, y]| DVec3::new(x, y, -depth));
+            Triangle::new(corners, material).unwrap().into()
+        };
+        // Halfway between two numbers of single precision, and a little to either side.
+        let (half, little) = (1.0 + 2f64.powi(-24), 2f64.powi(-46));
+        let chosen = |one: f64, other: f64| precision(&scene(vec![card(one, 0.1), card(other, 0.2)]));
+        assert_eq!(chosen(half + little, half + little), Precision::F32);
+        assert_eq!(chosen(half + little, half + 2.0 * little), Precision::F32);
+        assert_eq!(chosen(half - little, half + little), Precision::F64);
+    }
+}

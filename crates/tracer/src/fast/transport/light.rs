@@ -1,0 +1,301 @@
+//! The direct light at a tile's hits: its possible occluders, and its contribution.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use crate::fast::acceleration::candidates::{CandidateSet, Candidates, Masks, Picked};
+use crate::fast::acceleration::light_buffer::{LightBuffer, Seen};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::bodies::ANY;
+use crate::fast::build::extensions::Extensions;
+use crate::fast::build::features::{BUILT, Features};
+use crate::fast::build::prepare::Prepared;
+use crate::fast::lights::lamp::Rays;
+use crate::fast::materials::finish::{Finishes, Gloss, Lit};
+use crate::fast::rays::bounce::{Columns, Hits, RayBatch};
+use crate::fast::rays::kind::ByKind;
+use crate::fast::rays::packet::Ray;
+use crate::fast::transport::search::{nearest, unoccluded};
+use crate::fast::transport::transmittance::{IncidentLight, Shadow};
+
+/// The possible occluders of each sun.
+#[derive(Default)]
+pub(crate) struct Occluders {
+    pub(crate) of: Vec<Obstacles>,
+    seen: Seen,
+}
+
+#[derive(Default)]
+pub(crate) struct Obstacles {
+    /// The masks, in a scene without a tree.
+    masks: Masks,
+    /// The list, in a scene with a tree, if it is not too long.
+    list: Picked,
+    is_listed: bool,
+    /// The bodies, as bits, if there are few.
+    pub(crate) bodies: u64,
+}
+
+impl Obstacles {
+    /// Returns the candidates, without the spheres whose bits are not among the `others`.
+    #[inline(always)]
+    pub(crate) fn candidates(&self, others: u64, kinds: ByKind<bool>) -> Candidates<'_> {
+        let list = self.is_listed.then_some(&self.list);
+        Candidates { masks: self.masks.and_spheres(others), list, kinds }
+    }
+}
+
+impl Occluders {
+    /// Finds the possible occluders between the hits, of which there is at least one, and each sun. Returns their
+    /// kinds.
+    #[inline(never)]
+    pub(crate) fn find<S: Simd, E: Real>(
+        &mut self,
+        simd: S,
+        scene: &Prepared<E>,
+        hits: &Hits<E>,
+    ) -> ByKind<bool> {
+        self.of.resize_with(scene.suns.len(), Obstacles::default);
+        let mut kinds = ByKind::default();
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (low, high) = region(simd, hits);
+                for (light, of) in scene.suns.iter().zip(&mut self.of) {
+                    let beam = light.sun.beam(low, high);
+                    if BUILT.tree && scene.tree.is_some() {
+                        let Obstacles { list, is_listed, .. } = of;
+                        let gather = |buffer: &LightBuffer| buffer.gather(&beam, &mut self.seen, list);
+                        *is_listed = light.buffer.as_ref().is_some_and(gather);
+                        kinds = kinds.or(if *is_listed { list.kinds() } else { scene.needs.kinds });
+                    } else {
+                        of.masks = scene.masks(light.outlines.occluders(simd, beam));
+                        kinds = kinds.or(of.masks.kinds());
+                    }
+                }
+            },
+        );
+        kinds
+    }
+
+    /// Finds the bodies that can occlude, after [`Self::find`], in a scene that has some.
+    #[inline(never)]
+    pub(crate) fn find_bodies<S: Simd, E: Real>(&mut self, simd: S, scene: &Prepared<E>, hits: &Hits<E>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (low, high) = region(simd, hits);
+                for (light, of) in scene.suns.iter().zip(&mut self.of) {
+                    of.bodies = match &light.bodies {
+                        Some(outlines) => outlines.occluders(simd, light.sun.beam(low, high)),
+                        None => ANY,
+                    };
+                }
+            },
+        );
+    }
+}
+
+/// Adds the light of the suns that reaches the hits. Without `SHADOWS` all of it reaches them.
+#[inline(never)]
+pub(crate) fn add_sun_light<S: Simd, E: Real, F: Features<E>, const SHADOWS: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    hits: &mut Hits<E>,
+    obstacles: &Occluders,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = constant::<S, E>(simd, 0.0);
+            for &(at, others) in &hits.packets {
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let mut sum = Vec3::zero(simd);
+                for (index, light) in scene.suns.iter().enumerate() {
+                    let cosine = normal.dot(light.sun.towards(simd));
+                    let mut lit = cosine.simd_gt(zero);
+                    if !lit.any_true() {
+                        continue;
+                    }
+                    if SHADOWS {
+                        let obstacles = &obstacles.of[index];
+                        let candidates = obstacles.candidates(others, F::KINDS);
+                        let start = Vec3::load(simd, &hits.start, at);
+                        lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
+                    }
+                    sum = Vec3::splat(simd, light.sun.color).scale_add(lit.select(cosine, zero), sum);
+                }
+                let diffuse = Vec3::load(simd, &hits.diffuse, at);
+                let color = Vec3::load(simd, &hits.color, at);
+                let lit = Vec3::<S, E>::new(
+                    diffuse.x.mul_add(sum.x, color.x),
+                    diffuse.y.mul_add(sum.y, color.y),
+                    diffuse.z.mul_add(sum.z, color.z),
+                );
+                lit.store(&mut hits.color, at);
+            }
+        },
+    );
+}
+
+/// Adds the light of suns and lamps that reaches the hits past objects and bodies; with `GLASS` also the light that
+/// passes through glass.
+#[inline(never)]
+pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, const GLASS: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    beyond: &Extensions<E>,
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+    obstacles: &Occluders,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let zero = constant::<S, E>(simd, 0.0);
+            let far = constant::<S, E>(simd, E::FAR);
+            // Checked once here, not for each packet.
+            let (bodies, lamps) = (beyond.bodies(), beyond.lamps());
+            let (glossy, glass) = (beyond.glossy(), beyond.glass().filter(|_| GLASS));
+            for &(at, others) in &hits.packets {
+                let normal = Vec3::load(simd, &hits.normal, at);
+                let start = Vec3::load(simd, &hits.start, at);
+                let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
+                let seen = Ray { origin: start, direction: Vec3::load(simd, &queue.direction, at) };
+                let mut gloss = glossy.map(Finishes::gloss);
+                let mut sum = Vec3::zero(simd);
+                for (light, obstacles) in scene.suns.iter().zip(&obstacles.of) {
+                    let towards = light.sun.towards(simd);
+                    let cosine = normal.dot(towards);
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, glossy);
+                    }
+                    let mut lit = facing;
+                    if lit.any_true() {
+                        let candidates = obstacles.candidates(others, F::KINDS);
+                        lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
+                    }
+                    let ray = Ray { origin: start, direction: towards };
+                    if let Some(bodies) = bodies
+                        && lit.any_true()
+                    {
+                        lit = bodies.unoccluded(simd, obstacles.bodies, ray, far, lit);
+                    }
+                    let mut color = Vec3::splat(simd, light.sun.color);
+                    if let Some(glass) = glass {
+                        let glass = (scene, beyond, glass);
+                        let shadow = Shadow { ray, far };
+                        let arriving = IncidentLight { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
+                    }
+                    sum = color.scale_add(lit.select(cosine, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
+                    }
+                }
+                for lamp in lamps {
+                    let Rays { ray, far, part } = lamp.rays(simd, start);
+                    let cosine = normal.dot(ray.direction);
+                    let mut facing = cosine.simd_gt(zero);
+                    if glass.is_some() {
+                        facing &= shows(simd, hits, at, glossy);
+                    }
+                    let mut lit = facing;
+                    if let Some(bodies) = bodies
+                        && lit.any_true()
+                    {
+                        lit = bodies.unoccluded(simd, ANY, ray, far, lit);
+                    }
+                    if lit.any_true() {
+                        let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
+                        lit &= !met.distance.simd_lt(far);
+                    }
+                    let mut color = Vec3::splat(simd, lamp.color);
+                    if let Some(glass) = glass {
+                        let glass = (scene, beyond, glass);
+                        let shadow = Shadow { ray, far };
+                        let arriving = IncidentLight { color, lit };
+                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        (color, lit) = (through.color, through.lit);
+                    }
+                    sum = color.scale_add(lit.select(cosine * part, zero), sum);
+                    if let Some(gloss) = &mut gloss {
+                        let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
+                        gloss.add(lit, (seen, normal), orders);
+                    }
+                }
+                let colors = (&hits.diffuse, &mut hits.color);
+                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss));
+            }
+        },
+    );
+}
+
+/// Returns the hits of a packet that show the light that reaches them. Most glass scatters none and needs no shadow
+/// rays.
+#[inline(always)]
+pub(crate) fn shows<S: Simd, E: Real>(
+    simd: S,
+    hits: &Hits<E>,
+    at: usize,
+    glossy: Option<&Finishes>,
+) -> Mask<S, E> {
+    let zero = constant::<S, E>(simd, 0.0);
+    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+    let scatters = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
+    match glossy {
+        Some(finishes) => scatters | finishes.shines(simd, &hits.order.0[at..at + Lanes::<S, E>::LEN]),
+        None => scatters,
+    }
+}
+
+/// Adds the `sum` of the lights that reach a packet's hits, and their highlights, to the colours of the hits.
+#[inline(always)]
+pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    queue: &RayBatch<E>,
+    at: usize,
+    (diffuse, colors): (&Columns<E>, &mut Columns<E>),
+    (sum, gloss): (Vec3<S, E>, Option<Gloss>),
+) {
+    let diffuse = Vec3::load(simd, diffuse, at);
+    let color = Vec3::load(simd, colors, at);
+    let lit = Vec3::<S, E>::new(
+        diffuse.x.mul_add(sum.x, color.x),
+        diffuse.y.mul_add(sum.y, color.y),
+        diffuse.z.mul_add(sum.z, color.z),
+    );
+    let lit = match gloss {
+        Some(gloss) if gloss.is_seen => {
+            let one = constant::<S, E>(simd, 1.0);
+            let sum = gloss.sum::<S, E>(simd);
+            if EYE {
+                sum.scale_add(one, lit)
+            } else {
+                sum.mul(Vec3::load(simd, &queue.weight, at)).scale_add(one, lit)
+            }
+        }
+        Some(_) | None => lit,
+    };
+    lit.store(colors, at);
+}
+
+/// Returns the bounding box of the hits that need light. There is at least one.
+#[inline(always)]
+pub(crate) fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 3]) {
+    let far = constant::<S, E>(simd, E::FAR);
+    let near = constant::<S, E>(simd, -E::FAR);
+    let mut low = Vec3::<S, E>::new(far, far, far);
+    let mut high = Vec3::<S, E>::new(near, near, near);
+    for &(at, _) in &hits.packets {
+        let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, &hits.start, at);
+        low = Vec3::<S, E>::new(low.x.min(x), low.y.min(y), low.z.min(z));
+        high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
+    }
+    (
+        [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()],
+        [high.x.reduce_max(), high.y.reduce_max(), high.z.reduce_max()],
+    )
+}

@@ -1,0 +1,100 @@
+//! Shadow rays through glass. Each glass surface multiplies the light by its transmitted share; an opaque surface
+//! blocks it.
+//!
+//! A ray goes straight on, from surface to surface. It passes all surfaces at the same distance together. Each lane
+//! stops on its own, at the light or at an opaque surface.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::bodies::ANY;
+use crate::fast::build::extensions::Extensions;
+use crate::fast::build::features::Features;
+use crate::fast::build::prepare::Prepared;
+use crate::fast::materials::glass::Glass;
+use crate::fast::rays::packet::Ray;
+use crate::fast::transport::search::nearest;
+use crate::fast::transport::surfaces::{HitPacket, surface};
+
+/// Shadow rays, and their distance to the light.
+#[derive(Clone, Copy)]
+pub(crate) struct Shadow<S: Simd, E: Real> {
+    pub(crate) ray: Ray<S, E>,
+    pub(crate) far: Lanes<S, E>,
+}
+
+/// The incident light: its colour, and the lanes that it reaches.
+#[derive(Clone, Copy)]
+pub(crate) struct IncidentLight<S: Simd, E: Real> {
+    pub(crate) color: Vec3<S, E>,
+    pub(crate) lit: Mask<S, E>,
+}
+
+impl<S: Simd, E: Real> IncidentLight<S, E> {
+    /// Adds the light that passes through glass, for the `hidden` lanes, whose colour is still that of the light.
+    // Out of line, so that it does not use registers of the lighting code for scenes without glass.
+    #[inline(never)]
+    pub(crate) fn through_glass<F: Features<E>>(
+        self,
+        simd: S,
+        (scene, beyond, glass): (&Prepared<E>, &Extensions<E>, &Glass<E>),
+        hidden: Mask<S, E>,
+        shadow: Shadow<S, E>,
+    ) -> Self {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Shadow { mut ray, mut far } = shadow;
+                let Self { mut color, mut lit } = self;
+                let zero = constant::<S, E>(simd, 0.0);
+                let mut open = hidden;
+                // A ray that has passed as many surfaces as there are has none ahead.
+                for _ in 0..=glass.surfaces {
+                    if !open.any_true() {
+                        break;
+                    }
+                    let mut found = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
+                    if let Some(bodies) = beyond.bodies() {
+                        bodies.intersect(simd, ANY, ray, &mut found);
+                    }
+                    if let Some(shared) = &scene.shared {
+                        shared.settle::<S, E, F, false>(simd, scene, ray, &mut found);
+                    }
+                    let hit = open & found.distance.simd_lt(far);
+                    lit |= open & !hit;
+                    open = hit;
+                    let mut orders = [E::narrow(0.0); 16];
+                    found.order.store_slice(&mut orders[..Lanes::<S, E>::LEN]);
+                    let met = HitPacket { found, orders: &orders, hit };
+                    let mut rest = hit.to_bitmask();
+                    while rest != 0 {
+                        let lane = rest.trailing_zeros();
+                        let (entry, same) = met.object(simd, scene, lane);
+                        rest &= !same.to_bitmask();
+                        let Some(pane) = glass.of(orders[lane as usize]) else {
+                            open &= !same;
+                            continue;
+                        };
+                        let dimmed = color.mul(Vec3::splat(simd, pane.color));
+                        color = Vec3::select(same, dimmed, color);
+                        let mut surface = surface::<S, E, F, false>(simd, scene, entry, ray, found.distance);
+                        if let Some(shared) = &scene.shared {
+                            surface = shared.lifted(simd, surface, orders[lane as usize]);
+                        }
+                        ray.origin = Vec3::select(same, surface.beyond(simd), ray.origin);
+                    }
+                    far = hit.select(far - found.distance, far);
+                }
+                lit |= open;
+                // Lanes in the dark get no light.
+                let color = Vec3::<S, E>::new(
+                    lit.select(color.x, zero),
+                    lit.select(color.y, zero),
+                    lit.select(color.z, zero),
+                );
+                Self { color, lit }
+            },
+        )
+    }
+}
