@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import type { JSX } from "preact";
+import { useEffect } from "preact/hooks";
 
 /** The shown step; `null` without a tour. */
 export const tour = signal<number | null>(location.hash === "#tour" ? 0 : null);
@@ -18,10 +19,20 @@ const WIDTH = 280;
 
 export function Tour(): JSX.Element | null {
   const at = tour.value;
+  const end = (): void => void (tour.value = null);
+  useEffect(() => {
+    // The focus may be elsewhere: a dialog that closes gives it back to what had it before.
+    const leave = (event: KeyboardEvent): void => {
+      if (event.key !== "Escape" || tour.value === null || document.querySelector("dialog[open]")) return;
+      event.stopPropagation();
+      end();
+    };
+    addEventListener("keydown", leave, true);
+    return () => removeEventListener("keydown", leave, true);
+  }, []);
   const [part, text] = STEPS[at ?? -1] ?? [];
   const box = part && document.querySelector(part)?.getBoundingClientRect();
   if (at === null || !box) return null;
-  const end = (): void => void (tour.value = null);
   const left = Math.max(8, Math.min(innerWidth - WIDTH - 8, box.left + box.width / 2 - WIDTH / 2));
   const top = Math.max(8, Math.min(innerHeight - 150, box.top + Math.min(box.height, 120) / 2));
   return (
@@ -31,10 +42,7 @@ export function Tour(): JSX.Element | null {
       role="dialog"
       aria-label="Tour"
       style={{ left: `${left}px`, top: `${top}px`, width: `${WIDTH}px` }}
-      onKeyDown={(event) => {
-        event.stopPropagation();
-        if (event.key === "Escape") end();
-      }}
+      onKeyDown={(event) => event.stopPropagation()}
     >
       <p>{text}</p>
       <button type="button" onClick={end}>
