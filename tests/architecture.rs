@@ -16,6 +16,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &[]),
     ("rayfold-files", &["rayfold-scene"]),
     ("rayfold-gif", &[]),
+    ("rayfold-movie", &["rayfold-gif"]),
     ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),
@@ -29,7 +30,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-scene",
             "rayfold-files",
             "rayfold-tracer",
-            "rayfold-gif",
+            "rayfold-movie",
             "rayfold-pipeline",
             "rayfold-client",
         ],
@@ -41,6 +42,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-files",
             "rayfold-tracer",
             "rayfold-gif",
+            "rayfold-movie",
             "rayfold-pipeline",
             "rayfold-client",
             "rayfold-local",
@@ -84,7 +86,7 @@ const ROOMS: [&str; 14] = [
 ];
 
 /// The crates of pure functions, without side effects.
-const CORE: [&str; 3] = ["rayfold-scene", "rayfold-tracer", "rayfold-gif"];
+const CORE: [&str; 4] = ["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-movie"];
 
 /// Packages that open sockets, read clocks or draw random numbers, by the start of their names.
 const OUTSIDE_THE_CORE: &[&str] = &[

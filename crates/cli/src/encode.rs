@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use image::RgbImage;
 use rayfold_files::probe;
-use rayfold_gif::{Encoder, Plays, Settings};
+use rayfold_gif::{Encoder, Settings};
+use rayfold_movie::{Container, Movie, Plays};
 use rayfold_scene::{SETTINGS_FILE, natural_cmp};
 
 use crate::ahead;
@@ -17,7 +18,7 @@ use crate::outcome::{Outcome, Usage};
 use crate::playback::Playback;
 use crate::progress::Progress;
 use crate::render::movie::{self, MovieError, Push};
-use crate::render::target::{Container, Movie, Place, Target};
+use crate::render::target::{Place, Target};
 use crate::render::{check_max_size, fit};
 use crate::threads::Threads;
 use crate::values;
@@ -59,7 +60,7 @@ pub(crate) struct Args {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Format of the file, whatever the ending of OUT [default: by the ending; for -, gif]
-    #[arg(long, value_name = "FORMAT", value_enum)]
+    #[arg(long, value_name = "FORMAT", value_parser = values::container())]
     format: Option<Container>,
     /// Leave a file that is there already, and fail
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! How an animation is shown when it has been written, for every subcommand that writes one.
 
-use rayfold_gif::Plays;
+use rayfold_movie::Plays;
 
 use crate::values;
 

@@ -2,7 +2,14 @@
 
 use std::str::FromStr;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use rayfold_movie::Container;
 use rayfold_scene::{Samples, Screen};
+
+/// A container of animations, by the ending of its files.
+pub(crate) fn container() -> impl TypedValueParser<Value = Container> {
+    PossibleValuesParser::new(Container::ALL.map(Container::ending)).try_map(|word| word.parse::<Container>())
+}
 
 /// A whole number of `1` or more.
 ///

@@ -1,4 +1,4 @@
-//! The GIF of the open animation, rendered on a thread of its own. Its bytes equal those of `rayfold
+//! The open animation as a GIF, APNG or WebP, rendered on a thread of its own. Its bytes equal those of `rayfold
 //! render` for the files.
 
 use std::io::{self, Write};
@@ -8,7 +8,7 @@ use std::thread;
 
 use axum::body::Body;
 use image::{ImageFormat, RgbImage};
-use rayfold_gif::{Encoder, Settings};
+use rayfold_movie::{Container, Encoding, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Scene, Screen, Script};
 use rayfold_tracer::{RenderOptions, render, render_frame};
 use zip::ZipWriter;
@@ -17,30 +17,34 @@ use zip::write::SimpleFileOptions;
 use crate::error::Error;
 use crate::pipe::{frame_file, zip_of};
 use crate::project::Project;
-use crate::protocol::OutputState;
+use crate::protocol::{MovieFormat, OutputState};
 
-/// The largest GIF in bytes that is kept in memory.
-const GIF: usize = 512 << 20;
+/// The largest file in bytes that is kept in memory.
+const LARGEST: usize = 512 << 20;
 
 /// The longer side of a small picture, in pixels.
 const THUMBNAIL: f64 = 96.0;
 
-/// The GIF that was rendered last, and the rendering in progress.
+/// A file with an animation.
+pub(crate) type File = (Container, Arc<Vec<u8>>);
+
+/// The file that was rendered last, and the rendering in progress.
 #[derive(Debug, Default)]
 pub(crate) struct Outputs {
-    gif: Mutex<Option<Arc<Vec<u8>>>>,
+    file: Mutex<Option<File>>,
     running: Mutex<Option<Arc<AtomicBool>>>,
 }
 
-/// The input of a rendering: scripts in order, and the frame rate.
+/// The input of a rendering: scripts in order, the settings, and the kind of file.
 #[derive(Debug)]
 struct Job {
+    container: Container,
     scripts: Vec<Arc<Script>>,
     settings: AnimationSettings,
 }
 
 impl Job {
-    fn of(project: &Project) -> Result<Self, Error> {
+    fn of(project: &Project, container: Container) -> Result<Self, Error> {
         if let Some(file) = project.files.iter().find(|file| !file.is_sound()) {
             return Err(Error::Output(format!("{} has errors; mend them first", file.name)));
         }
@@ -50,7 +54,7 @@ impl Job {
             Some(expected) if (frames as u64) < expected => Err(Error::Output(format!(
                 "animation.json says {expected} frames, but the scripts give {frames}"
             ))),
-            _ => Ok(Self { scripts, settings: project.settings() }),
+            _ => Ok(Self { container, scripts, settings: project.settings() }),
         }
     }
 
@@ -61,28 +65,53 @@ impl Job {
             .flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)))
             .collect();
         let of = self.settings.shown(&frames).count();
-        let failed = |error: &dyn std::error::Error| Error::Output(format!("cannot make the GIF: {error}"));
+        let ending = self.container.ending();
+        let failed =
+            |error: &dyn std::error::Error| Error::Output(format!("cannot make the .{ending}: {error}"));
         let durations = self.settings.shown_durations(frames.len() as u64);
-        let settings = Settings::new(self.settings.fps(), self.settings.loops()).timed(&durations);
-        let mut gif = Bounded(Vec::new());
-        let mut encoder = Encoder::new(&mut gif, settings).map_err(|error| failed(&error))?;
+        let mut file = Bounded(Vec::new());
+        let mut encoding: Option<Encoding<&mut Bounded>> = None;
+        let mut out = Some(&mut file);
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
         report(OutputState::Running { done: 0, of });
         for (done, &(script, k)) in self.settings.shown(&frames).enumerate() {
             let Some(frame) = render_frame(script, k, &options) else { break };
             let frame = frame.map_err(|error| failed(&error))?;
-            encoder.push(frame).map_err(|error| failed(&error))?;
+            if let Some(out) = out.take() {
+                let movie = Movie {
+                    size: frame.dimensions(),
+                    frames: Some(of as u64),
+                    fps: self.settings.fps(),
+                    plays: Plays::repeated(self.settings.loops()),
+                    last_delay_cs: None,
+                    exact: false,
+                };
+                encoding = Some(Encoding::begin(out, self.container, movie).map_err(|error| failed(&error))?);
+            }
+            if let Some(encoding) = &mut encoding {
+                let seconds = durations.get(&(done as u64)).copied();
+                encoding.push(frame, seconds).map_err(|error| failed(&error))?;
+            }
             report(OutputState::Running { done: done + 1, of });
         }
-        encoder.finish().map_err(|error| failed(&error))?;
-        Ok(gif.0)
+        let encoding = encoding.ok_or_else(|| Error::Output("there is no frame to draw".into()))?;
+        if let Some((at, length)) = encoding.finish().map_err(|error| failed(&error))?.length {
+            file.0[at as usize..][..length.len()].copy_from_slice(&length);
+        }
+        Ok(file.0)
     }
 }
 
 impl Outputs {
-    /// Starts rendering the GIF unless a rendering is in progress. Reports the progress to `report`.
-    pub(crate) fn start(self: &Arc<Self>, project: &Project, report: impl Fn(OutputState) + Send + 'static) {
-        let job = Job::of(project);
+    /// Starts rendering the animation unless a rendering is in progress. Reports the progress to `report`.
+    pub(crate) fn start(
+        self: &Arc<Self>,
+        project: &Project,
+        format: MovieFormat,
+        report: impl Fn(OutputState) + Send + 'static,
+    ) {
+        let container = Container::from(format);
+        let job = Job::of(project, container);
         let cancel = Arc::new(AtomicBool::new(false));
         {
             let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
@@ -98,10 +127,11 @@ impl Outputs {
             report(match made {
                 _ if cancel.load(Ordering::Relaxed) => OutputState::Cancelled,
                 Err(error) => OutputState::Failed { why: error.to_string() },
-                Ok(gif) => {
-                    let bytes = gif.len();
-                    *own.gif.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(gif));
-                    OutputState::Done { bytes }
+                Ok(file) => {
+                    let bytes = file.len();
+                    *own.file.lock().unwrap_or_else(PoisonError::into_inner) =
+                        Some((container, Arc::new(file)));
+                    OutputState::Done { bytes, format }
                 }
             });
         });
@@ -117,9 +147,9 @@ impl Outputs {
         }
     }
 
-    /// Returns the GIF that was rendered last.
-    pub(crate) fn gif(&self) -> Option<Arc<Vec<u8>>> {
-        self.gif.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// Returns the file that was rendered last.
+    pub(crate) fn file(&self) -> Option<File> {
+        self.file.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -169,7 +199,7 @@ fn no_picture(error: &dyn std::error::Error) -> Error {
 /// # Errors
 /// Fails if a script has errors, or if the system cannot start a thread.
 pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
-    let job = Job::of(project)?;
+    let job = Job::of(project, Container::Gif)?;
     let of: usize = job.scripts.iter().map(|script| script.frame_count()).sum();
     let made = zip_of(move |zip| {
         let _permit = permit;
@@ -204,9 +234,9 @@ struct Bounded(Vec<u8>);
 
 impl Write for Bounded {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.0.len() + bytes.len() > GIF {
+        if self.0.len() + bytes.len() > LARGEST {
             return Err(io::Error::other(format!(
-                "it is larger than {GIF} bytes; `rayfold render` writes it to a file"
+                "it is larger than {LARGEST} bytes; `rayfold render` writes it to a file"
             )));
         }
         self.0.extend_from_slice(bytes);
@@ -227,22 +257,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gif_runs_back_and_shows_frames_for_times_of_their_own() {
+    fn an_animation_runs_back_and_shows_frames_for_times_of_their_own() {
         let text = "Screen 16 12\nFrames 3\nSphere 2  (1:-2 3:2) 0 -9  1 .5 0  0 0 0\nTrace\n";
         let script = Arc::new(parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap());
         let settings = AnimationSettings::new(None, 10.0, 0).unwrap().bouncing(true);
         let settings = settings.with_durations(BTreeMap::from([(2, 0.5)])).unwrap();
-        let job = Job { scripts: vec![Arc::clone(&script)], settings };
-        let gif = job.run(&AtomicBool::new(false), &|_| {}).unwrap();
-
-        let mut expected = Vec::new();
-        // The second frame is shown twice: there, and back.
-        let timed = Settings::new(10.0, 0).timed(&BTreeMap::from([(1, 0.5), (3, 0.5)]));
-        let mut encoder = Encoder::new(&mut expected, timed).unwrap();
-        for frame in [0, 1, 2, 1] {
-            encoder.push(render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap()).unwrap();
+        let movie = Movie {
+            size: (16, 12),
+            frames: Some(4),
+            fps: 10.0,
+            plays: Plays::Endless,
+            last_delay_cs: None,
+            exact: false,
+        };
+        for container in [Container::Gif, Container::Apng, Container::Webp] {
+            let job = Job { container, scripts: vec![Arc::clone(&script)], settings: settings.clone() };
+            let file = job.run(&AtomicBool::new(false), &|_| {}).unwrap();
+            // The second frame is shown twice: there, and back.
+            let frames = [(0, None), (1, Some(0.5)), (2, None), (1, Some(0.5))].map(|(frame, seconds)| {
+                (render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap(), seconds)
+            });
+            let expected = rayfold_movie::to_bytes(container, movie, frames).unwrap();
+            assert!(file == expected, "{container:?}: {} and {} bytes", file.len(), expected.len());
         }
-        encoder.finish().unwrap();
-        assert!(gif == expected, "{} and {} bytes", gif.len(), expected.len());
     }
 }

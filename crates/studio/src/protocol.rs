@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use rayfold_movie::Container;
 use rayfold_scene::Language;
 use serde::{Deserialize, Serialize};
 
@@ -102,10 +103,30 @@ pub(crate) enum ClientMessage {
     Resolve { keep_mine: bool },
     /// Load a whole text, in place of the shown one or as a new script of this name.
     Load { from: Source, new: Option<String> },
-    /// Start rendering the GIF.
-    Render,
-    /// Stop rendering the GIF.
+    /// Start rendering the animation.
+    Render { format: MovieFormat },
+    /// Stop rendering the animation.
     Cancel,
+}
+
+/// The file format of a rendered animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum MovieFormat {
+    Gif,
+    Apng,
+    Webp,
+}
+
+impl From<MovieFormat> for Container {
+    fn from(format: MovieFormat) -> Self {
+        match format {
+            MovieFormat::Gif => Self::Gif,
+            MovieFormat::Apng => Self::Apng,
+            MovieFormat::Webp => Self::Webp,
+        }
+    }
 }
 
 /// The source of a whole text.
@@ -285,7 +306,7 @@ pub(crate) struct ServerMessage {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     pub(crate) tracks: Option<Tracks>,
-    /// The state of the GIF.
+    /// The state of the rendered animation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     pub(crate) output: Option<OutputState>,
@@ -502,17 +523,18 @@ pub(crate) struct FaultState {
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "is")]
 pub(crate) enum OutputState {
-    /// The GIF is being rendered.
+    /// The animation is being rendered.
     Running {
         /// The number of rendered frames.
         done: usize,
         /// The number of all frames.
         of: usize,
     },
-    /// The GIF can be downloaded.
+    /// The file can be downloaded.
     Done {
         /// The size of the file.
         bytes: usize,
+        format: MovieFormat,
     },
     /// The rendering was cancelled.
     Cancelled,

@@ -86,7 +86,7 @@ impl Server {
             .route("/{token}/studio.js", get(script))
             .route("/{token}/studio.css", get(style))
             .route("/{token}/socket", any(socket))
-            .route("/{token}/animation.gif", get(gif))
+            .route("/{token}/animation", get(animation))
             .route("/{token}/scripts.zip", get(scripts))
             .route("/{token}/frame.png", get(frame))
             .route("/{token}/frames.zip", get(frames))
@@ -147,10 +147,10 @@ async fn style(State(shared): State<Arc<Shared>>) -> Response {
     file("text/css; charset=utf-8", shared.page.style.clone())
 }
 
-async fn gif(State(shared): State<Arc<Shared>>) -> Response {
-    match shared.outputs.gif() {
-        Some(gif) => file("image/gif", gif.to_vec()),
-        None => (StatusCode::NOT_FOUND, "no GIF has been made yet\n").into_response(),
+async fn animation(State(shared): State<Arc<Shared>>) -> Response {
+    match shared.outputs.file() {
+        Some((container, bytes)) => file(container.media_type(), bytes.to_vec()),
+        None => (StatusCode::NOT_FOUND, "no animation has been rendered yet\n").into_response(),
     }
 }
 
@@ -284,9 +284,9 @@ async fn work(shared: Arc<Shared>, mut socket: WebSocket, mut left: oneshot::Rec
                 }
                 match answer.output {
                     Some(Output::Cancel) => shared.outputs.cancel(),
-                    Some(Output::Render) => {
+                    Some(Output::Render(format)) => {
                         let tellings = tellings.clone();
-                        shared.outputs.start(&shared.project(), move |output| {
+                        shared.outputs.start(&shared.project(), format, move |output| {
                             let tell = ServerMessage { output: Some(output), ..ServerMessage::default() };
                             // If this fails, the page has gone.
                             let _ = tellings.blocking_send(tell);

@@ -28,7 +28,7 @@ use crate::materials;
 use crate::names;
 use crate::pictures::Wanted;
 use crate::project::{Place, Project};
-use crate::protocol::{ClientMessage, FileState, ServerMessage};
+use crate::protocol::{ClientMessage, FileState, MovieFormat, ServerMessage};
 use crate::snap_to_ground;
 use crate::tables::{Role, commands, role};
 use crate::tracks::{Copied, Tracks};
@@ -73,16 +73,16 @@ pub(crate) struct Session {
     /// The version of each file's text, and the last version of any.
     versions: BTreeMap<usize, u32>,
     version: u32,
-    /// The action that the server is to take on the GIF.
+    /// The action that the server is to take on the rendered animation.
     output: Option<Output>,
 }
 
-/// An action on the GIF.
+/// An action on the rendered animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
-    /// Start rendering the GIF.
-    Render,
-    /// Stop rendering the GIF.
+    /// Start rendering the animation.
+    Render(MovieFormat),
+    /// Stop rendering the animation.
     Cancel,
 }
 
@@ -428,8 +428,8 @@ impl Session {
                 Change::Still
             }
             ClientMessage::Load { from, new } => self.load(project, from, new.as_deref(), tell),
-            ClientMessage::Render => {
-                self.output = Some(Output::Render);
+            ClientMessage::Render { format } => {
+                self.output = Some(Output::Render(format));
                 Change::Nothing
             }
             ClientMessage::Cancel => {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use rayfold_client::{FetchedFrame, Frames, Output, frame_name, frames};
 use rayfold_files::{OutputFile, probe};
+use rayfold_movie::Container;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 
@@ -14,7 +15,7 @@ use super::{BucketArgs, Client, Watch, address, named, parse_animation, report, 
 use crate::console::Console;
 use crate::outcome::{Outcome, Usage};
 use crate::progress::Progress;
-use crate::render::target::{Container, Format, Pattern, Place, Target};
+use crate::render::target::{Format, Pattern, Place, Target};
 use crate::wording::{Size, number};
 
 /// Download the GIF of an animation, or its frames

@@ -8,9 +8,10 @@ use std::io::{BufReader, BufWriter, Read, Seek, Write};
 
 use anyhow::Context;
 use image::RgbImage;
+use rayfold_movie::{Container, Movie};
 
 use super::movie::{self, Encoded, MovieError, Push, Written};
-use super::target::{Container, Format, Movie, Place};
+use super::target::{Format, Place};
 use crate::console::Console;
 use crate::interrupt;
 use crate::wording::Size;

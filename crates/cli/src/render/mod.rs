@@ -11,7 +11,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use image::RgbImage;
 use rayfold_files::{OutputFile, probe};
-use rayfold_gif::Plays;
+use rayfold_movie::{Container, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
 use rayfold_tracer::{Precision, Progress as Work, RenderOptions};
 
@@ -27,17 +27,13 @@ use crate::threads::Threads;
 use crate::values;
 use crate::wording::{Size, number};
 
-mod apng;
 pub(crate) mod fit;
 pub(crate) mod movie;
-mod rate;
 pub(crate) mod target;
 mod watch;
-mod webp;
-mod y4m;
 
 use movie::{MovieError, Push};
-use target::{Container, Format, Movie, Pattern, Place, Target};
+use target::{Format, Pattern, Place, Target};
 
 /// Render scripts to an animation, to one image, or to many
 ///
@@ -69,7 +65,7 @@ pub(crate) struct Args {
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
     /// Format of an animation, whatever the ending of OUT [default: by the ending; for -, y4m]
-    #[arg(long, value_name = "FORMAT", value_enum)]
+    #[arg(long, value_name = "FORMAT", value_parser = values::container())]
     format: Option<Container>,
     /// Leave a file that is there already, and fail
     #[arg(long, conflicts_with_all = ["watch", "skip_existing"])]

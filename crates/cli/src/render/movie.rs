@@ -5,12 +5,9 @@ use std::time::Duration;
 
 use image::RgbImage;
 use rayfold_files::OutputFile;
-use rayfold_gif::{Encoder, Settings};
+use rayfold_movie::{Container, Encoding, Finished, Length, MAX_FPS, Movie};
 
-use super::apng::{Apng, MAX_FPS};
-use super::target::{Container, Movie, Place};
-use super::webp::{Length, WebP};
-use super::y4m::Y4m;
+use super::target::Place;
 use crate::console::Console;
 use crate::interrupt;
 use crate::outcome::Usage;
@@ -105,13 +102,13 @@ pub(super) fn encode(
     let failed = |source| error_at(place, source);
     let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place, container, limit)?);
     let mut frames = 0;
-    let (dropped, length) = {
-        let mut encoding = Encoding::begin(&mut out, container, movie).map_err(|error| error.at(place))?;
+    let Finished { dropped, length } = {
+        let mut encoding = Encoding::begin(&mut out, container, movie).map_err(|error| at(place, error))?;
         fill(&mut |frame, seconds| {
             frames += 1;
-            encoding.push(frame, seconds).map_err(|error| error.at(place))
+            encoding.push(frame, seconds).map_err(|error| at(place, error))
         })?;
-        encoding.finish().map_err(|error| error.at(place))?
+        encoding.finish().map_err(|error| at(place, error))?
     };
     let mut sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
     let bytes = sink.bytes;
@@ -146,79 +143,10 @@ pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, c
     }
 }
 
-enum Encoding<W: Write> {
-    Gif(Box<Encoder<W>>),
-    Apng(Box<Apng<W>>),
-    WebP(Box<WebP<W>>),
-    Y4m(Y4m<W>),
-}
-
-/// What a container says went wrong, wherever it was to go.
-enum Failure {
-    Write(io::Error),
-    Gif(rayfold_gif::Error),
-}
-
-impl<W: Write> Encoding<W> {
-    fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Failure> {
-        let Movie { size, fps, plays, last_delay_cs, exact, .. } = movie;
-        let settings = Settings { fps, plays, last_delay_cs, exact, ..Settings::default() };
-        Ok(match container {
-            Container::Gif => Self::Gif(Box::new(Encoder::new(out, settings)?)),
-            Container::Apng => Self::Apng(Box::new(Apng::new(out, movie)?)),
-            Container::Webp => Self::WebP(Box::new(WebP::new(out, movie)?)),
-            Container::Y4m => Self::Y4m(Y4m::new(out, size, fps)?),
-        })
-    }
-
-    fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> Result<(), Failure> {
-        match (self, seconds) {
-            (Self::Gif(encoder), None) => Ok(encoder.push(frame)?),
-            // The conversion saturates.
-            (Self::Gif(encoder), Some(seconds)) => {
-                Ok(encoder.push_for(frame, (100.0 * seconds).round() as u16)?)
-            }
-            (Self::Apng(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
-            (Self::WebP(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
-            (Self::Y4m(encoder), _) => Ok(encoder.push(&frame)?),
-        }
-    }
-
-    /// Returns how many frames were left out, and a length that is to be written where the file says it.
-    fn finish(self) -> Result<(u64, Option<Length>), Failure> {
-        Ok(match self {
-            Self::Gif(encoder) => (encoder.finish()?.dropped, None),
-            Self::Apng(encoder) => (encoder.finish()?, None),
-            Self::WebP(encoder) => {
-                let (dropped, length) = encoder.finish()?;
-                (dropped, Some(length))
-            }
-            Self::Y4m(encoder) => (encoder.finish().map(|()| 0)?, None),
-        })
-    }
-}
-
-impl From<io::Error> for Failure {
-    fn from(source: io::Error) -> Self {
-        Self::Write(source)
-    }
-}
-
-impl From<rayfold_gif::Error> for Failure {
-    fn from(error: rayfold_gif::Error) -> Self {
-        match error {
-            rayfold_gif::Error::Write { source, .. } => Self::Write(source),
-            other => Self::Gif(other),
-        }
-    }
-}
-
-impl Failure {
-    fn at(self, place: &Place) -> MovieError {
-        match self {
-            Self::Write(source) => error_at(place, source),
-            Self::Gif(error) => MovieError::Gif(error),
-        }
+fn at(place: &Place, error: rayfold_movie::Error) -> MovieError {
+    match error {
+        rayfold_movie::Error::Write(source) => error_at(place, source),
+        rayfold_movie::Error::Gif(error) => MovieError::Gif(error),
     }
 }
 

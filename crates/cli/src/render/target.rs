@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::ValueEnum;
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
 use rayfold_files::probe;
-use rayfold_gif::Plays;
+use rayfold_movie::Container;
 
 use crate::console::Console;
 use crate::outcome::Usage;
@@ -23,49 +22,11 @@ pub(crate) enum Target {
     Images(Pattern, Format),
 }
 
-/// The file format of an animation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Container {
-    Gif,
-    Apng,
-    Webp,
-    Y4m,
-}
-
-impl Container {
-    /// Returns the ending of its files.
-    pub(crate) fn ending(self) -> &'static str {
-        match self {
-            Self::Gif => "gif",
-            Self::Apng => "apng",
-            Self::Webp => "webp",
-            Self::Y4m => "y4m",
-        }
-    }
-}
-
 /// The destination of an animation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
     File(PathBuf),
     StandardOutput,
-}
-
-/// The properties of an animation that are known before its first frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Movie {
-    /// The columns and rows.
-    pub(crate) size: (u32, u32),
-    /// The number of frames, each counted as often as it is shown; `None` for a video that is read, where it is not
-    /// known.
-    pub(crate) frames: Option<u64>,
-    /// The frames per second.
-    pub(crate) fps: f64,
-    pub(crate) plays: Plays,
-    /// The duration of the last frame, if it differs from that of the others.
-    pub(crate) last_delay_cs: Option<u16>,
-    /// Whether a GIF keeps frames of at most 256 colours exactly, whatever that takes.
-    pub(crate) exact: bool,
 }
 
 /// The file format of a single image.

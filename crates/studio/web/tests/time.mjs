@@ -83,15 +83,18 @@ test("five objects from an empty page, two of them animated, without a number; t
   assert.equal((text.match(/\(smooth 1:[-\d.]+ 30:[-\d.]+\)/g) ?? []).length, 3, "a cone has two ends: " + text);
   assert.equal(text.split("\n").filter((line) => /^(Box|Sphere|Cone|Torus) /.test(line)).length, 5, text);
   await isDrawn(page, studio.path, 16);
-  await page.getByRole("button", { name: "Render GIF" }).click();
-  const [download] = await Promise.all([
-    page.waitForEvent("download", { timeout: 120_000 }),
-    page.getByRole("link", { name: /Download GIF/ }).click({ timeout: 120_000 }),
-  ]);
-  const expected = join(studio.folder, "expected.gif");
-  const run = spawnSync(program, ["render", studio.path, "-o", expected]);
-  assert.equal(run.status, 0, String(run.stderr));
-  assert.ok(readFileSync(await download.path()).equals(readFileSync(expected)), "the same bytes");
+  for (const format of ["GIF", "APNG", "WebP"]) {
+    if (format !== "GIF") await page.getByRole("button", { name: "More output" }).click();
+    await page.getByRole("button", { name: `Render ${format}` }).click();
+    const [download] = await Promise.all([
+      page.waitForEvent("download", { timeout: 120_000 }),
+      page.getByRole("link", { name: `Download ${format}` }).click({ timeout: 120_000 }),
+    ]);
+    const expected = join(studio.folder, `expected.${format.toLowerCase()}`);
+    const run = spawnSync(program, ["render", studio.path, "-o", expected]);
+    assert.equal(run.status, 0, String(run.stderr));
+    assert.ok(readFileSync(await download.path()).equals(readFileSync(expected)), `the same bytes of ${format}`);
+  }
   studio.check();
 });
 

@@ -9,8 +9,11 @@ import { Button } from "../parts/button";
 import { Icon } from "../parts/icon";
 import { remember, remembered } from "../parts/memory";
 import { visible } from "../parts/visible";
+import type { MovieFormat } from "../protocol";
 import { ask, canSubmit, connected, files, output, state } from "../store";
 import { filing } from "./file";
+
+const FORMATS: Readonly<Record<MovieFormat, string>> = { gif: "GIF", apng: "APNG", webp: "WebP" };
 
 const SAVED = { yes: "saved", soon: "saving", conflict: "not saved", failed: "cannot be saved" } as const;
 
@@ -78,9 +81,9 @@ function Result(): JSX.Element {
   return (
     <div class="result" role="group" aria-label="Output">
       {now?.is === "done" && (
-        <a class="button" href="animation.gif" download={`${state.value?.title.replace(/\.txt$/, "") ?? "animation"}.gif`}>
+        <a class="button" href="animation" download={`${state.value?.title.replace(/\.txt$/, "") ?? "animation"}.${now.format}`}>
           <Icon of={Download} />
-          Download GIF ({Math.max(1, Math.round(now.bytes / 1000))} kB)
+          Download {FORMATS[now.format]} ({Math.max(1, Math.round(now.bytes / 1000))} kB)
         </a>
       )}
       {now?.is === "failed" && <span class="failed">{visible(now.why)}</span>}
@@ -93,7 +96,7 @@ function Result(): JSX.Element {
           </button>
         </>
       ) : (
-        <button type="button" class="main" onClick={() => ask({ ask: "render" })}>
+        <button type="button" class="main" onClick={() => ask({ ask: "render", format: "gif" })}>
           Render GIF
         </button>
       )}
@@ -101,6 +104,17 @@ function Result(): JSX.Element {
         <Icon of={ChevronDown} />
       </button>
       <div id="more-output" class="menu" popover="auto">
+        {(["apng", "webp"] as const).map((format) => (
+          <button
+            key={format}
+            type="button"
+            disabled={now?.is === "running"}
+            title={`The animation without loss, as ${FORMATS[format]}`}
+            onClick={(event) => (ask({ ask: "render", format }), close(event))}
+          >
+            Render {FORMATS[format]}
+          </button>
+        ))}
         <a href={`frame.png?${frame}`} download={`frame${frame + 1}.png`} onClick={close} title="The shown frame, as PNG">
           Frame
         </a>

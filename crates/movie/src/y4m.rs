@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use image::RgbImage;
 
-use super::rate::fraction;
+use crate::rate::fraction;
 
 /// Parts that a fixed-point number has of 1.
 const ONE: i32 = 1 << 16;
@@ -20,7 +20,7 @@ const MATRIX: [([i32; 3], i32); 3] =
 
 /// Frames on their way.
 #[derive(Debug)]
-pub(super) struct Y4m<W> {
+pub(crate) struct Y4m<W> {
     out: W,
     planes: Vec<u8>,
 }
@@ -30,7 +30,7 @@ impl<W: Write> Y4m<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub(super) fn new(mut out: W, size: (u32, u32), fps: f64) -> io::Result<Self> {
+    pub(crate) fn new(mut out: W, size: (u32, u32), fps: f64) -> io::Result<Self> {
         let ((width, height), (frames, seconds)) = (size, fraction(fps));
         writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=LIMITED")?;
         Ok(Self { out, planes: Vec::new() })
@@ -40,7 +40,7 @@ impl<W: Write> Y4m<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub(super) fn push(&mut self, frame: &RgbImage) -> io::Result<()> {
+    pub(crate) fn push(&mut self, frame: &RgbImage) -> io::Result<()> {
         self.planes.clear();
         for row in &MATRIX {
             self.planes.extend(frame.pixels().map(|pixel| level(row, pixel.0)));
@@ -51,7 +51,7 @@ impl<W: Write> Y4m<W> {
 
     /// # Errors
     /// The writer's.
-    pub(super) fn finish(mut self) -> io::Result<()> {
+    pub(crate) fn finish(mut self) -> io::Result<()> {
         self.out.flush()
     }
 }

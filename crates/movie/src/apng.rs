@@ -6,8 +6,8 @@ use image::{GenericImageView, RgbImage};
 use png::{BitDepth, ColorType, Compression, EncodingError};
 use rayfold_gif::{Plays, Thinning};
 
-use super::rate::fraction;
-use super::target::Movie;
+use crate::Movie;
+use crate::rate::fraction;
 
 /// Parts of a second in which a frame's time is counted where a whole number of frames does not fill it: milliseconds, or
 /// hundredths where those have no room in the format's 16 bits.
@@ -15,10 +15,10 @@ const PARTS: [u16; 2] = [1_000, 100];
 
 /// The most frames a second that browsers show: they show a frame of 10 ms or less for 100 ms, and round down to whole
 /// milliseconds. With more, frames are left out as in a GIF.
-pub(super) const MAX_FPS: f64 = 90.0;
+pub const MAX_FPS: f64 = 90.0;
 
 /// Frames on their way.
-pub(super) struct Apng<W: Write> {
+pub(crate) struct Apng<W: Write> {
     file: png::Writer<W>,
     movie: Movie,
     thinning: Thinning,
@@ -31,7 +31,7 @@ pub(super) struct Apng<W: Write> {
 impl<W: Write> Apng<W> {
     /// # Errors
     /// The writer's, and when the animation is beyond what the format can hold.
-    pub(super) fn new(out: W, movie: Movie) -> io::Result<Self> {
+    pub(crate) fn new(out: W, movie: Movie) -> io::Result<Self> {
         let (width, height) = movie.size;
         let mut file = png::Encoder::new(out, width, height);
         file.set_color(ColorType::Rgb);
@@ -52,7 +52,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub(super) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    pub(crate) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
         if seconds.is_some() && self.movie.fps > MAX_FPS {
             let message =
                 format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
@@ -85,7 +85,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub(super) fn finish(mut self) -> io::Result<u64> {
+    pub(crate) fn finish(mut self) -> io::Result<u64> {
         if let Some(last) = self.thinning.finish() {
             self.write(last, None)?;
         }
@@ -122,7 +122,7 @@ fn in_parts(seconds: f64) -> (u16, u16) {
 }
 
 /// Column, row, width and height of what differs; a pixel if nothing does, because a frame must have one.
-pub(super) fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
+pub(crate) fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
     let differs = |x: u32, y: u32| last.get_pixel(x, y) != frame.get_pixel(x, y);
     let (width, height) = frame.dimensions();
     let rows: Vec<u32> = (0..height).filter(|&y| (0..width).any(|x| differs(x, y))).collect();

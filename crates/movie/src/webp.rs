@@ -9,8 +9,8 @@ use image::{GenericImageView, RgbImage};
 use image_webp::{ColorType, WebPEncoder};
 use rayfold_gif::{Plays, Thinning};
 
-use super::apng::{MAX_FPS, changed};
-use super::target::Movie;
+use crate::Movie;
+use crate::apng::{MAX_FPS, changed};
 
 /// The largest side of a picture in pixels.
 const LONGEST_SIDE: u32 = 16_384;
@@ -23,7 +23,7 @@ const ANIMATED: u8 = 1 << 1;
 const OVERWRITES: u8 = 1 << 1;
 
 /// An encoder of frames.
-pub(super) struct WebP<W: Write> {
+pub(crate) struct WebP<W: Write> {
     out: W,
     movie: Movie,
     thinning: Thinning,
@@ -43,12 +43,12 @@ struct Chunk {
 }
 
 /// The bytes that are to be written last, with their offset in the file.
-pub(super) type Length = (u64, [u8; 4]);
+pub type Length = (u64, [u8; 4]);
 
 impl<W: Write> WebP<W> {
     /// # Errors
     /// The writer's errors, and one when the animation exceeds the limits of the format.
-    pub(super) fn new(out: W, movie: Movie) -> io::Result<Self> {
+    pub(crate) fn new(out: W, movie: Movie) -> io::Result<Self> {
         let (width, height) = movie.size;
         if width.max(height) > LONGEST_SIDE {
             let message =
@@ -75,7 +75,7 @@ impl<W: Write> WebP<W> {
     ///
     /// # Errors
     /// The writer's errors.
-    pub(super) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    pub(crate) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
         if seconds.is_some() && self.movie.fps > MAX_FPS {
             let message =
                 format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
@@ -117,7 +117,7 @@ impl<W: Write> WebP<W> {
     ///
     /// # Errors
     /// The writer's errors, and one when the file is longer than the format allows.
-    pub(super) fn finish(mut self) -> io::Result<(u64, Length)> {
+    pub(crate) fn finish(mut self) -> io::Result<(u64, Length)> {
         if let Some(last) = self.thinning.finish() {
             self.add(last, None)?;
         }

@@ -1,0 +1,251 @@
+//! Ordered frames into one file of an animation: GIF, APNG, WebP or YUV4MPEG2.
+//!
+//! An [`Encoding`] takes the frames one by one and writes as it goes, so that memory does not grow with their number.
+//! `rayfold-gif` encodes GIFs; the other containers are here. Every program that writes animations uses this crate, so that
+//! the same frames give the same bytes everywhere.
+
+mod apng;
+mod rate;
+mod webp;
+mod y4m;
+
+use std::io::{self, Write};
+use std::str::FromStr;
+
+use image::RgbImage;
+pub use rayfold_gif::Plays;
+use rayfold_gif::{Encoder, Settings};
+
+use apng::Apng;
+pub use apng::MAX_FPS;
+pub use webp::Length;
+use webp::WebP;
+use y4m::Y4m;
+
+/// The file format of an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Container {
+    /// At most 256 colours a frame.
+    Gif,
+    /// Lossless; the number of frames must be known before the first.
+    Apng,
+    /// Lossless.
+    Webp,
+    /// Raw frames for video encoders.
+    Y4m,
+}
+
+impl Container {
+    /// All containers.
+    pub const ALL: [Self; 4] = [Self::Gif, Self::Apng, Self::Webp, Self::Y4m];
+
+    /// Returns the ending of its files, without a dot. [`FromStr`] is the inverse.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Gif => "gif",
+            Self::Apng => "apng",
+            Self::Webp => "webp",
+            Self::Y4m => "y4m",
+        }
+    }
+
+    /// Returns the media type of its files.
+    #[must_use]
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Self::Gif => "image/gif",
+            Self::Apng => "image/apng",
+            Self::Webp => "image/webp",
+            Self::Y4m => "video/x-yuv4mpeg2",
+        }
+    }
+}
+
+/// The error for a word that names no container.
+#[derive(Debug, thiserror::Error)]
+#[error("no container of animations: expected gif, apng, webp or y4m")]
+pub struct UnknownContainer;
+
+impl FromStr for Container {
+    type Err = UnknownContainer;
+
+    fn from_str(word: &str) -> Result<Self, UnknownContainer> {
+        Self::ALL.into_iter().find(|container| container.ending() == word).ok_or(UnknownContainer)
+    }
+}
+
+/// The properties of an animation that are known before its first frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Movie {
+    /// The columns and rows.
+    pub size: (u32, u32),
+    /// The number of frames, each counted as often as it is shown; `None` for a video that is read, where it is not
+    /// known.
+    pub frames: Option<u64>,
+    /// The frames per second.
+    pub fps: f64,
+    /// How often it is shown.
+    pub plays: Plays,
+    /// The duration of the last frame in hundredths of a second, if it differs from that of the others.
+    pub last_delay_cs: Option<u16>,
+    /// Whether a GIF keeps frames of at most 256 colours exactly, whatever that takes.
+    pub exact: bool,
+}
+
+/// The error of an [`Encoding`].
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The writer's error, or the frames are beyond the limits of the container.
+    #[error(transparent)]
+    Write(#[from] io::Error),
+    /// The GIF encoder's error, other than the writer's.
+    #[error(transparent)]
+    Gif(rayfold_gif::Error),
+}
+
+impl From<rayfold_gif::Error> for Error {
+    fn from(error: rayfold_gif::Error) -> Self {
+        match error {
+            rayfold_gif::Error::Write { source, .. } => Self::Write(source),
+            other => Self::Gif(other),
+        }
+    }
+}
+
+/// The end of an [`Encoding`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Finished {
+    /// The number of frames that were left out because players of the container have no time for them.
+    pub dropped: u64,
+    /// The bytes that are still to be written over others at the start of the file; only a WebP has them.
+    pub length: Option<Length>,
+}
+
+/// Frames on their way into a file.
+pub struct Encoding<W: Write>(Kind<W>);
+
+enum Kind<W: Write> {
+    Gif(Box<Encoder<W>>),
+    Apng(Box<Apng<W>>),
+    Webp(Box<WebP<W>>),
+    Y4m(Y4m<W>),
+}
+
+impl<W: Write> std::fmt::Debug for Encoding<W> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Encoding").finish_non_exhaustive()
+    }
+}
+
+impl<W: Write> Encoding<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Fails if the writer does, or if the animation is beyond the limits of the container.
+    pub fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Error> {
+        let Movie { size, fps, plays, last_delay_cs, exact, .. } = movie;
+        let settings = Settings { fps, plays, last_delay_cs, exact, ..Settings::default() };
+        Ok(Self(match container {
+            Container::Gif => Kind::Gif(Box::new(Encoder::new(out, settings)?)),
+            Container::Apng => Kind::Apng(Box::new(Apng::new(out, movie)?)),
+            Container::Webp => Kind::Webp(Box::new(WebP::new(out, movie)?)),
+            Container::Y4m => Kind::Y4m(Y4m::new(out, size, fps)?),
+        }))
+    }
+
+    /// Takes the next frame, and its duration in seconds if that differs from that of the others. A [`Container::Y4m`]
+    /// has no durations and ignores them.
+    ///
+    /// # Errors
+    /// Fails if the writer does, or if the frame is beyond the limits of the container.
+    pub fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> Result<(), Error> {
+        match (&mut self.0, seconds) {
+            (Kind::Gif(encoder), None) => Ok(encoder.push(frame)?),
+            // The conversion saturates.
+            (Kind::Gif(encoder), Some(seconds)) => {
+                Ok(encoder.push_for(frame, (100.0 * seconds).round() as u16)?)
+            }
+            (Kind::Apng(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
+            (Kind::Webp(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
+            (Kind::Y4m(encoder), _) => Ok(encoder.push(&frame)?),
+        }
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// Fails if the writer does, or if the file is beyond the limits of the container.
+    pub fn finish(self) -> Result<Finished, Error> {
+        let (dropped, length) = match self.0 {
+            Kind::Gif(encoder) => (encoder.finish()?.dropped, None),
+            Kind::Apng(encoder) => (encoder.finish()?, None),
+            Kind::Webp(encoder) => {
+                let (dropped, length) = encoder.finish()?;
+                (dropped, Some(length))
+            }
+            Kind::Y4m(encoder) => (encoder.finish().map(|()| 0)?, None),
+        };
+        Ok(Finished { dropped, length })
+    }
+}
+
+/// Encodes frames that are all at hand into memory.
+///
+/// # Errors
+/// Fails if the frames are beyond the limits of the container.
+pub fn to_bytes(
+    container: Container,
+    movie: Movie,
+    frames: impl IntoIterator<Item = (RgbImage, Option<f64>)>,
+) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    let mut encoding = Encoding::begin(&mut bytes, container, movie)?;
+    for (frame, seconds) in frames {
+        encoding.push(frame, seconds)?;
+    }
+    if let Some((at, length)) = encoding.finish()?.length {
+        bytes[at as usize..][..length.len()].copy_from_slice(&length);
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_container_is_named_by_its_ending() {
+        for container in Container::ALL {
+            assert_eq!(container.ending().parse::<Container>().unwrap(), container);
+        }
+        assert!("mp4".parse::<Container>().is_err());
+    }
+
+    #[test]
+    fn every_container_is_whole_in_memory() {
+        let frames = (0..3).map(|k| (RgbImage::from_pixel(6, 4, image::Rgb([40 * k, 9, 200])), None));
+        let movie = Movie {
+            size: (6, 4),
+            frames: Some(3),
+            fps: 10.0,
+            plays: Plays::Endless,
+            last_delay_cs: None,
+            exact: false,
+        };
+        for container in Container::ALL {
+            let bytes = to_bytes(container, movie, frames.clone()).unwrap();
+            let start: &[u8] = match container {
+                Container::Gif => b"GIF89a",
+                Container::Apng => b"\x89PNG",
+                Container::Webp => b"RIFF",
+                Container::Y4m => b"YUV4MPEG2",
+            };
+            assert!(bytes.starts_with(start), "{container:?}");
+            if container == Container::Webp {
+                let length = u32::from_le_bytes(bytes[4..8].try_into().unwrap());
+                assert_eq!(length as usize + 8, bytes.len());
+            }
+        }
+    }
+}
