@@ -1,7 +1,7 @@
 //! The studio's page in a real browser with the real program: runs `crates/studio/web/tests`.
 //!
 //! The test needs Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). If one of them is missing,
-//! a line reports that the page was not tested. Nothing is installed here.
+//! a line reports that the page was not tested; likewise for Firefox. Nothing is installed here.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,12 @@ const TESTS: [&str; 9] = [
     "tests/time.mjs",
 ];
 
-/// The names of the browser, in the order in which they are tried.
-const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+/// The tests that drive Firefox.
+const IN_FIREFOX: &str = "tests/firefox.mjs";
+
+/// The names of the browsers, in the order in which they are tried.
+const CHROMIUM: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 
 /// The first version of Node with all features that the tests use.
 const NODE: u32 = 20;
@@ -42,6 +46,13 @@ fn the_page_does_in_a_browser_what_it_promises() {
     let mut node = Command::new("node");
     // One after the other, because each uses all cores.
     node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
+    match found(&FIREFOX) {
+        Ok(firefox) => drop(node.arg(IN_FIREFOX).env("FIREFOX", firefox)),
+        Err(missing) => {
+            writeln!(std::io::stderr(), "studio: the page was NOT TESTED in Firefox: {missing}")
+                .expect("standard error");
+        }
+    }
     if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
         // The functions were built with this test. Without them `rayfold dev` builds them itself.
         node.env("RAYFOLD_FUNCTIONS", beside);
@@ -62,9 +73,14 @@ fn tools(web: &Path) -> Result<PathBuf, String> {
     if !web.join("node_modules/playwright-core").exists() {
         return Err("its packages are not installed: `npm ci` in crates/studio/web".into());
     }
+    found(&CHROMIUM)
+}
+
+/// Returns the program on the PATH, or the missing names.
+fn found(names: &[&str]) -> Result<PathBuf, String> {
     let paths = std::env::var_os("PATH").unwrap_or_default();
     let found = std::env::split_paths(&paths)
-        .flat_map(|folder| BROWSERS.map(|name| folder.join(name)))
+        .flat_map(|folder| names.iter().map(move |name| folder.join(name)))
         .find(|path| path.is_file());
-    found.ok_or_else(|| format!("there is none of {}", BROWSERS.join(", ")))
+    found.ok_or_else(|| format!("there is none of {}", names.join(", ")))
 }

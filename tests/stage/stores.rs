@@ -1,4 +1,5 @@
-//! Selects the S3 servers for the tests: always the built-in one, and each other one that is found.
+//! Selects the S3 servers for the tests: always the built-in one, and each other one that is found. `RAYFOLD_STORE` names
+//! the only one.
 //!
 //! Each test program prints its servers once, on standard error, so that the test runner does not capture the line. A
 //! store that was not tested must not look like a success.
@@ -8,17 +9,28 @@ use std::sync::OnceLock;
 
 use rayfold_local::StoreKind;
 
-/// Returns the built-in one and those that are found. Installs nothing.
+/// Names the only server for the tests, as the flag `--store` does.
+const ONLY: &str = "RAYFOLD_STORE";
+
+/// Returns the built-in one and those that are found. Installs nothing. A server that is named must be there.
 fn stores() -> &'static [StoreKind] {
     static STORES: OnceLock<Vec<StoreKind>> = OnceLock::new();
     STORES.get_or_init(|| {
         let mut stores = Vec::new();
         // The printing macros are captured, and their output is shown only for failed tests.
         let say = |line: String| drop(writeln!(std::io::stderr(), "{line}"));
-        for kind in StoreKind::ALL {
+        let only = std::env::var(ONLY).ok();
+        let is_named = |kind: &StoreKind| only.as_ref().is_none_or(|name| *name == kind.name());
+        assert!(
+            StoreKind::ALL.iter().any(is_named),
+            "{ONLY}={}: there is no such store",
+            only.unwrap_or_default()
+        );
+        for kind in StoreKind::ALL.into_iter().filter(is_named) {
             match kind.program().map(|program| program.find()) {
                 None => say(format!("these tests run on {kind}")),
                 Some(Ok(binary)) => say(format!("these tests run on {kind} ({})", binary.display())),
+                Some(Err(why)) if only.is_some() => panic!("{kind}: {why}"),
                 Some(Err(why)) => {
                     say(format!("NOT RUN: these tests on {kind}: {why}"));
                     continue;

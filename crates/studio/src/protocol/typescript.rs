@@ -137,6 +137,7 @@ fn written() -> String {
         Ghost,
         FaultState,
         OutputState,
+        MovieFormat,
         Saved,
         Alignment,
         HandleKind,

@@ -10,7 +10,7 @@ upright: boolean,
 /** Move in steps of a grid. */
 snap: boolean, 
 /** Move curves as a whole, in all frames. */
-whole: boolean, } | { "ask": "release" } | { "ask": "navigate", how: Navigation, x: number, y: number, } | { "ask": "look", at: ViewPreset, } | { "ask": "keep-camera" } | { "ask": "set", line: number, first: number, values: ReadonlyArray<number>, gesture: number | null, } | { "ask": "edit", file: number, version: number, changes: ReadonlyArray<TextChange>, } | { "ask": "remove", lines: ReadonlyArray<number>, } | { "ask": "duplicate", lines: ReadonlyArray<number>, } | { "ask": "reorder", line: number, down: boolean, } | { "ask": "rename", line: number, name: string, } | { "ask": "hide", lines: ReadonlyArray<number>, } | { "ask": "drop", lines: ReadonlyArray<number>, } | { "ask": "ground", lines: ReadonlyArray<number>, } | { "ask": "lock", lines: ReadonlyArray<number>, } | { "ask": "paste", text: string, } | { "ask": "align", lines: ReadonlyArray<number>, axis: number, how: Alignment, } | { "ask": "box", from: readonly [number, number], to: readonly [number, number], extend: boolean, } | { "ask": "group", lines: ReadonlyArray<number>, } | { "ask": "ungroup", line: number, } | { "ask": "surface", lines: ReadonlyArray<number>, material: string, } | { "ask": "preset", lines: ReadonlyArray<number>, preset: string, } | { "ask": "paint", at: readonly [number, number], material: string, preset: boolean, } | { "ask": "clause", line: number, clause: string, } | { "ask": "word", line: number, number: number, word: string, } | { "ask": "camera", command: string, } | { "ask": "time", wish: TimelineEdit, } | { "ask": "nudge", lines: ReadonlyArray<number>, by: readonly [number, number, number], } | { "ask": "add", command: string, at: readonly [number, number] | null, } | { "ask": "undo" } | { "ask": "redo" } | { "ask": "resolve", "keep-mine": boolean, } | { "ask": "load", from: Source, new: string | null, } | { "ask": "render" } | { "ask": "cancel" };
+whole: boolean, } | { "ask": "release" } | { "ask": "navigate", how: Navigation, x: number, y: number, } | { "ask": "look", at: ViewPreset, } | { "ask": "keep-camera" } | { "ask": "set", line: number, first: number, values: ReadonlyArray<number>, gesture: number | null, } | { "ask": "edit", file: number, version: number, changes: ReadonlyArray<TextChange>, } | { "ask": "remove", lines: ReadonlyArray<number>, } | { "ask": "duplicate", lines: ReadonlyArray<number>, } | { "ask": "reorder", line: number, down: boolean, } | { "ask": "rename", line: number, name: string, } | { "ask": "hide", lines: ReadonlyArray<number>, } | { "ask": "drop", lines: ReadonlyArray<number>, } | { "ask": "ground", lines: ReadonlyArray<number>, } | { "ask": "lock", lines: ReadonlyArray<number>, } | { "ask": "paste", text: string, } | { "ask": "align", lines: ReadonlyArray<number>, axis: number, how: Alignment, } | { "ask": "box", from: readonly [number, number], to: readonly [number, number], extend: boolean, } | { "ask": "group", lines: ReadonlyArray<number>, } | { "ask": "ungroup", line: number, } | { "ask": "surface", lines: ReadonlyArray<number>, material: string, } | { "ask": "preset", lines: ReadonlyArray<number>, preset: string, } | { "ask": "paint", at: readonly [number, number], material: string, preset: boolean, } | { "ask": "clause", line: number, clause: string, } | { "ask": "word", line: number, number: number, word: string, } | { "ask": "camera", command: string, } | { "ask": "time", wish: TimelineEdit, } | { "ask": "nudge", lines: ReadonlyArray<number>, by: readonly [number, number, number], } | { "ask": "add", command: string, at: readonly [number, number] | null, } | { "ask": "undo" } | { "ask": "redo" } | { "ask": "resolve", "keep-mine": boolean, } | { "ask": "load", from: Source, new: string | null, } | { "ask": "render", format: MovieFormat, } | { "ask": "cancel" };
 
 /** The source of a whole text. */
 export type Source = { "what": "empty" } | { "what": "example", name: string, } | { "what": "text", text: string, } | { "what": "shown" };
@@ -88,7 +88,7 @@ hoverOutline?: string,
 ghosts?: ReadonlyArray<Ghost>, 
 /** The numbers that change. */
 tracks?: Tracks, 
-/** The state of the GIF. */
+/** The state of the rendered animation. */
 output?: OutputState, 
 /** A message for the user. */
 notice?: string, };
@@ -253,9 +253,12 @@ done: number,
 /** The number of all frames. */
 of: number, } | { "is": "done", 
 /** The size of the file. */
-bytes: number, } | { "is": "cancelled" } | { "is": "failed", 
+bytes: number, format: MovieFormat, } | { "is": "cancelled" } | { "is": "failed", 
 /** The reason of the failure. */
 why: string, };
+
+/** The file format of a rendered animation. */
+export type MovieFormat = "gif" | "apng" | "webp";
 
 /** Whether a file on disk has the shown content. */
 export type Saved = "yes" | "soon" | "conflict" | "failed";
