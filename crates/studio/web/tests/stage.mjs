@@ -63,7 +63,7 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   };
   const saved = async () => {
     await page.waitForTimeout(300);
-    await page.getByText("saved", { exact: true }).waitFor();
+    await page.getByText("saved", { exact: true }).waitFor({ timeout: 60_000 });
     return readFileSync(path, "utf8");
   };
   const check = () => {
