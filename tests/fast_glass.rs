@@ -16,8 +16,8 @@ use glam::{DMat3, DVec3};
 use image::Rgb;
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Camera, Coefficients, Cuboid, Depth, DirectionalLight, Instance, Lamp, Light, Look, Material, Object,
-    Placement, Plane, Scene, Screen, Sphere, Triangle,
+    Camera, Coefficients, Cuboid, Depth, DirectionalLight, Fog, Instance, Lamp, Light, Look, Material,
+    Object, Placement, Plane, Scene, Screen, Sphere, Triangle,
 };
 use rayfold_tracer::probe::nearest_hits;
 use rayfold_tracer::{RenderError, RenderOptions, reference, render};
@@ -72,6 +72,21 @@ fn glass_of_all_shapes_is_the_references() {
     let mut scenes: Vec<Scene> = vec![];
     for count in [1, 1, 2, 2, 4, 8, 16] {
         scenes.extend([(); 3].map(|()| dice.glass_scene(count)));
+    }
+    hold(&scenes);
+}
+
+#[test]
+fn glass_in_fog_is_the_references() {
+    let mut dice = Dice::new("glass in fog", SEED);
+    let mut scenes: Vec<Scene> = vec![];
+    for count in [1, 2, 4, 8] {
+        scenes.extend([(); 3].map(|()| {
+            let mut scene = dice.glass_scene(count);
+            let unit = if scene.camera == Camera::Orthographic { 12.0 } else { 1.0 };
+            scene.fog = Fog::new(dice.color(), unit * dice.within(1.0, 20.0)).unwrap();
+            scene
+        }));
     }
     hold(&scenes);
 }

@@ -11,7 +11,8 @@ mod hold;
 use glam::DVec3;
 use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Camera, Cone, Cylinder, Disc, Lamp, Lens, Light, Look, Material, Object, Plane, Samples, Scene, Torus,
+    Camera, Cone, Cylinder, Disc, Fog, Lamp, Lens, Light, Look, Material, Object, Plane, Samples, Scene,
+    Torus,
 };
 use rayfold_tracer::{Precision, RenderOptions, reference};
 
@@ -202,6 +203,73 @@ fn highlights_and_patterns_are_the_references() {
         }));
     }
     hold(&scenes);
+}
+
+#[test]
+fn fog_is_the_references() {
+    let mut dice = Dice::new("fog", SEED);
+    let mut scenes: Vec<Scene> = vec![];
+    for count in [0, 1, 6, 30, 90] {
+        scenes.extend([(); 3].map(|()| {
+            let objects = (0..count)
+                .map(|_| match dice.0.u8(0..3) {
+                    0 => dice.object(),
+                    1 => dice.body(6),
+                    _ => {
+                        let material = dice.finished();
+                        dice.any(material)
+                    }
+                })
+                .collect();
+            let mut scene = dice.scene(objects);
+            if dice.0.bool() {
+                dice.add_lamps(&mut scene);
+            }
+            let unit = if scene.camera == Camera::Orthographic { 12.0 } else { 1.0 };
+            scene.fog = Fog::new(1.5 * dice.color() - 0.2, unit * dice.within(0.5, 20.0)).unwrap();
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+#[test]
+fn fog_mixes_in_by_the_length_of_each_ray() {
+    let view = "Screen 1 1\nDepth 2\nLook 0 0 4  0 0 0  10";
+    let color = |objects: &str| {
+        let scene = scripted(view, objects);
+        let drawn = draw(&scene, RenderOptions::default());
+        assert_eq!(drawn, reference::render(&scene, &RenderOptions::default()).unwrap(), "{objects}");
+        (reference::color(&scene, 0, 0), drawn.get_pixel(0, 0).0)
+    };
+    let near = |found: (DVec3, [u8; 3]), expected: f64| {
+        assert!((found.0.x - expected).abs() < 1e-12, "{found:?} {expected}");
+        assert_eq!(found.1[0], (255.0 * expected.clamp(0.0, 1.0)).round() as u8);
+    };
+    let disc = "Disc 1  0 0 0  0 0 1  .2 .2 .2  0 0 0";
+    let clear = (-4f64 / 8.0).exp();
+    near(color(&format!("Fog 1 1 1 8\n{disc}")), clear * 0.2 + 1.0 - clear);
+    // What hits nothing is all fog, which hides the background.
+    near(color("Fog .6 .6 .6 8\nBackground 0 1 0  1 0 0"), 0.6);
+    near(color("Background .3 0 0\nFog .6 .6 .6 8\nFog none"), 0.3);
+    // A mirror: fog on the way to it, and on the way from it to what is 6 away.
+    let mirror = "Disc 1  0 0 0  0 0 1  0 0 0  0 0 0  .5 .5 .5\nDisc 9  0 0 6  0 0 1  .8 .8 .8  0 0 0";
+    let beyond = (-6f64 / 8.0).exp();
+    near(color(&format!("Fog 1 1 1 8\n{mirror}")), clear * 0.5 * (beyond * 0.8 + 1.0 - beyond) + 1.0 - clear);
+    // Beyond the depth all is black, fog too.
+    near(color(&format!("Depth 0\nFog 1 1 1 8\n{mirror}")), 1.0 - clear);
+    // Glass: in front of it, within it and behind it.
+    let glass =
+        "Material pane  glass .5 .5 .5 1\nBox -1 -1 -2  1 1 0  pane\nDisc 9  0 0 -5  0 0 1  .8 .8 .8  0 0 0";
+    let (within, behind) = ((-2f64 / 8.0).exp(), (-3f64 / 8.0).exp());
+    let last = behind * 0.8 + 1.0 - behind;
+    near(
+        color(&format!("Fog 1 1 1 8\n{glass}")),
+        clear * 0.5 * (within * 0.5 * last + 1.0 - within) + 1.0 - clear,
+    );
+    // Light comes through fog undimmed, also from a lamp.
+    let lit = "Plight 1 1 1  0 0 3.9\nDisc 1  0 0 0  0 0 1  0 0 0  .5 .5 .5";
+    near(color(&format!("Fog 0 0 0 8\n{lit}")), clear * 0.5);
 }
 
 const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0 0 9  0 0 0  50\nBackground 0.1 0.2 0.3  0.5 0.7 0.9\n\

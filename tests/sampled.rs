@@ -62,6 +62,10 @@ fn effects(size: &str) -> Vec<(&'static str, String)> {
         ("bodies", table(size, &format!("{dark}{bodies}"), WIDE_SUN)),
         ("glass", table(size, glass, WIDE_SUN)),
         ("glass before a lamp", table(size, &format!("Lens .1 8\nShutter .7\n{dark}{bodies}{glass}"), LAMP)),
+        (
+            "fog",
+            table(size, &format!("Shutter .7\nFog 1.2 (1:.8 3:.2) -.1 9\n{dark}{bodies}{glass}"), WIDE_SUN),
+        ),
         ("many", table(size, &many, WIDE_SUN)),
         ("many, seen by a lens", table(size, &format!("Lens .1 8\n{many}"), LAMP)),
         ("all", table(size, &all, WIDE_SUN)),

@@ -7,8 +7,8 @@ use std::fmt;
 
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Camera, Depth, DirectionalLight, Faults, FrameNumbers, Lamp, Lens, Light, Look, MATERIAL,
-    ORTHOCAMERA, Object, Pinhole, Samples, Screen, Shutter, Tone, USE, shapes, with_shapes,
+    Background, Camera, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Lamp, Lens, Light, Look,
+    MATERIAL, ORTHOCAMERA, Object, Pinhole, Samples, Screen, Shutter, Tone, USE, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -18,6 +18,8 @@ pub(crate) enum Effect {
     Camera(Reader<Camera>),
     /// Sets the colour of rays that hit nothing.
     Background,
+    /// Sets the fog.
+    Fog,
     Lens,
     /// Sets the number of rays per pixel.
     Samples,
@@ -108,6 +110,7 @@ with_shapes! { commands! {
         Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
         Lens: Lens::FORM, Effect::Lens, "A lens that is in focus at one distance.";
         Background: Background::FORM, Effect::Background, "The colour of rays that hit nothing.";
+        Fog: Fog::FORM, Effect::Fog, "The colour that rays take on over their length.";
         Samples: Samples::FORM, Effect::Samples, "The number of rays per pixel.";
         Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
         Tone: Tone::FORM, Effect::Tone, "The conversion of colours to levels.";

@@ -55,6 +55,9 @@ pub struct CommandEntry {
     /// The first number that the name of a material may replace, together with all that follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material_instead_from: Option<&'static str>,
+    /// A word that may stand in place of all numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub word_instead: Option<&'static str>,
     /// The kind of the name after the numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ends_with: Option<&'static str>,
@@ -145,6 +148,7 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
         together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
+        word_instead: form.word,
         ends_with: form.ends_with.map(Names::noun),
     }
 }

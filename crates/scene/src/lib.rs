@@ -33,16 +33,16 @@ mod shown;
 pub use command::Command;
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values};
+pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values, color_levels};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::shapes::{
     Cone, Cuboid, Cylinder, Disc, Instance, Motion, Object, Placement, Plane, Sphere, Torus, Triangle,
 };
 pub use model::{
-    Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Glass, InvalidValue, Lamp,
-    Lens, Light, Look, Material, Parameter, Pattern, Pinhole, Samples, Scene, Screen, Shine, Shutter, Tone,
-    Weight,
+    Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, InvalidValue,
+    Lamp, Lens, Light, Look, Material, Parameter, Pattern, Pinhole, Samples, Scene, Screen, Shine, Shutter,
+    Tone, Weight,
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;

@@ -8,13 +8,15 @@ use std::sync::Arc;
 use crate::command::MAX_NUMBERS;
 use crate::curve::Curve;
 use crate::form::{Constraint, Form, Presence, Values, write_number};
-use crate::model::PARALLEL;
+use crate::model::{PARALLEL, Tone};
 
 /// A number of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Number {
     Constant(f64),
-    Animated(Curve),
+    Animated(Box<Curve>),
+    /// A channel of a colour that is written as `#rrggbb`. Such a colour is three of these.
+    Level(u8),
 }
 
 /// The numbers of a line, shared by all users.
@@ -34,19 +36,25 @@ impl Row {
         self.0.len()
     }
 
+    /// Returns whether no number is a curve.
     pub(crate) fn is_constant(&self) -> bool {
-        self.0.iter().all(|number| matches!(number, Number::Constant(_)))
+        !self.0.iter().any(|number| matches!(number, Number::Animated(_)))
+    }
+
+    /// Returns whether the numbers depend on the tone of the picture.
+    pub(crate) fn depends_on_tone(&self) -> bool {
+        self.0.iter().any(|number| matches!(number, Number::Level(_)))
     }
 
     pub(crate) fn numbers(&self) -> &[Number] {
         &self.0
     }
 
-    /// Returns the values at a time; 0 for omitted ones.
-    pub(crate) fn at(&self, frame: f64) -> [f64; MAX_NUMBERS] {
+    /// Returns the values at a time, for a picture of this tone; 0 for omitted ones.
+    pub(crate) fn at(&self, frame: f64, tone: Tone) -> [f64; MAX_NUMBERS] {
         let mut values = [0.0; MAX_NUMBERS];
         for (value, number) in values.iter_mut().zip(self.0.iter()) {
-            *value = number.at(frame);
+            *value = number.at(frame, tone);
         }
         values
     }
@@ -56,6 +64,7 @@ impl Row {
         self.0.get(i).map(|number| match number {
             Number::Constant(value) => value.abs(),
             Number::Animated(curve) => curve.largest(),
+            Number::Level(level) => Tone::Plain.light(*level),
         })
     }
 
@@ -67,6 +76,10 @@ impl Row {
             *range = match number {
                 Number::Constant(value) => (*value, *value),
                 Number::Animated(curve) => curve.range(from, to, work),
+                Number::Level(level) => {
+                    let light = Tone::Plain.light(*level);
+                    (light, light)
+                }
             };
         }
         let field = |i: usize| &ranges[form.span(i)];
@@ -95,18 +108,26 @@ impl Row {
                 is_left_out || provably_cross(&gaze, field(up))
             }
             Constraint::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
-            Constraint::NotBothZero(a, b) => field(a)[0].0 > 0.0 || field(b)[0].0 > 0.0,
             Constraint::InOrder(a, b) => field(a)[0].1 <= field(b)[0].0,
         }
     }
 
     /// Writes the numbers as in a line, each after a space. Numbers that represent words are written as words.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        // The number of channels so far of a colour.
+        let mut channels = 0;
         for number in self.0.iter() {
-            f.write_str(" ")?;
             match number {
-                Number::Constant(value) => write_number(f, *value)?,
-                Number::Animated(curve) => write!(f, "{curve}")?,
+                Number::Constant(value) => {
+                    f.write_str(" ")?;
+                    write_number(f, *value)?;
+                }
+                Number::Animated(curve) => write!(f, " {curve}")?,
+                Number::Level(level) => {
+                    f.write_str(if channels == 0 { " #" } else { "" })?;
+                    write!(f, "{level:02x}")?;
+                    channels = (channels + 1) % 3;
+                }
             }
         }
         Ok(())
@@ -114,10 +135,11 @@ impl Row {
 }
 
 impl Number {
-    pub(crate) fn at(&self, frame: f64) -> f64 {
+    pub(crate) fn at(&self, frame: f64, tone: Tone) -> f64 {
         match self {
             Self::Constant(value) => *value,
             Self::Animated(curve) => curve.at(frame),
+            Self::Level(level) => tone.light(*level),
         }
     }
 }

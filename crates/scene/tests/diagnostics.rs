@@ -285,19 +285,17 @@ fn a_radius_of_nothing() {
     check(
         "Screen 4 3\nSphere 0 0 0 -5 1 0 0 0 0 0\nSphere -1, 0 0 -5, 1 0 0, 0 0 0\nTrace",
         expect![[r#"
-            error: the radius must be greater than zero
+            warning: nothing is drawn: the radius is 0
              --> a.txt:2:8
               |
             2 | Sphere 0 0 0 -5 1 0 0 0 0 0
-              |        ^ expected a number greater than 0
-              |
-              = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
+              |        ^ expected a number greater than 0, or a curve that is not always 0
 
-            error: the radius must be greater than zero
+            error: the radius must not be negative
              --> a.txt:3:8
               |
             3 | Sphere -1, 0 0 -5, 1 0 0, 0 0 0
-              |        ^^ expected a number greater than 0"#]],
+              |        ^^ expected a number from 0"#]],
     );
 }
 

@@ -11,6 +11,7 @@ fn sample(command: Command) -> &'static str {
         Command::Look => "Look 1 2 3 4 5 -6 40 .3 .5 .1",
         Command::Lens => "Lens .1 5",
         Command::Background => "Background .1 .2 .3 .4 .5 .6",
+        Command::Fog => "Fog .1 .2 .3 4",
         Command::Samples => "Samples 16 .5",
         Command::Shutter => "Shutter .5",
         Command::Tone => "Tone srgb",

@@ -93,8 +93,24 @@ fn numbers(form: &Form, draft: &Draft) -> String {
     let count = counts[counts.len() - 1 - draft.left_out % counts.len()];
     assert!((least..=most).contains(&count));
     let mut text = String::new();
-    for ((_, field), number) in form.numbers().zip(&draft.numbers).take(count) {
+    // The number of numbers that the last colour of digits still stands for.
+    let (mut covered, mut is_behind_color) = (0, false);
+    for (i, ((_, field), number)) in form.numbers().zip(&draft.numbers).take(count).enumerate() {
         let fit = |x: f64| fitting(field.values, x);
+        if covered > 0 {
+            covered -= 1;
+            continue;
+        }
+        if let Number::Constant(x) = number
+            && draft.name % 2 == 0
+            && i + 3 <= count
+            && form.takes_color(i, is_behind_color)
+        {
+            text += &format!(" #{:06x}", x.to_bits() >> 40);
+            (covered, is_behind_color) = (2, true);
+            continue;
+        }
+        is_behind_color = false;
         text += " ";
         match (number, field.values) {
             (Number::Constant(x), Values::OneOf(words)) => text += words[fit(*x) as usize],

@@ -1,7 +1,9 @@
 //! Edits of a script that affect more than one number: new objects, copies, hidden lines. Lines in, splices out.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Field, Kind, Object, Parameter, Presence, Values as Range, parse_curve};
+use rayfold_scene::{
+    Command, Field, Kind, Object, Parameter, Presence, Values as Range, color_levels, parse_curve,
+};
 
 use crate::document::Splice;
 use crate::extent;
@@ -94,6 +96,7 @@ pub(crate) fn new_setting(command: Command) -> Line {
         (_, Range::OneOf(words)) => words.last().copied().unwrap_or_default().to_owned(),
         (Parameter::Samples, _) => "16".to_owned(),
         (Parameter::Depth, _) => "8".to_owned(),
+        (Parameter::FogDistance, _) => "20".to_owned(),
         (_, Range::Whole(least, _)) => least.max(1).to_string(),
         (_, Range::Share) => "0.5".to_owned(),
         _ if field.kind == Kind::Color => "0.86 0.9 0.95".to_owned(),
@@ -195,7 +198,10 @@ pub(crate) fn hidden(line: &Line) -> Option<Line> {
     let command = inner.command()?;
     let words = inner.words()?;
     let form = command.form();
-    let is_number = |word| inner.number(word).is_some() || parse_curve(inner.word(word)).is_some();
+    let is_number = |word| {
+        let text = inner.word(word);
+        inner.number(word).is_some() || parse_curve(text).is_some() || color_levels(text.as_bytes()).is_some()
+    };
     let is_named = form.surface().is_some_and(|at| {
         words.parameters.len() == at + 1 && words.parameters.last().is_some_and(|word| !is_number(word))
     });

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use rayfold_scene::Command;
+use rayfold_scene::{Command, color_levels};
 
 /// A line with its end: a line feed, with or without a carriage return, or nothing at the end of a text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub struct Words {
     pub command: Range<usize>,
     /// The name of a group or material before the parameters.
     pub subject: Option<Range<usize>>,
-    /// The parameters. A curve in brackets is one.
+    /// The parameters. A curve in brackets is one, and a colour such as `#ff8000` three with the same span.
     pub parameters: Vec<Range<usize>>,
     /// The comment, from its sign to the end of the text.
     pub comment: Option<Range<usize>>,
@@ -83,20 +83,28 @@ impl Line {
     pub fn words(&self) -> Option<Words> {
         let body = self.body();
         let start = if body.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        let comment = body.iter().position(|&byte| byte == b'#');
-        let code = comment.unwrap_or(body.len());
+        let mut comment = None;
         let mut words = Vec::new();
         let mut at = start;
-        while at < code {
+        while at < body.len() {
             if is_separator(body[at]) {
                 at += 1;
                 continue;
             }
             let from = at;
-            if body[at] == b'(' {
+            if body[at] == b'#' {
+                if color_levels(&body[at..]).is_none() || !self.takes_color(&words) {
+                    comment = Some(at);
+                    break;
+                }
+                at += "#rrggbb".len();
+                words.extend([from..at, from..at]);
+            } else if body[at] == b'(' {
+                let code =
+                    body[at..].iter().position(|&byte| byte == b'#').map_or(body.len(), |end| at + end);
                 at = body[at..code].iter().position(|&byte| byte == b')').map_or(code, |end| at + end + 1);
             } else {
-                while at < code && !is_separator(body[at]) && body[at] != b'(' {
+                while at < body.len() && !is_separator(body[at]) && !matches!(body[at], b'(' | b'#') {
                     at += 1;
                 }
             }
@@ -108,6 +116,14 @@ impl Line {
         let subject = if has_subject { words.next() } else { None };
         let comment = comment.map(|at| at..body.len());
         Some(Words { command, subject, parameters: words.collect(), comment })
+    }
+
+    /// Returns whether a colour such as `#ff8000` may follow these words, the first of which is the command.
+    fn takes_color(&self, words: &[Range<usize>]) -> bool {
+        let Some(command) = self.command() else { return false };
+        let first = 1 + usize::from(command.form().subject.is_some());
+        let parameters: Vec<_> = words.iter().skip(first).map(|word| self.word(word)).collect();
+        words.len() >= first && command.takes_color(&parameters)
     }
 
     /// Returns a word; empty if it is not UTF-8.
@@ -127,9 +143,23 @@ impl Line {
         Some(self.with(&[(subject, name.to_owned())]))
     }
 
-    /// Returns the number of a word; `None` for a curve, a name, and anything else.
+    /// Returns the number of a word; `None` for a curve, a name, a colour such as `#ff8000`, and anything else.
     pub fn number(&self, word: &Range<usize>) -> Option<f64> {
         self.word(word).parse().ok().filter(|number: &f64| number.is_finite())
+    }
+
+    /// Returns the number of a parameter, also that of a channel of a colour such as `#ff8000`: a share of 255.
+    pub fn parameter(&self, words: &Words, at: usize) -> Option<f64> {
+        let word = words.parameters.get(at)?;
+        match color_levels(self.word(word).as_bytes()) {
+            Some(levels) => Some(f64::from(levels[words.channel(at)]) / LEVELS),
+            None => self.number(word),
+        }
+    }
+
+    /// Returns whether a parameter is a channel of a colour such as `#ff8000`.
+    pub fn is_level(&self, words: &Words, at: usize) -> bool {
+        words.parameters.get(at).is_some_and(|word| color_levels(self.word(word).as_bytes()).is_some())
     }
 
     /// Returns the name of the line, which is the comment after a command.
@@ -167,26 +197,38 @@ impl Line {
         let at = words.parameters.len().min(first)..first + numbers.len();
         let changes = at.filter_map(|at| {
             let value = at.checked_sub(first).and_then(|i| numbers.get(i)).copied().unwrap_or(0.0);
-            let same = words.parameters.get(at).is_some_and(|word| self.number(word) == Some(value));
+            let same = self.parameter(&words, at) == Some(value);
             (!same).then(|| (at, written(value)))
         });
         self.with_words(&changes.collect::<Vec<_>>())
     }
 
-    /// Returns the line with other words for some parameters, given in order. Those beyond the last
-    /// are added after it.
+    /// Returns the line with other words for some parameters, given in order. Those beyond the last are added after it. A
+    /// number that replaces a channel of a colour such as `#ff8000` is rounded to a level.
     #[must_use]
     pub fn with_words(&self, changes: &[(usize, String)]) -> Option<Self> {
         let words = self.words()?;
         let last = words.last().end;
-        let changes: Vec<_> = changes
-            .iter()
-            .map(|(at, text)| match words.parameters.get(*at) {
-                Some(word) => (word.clone(), text.clone()),
-                None => (last..last, format!(" {text}")),
-            })
-            .collect();
-        Some(self.with(&changes))
+        let mut spans = Vec::with_capacity(changes.len());
+        let mut rest = changes.iter().peekable();
+        while let Some((at, text)) = rest.next() {
+            let Some(word) = words.parameters.get(*at) else {
+                spans.push((last..last, format!(" {text}")));
+                continue;
+            };
+            let Some(levels) = color_levels(self.word(word).as_bytes()) else {
+                spans.push((word.clone(), text.clone()));
+                continue;
+            };
+            let mut channels = levels.map(|level| format!("{level:02x}"));
+            channels[words.channel(*at)] = level(text)?;
+            while let Some((next, text)) = rest.next_if(|(next, _)| words.parameters.get(*next) == Some(word))
+            {
+                channels[words.channel(*next)] = level(text)?;
+            }
+            spans.push((word.clone(), format!("#{}", channels.concat())));
+        }
+        Some(self.with(&spans))
     }
 
     /// Returns the line without the parameters from `from` on.
@@ -217,10 +259,24 @@ impl Line {
 }
 
 impl Words {
+    /// Returns the position of a parameter among those with the same span, which are the channels of a colour.
+    fn channel(&self, at: usize) -> usize {
+        self.parameters[..at].iter().rev().take_while(|before| **before == self.parameters[at]).count()
+    }
+
     /// Returns the last word before the comment.
     fn last(&self) -> &Range<usize> {
         self.parameters.last().or(self.subject.as_ref()).unwrap_or(&self.command)
     }
+}
+
+/// The largest level of a channel.
+const LEVELS: f64 = 255.0;
+
+/// Returns the two digits of the level that is nearest to a number from 0 to 1.
+fn level(number: &str) -> Option<String> {
+    let share: f64 = number.parse().ok()?;
+    Some(format!("{:02x}", (LEVELS * share.clamp(0.0, 1.0)).round() as u8))
 }
 
 /// Returns the shortest decimal that parses to this number.
@@ -315,6 +371,23 @@ mod tests {
         assert_eq!(words.parameters.len(), 5);
         assert_eq!(sphere.number(&words.parameters[0]), None);
         assert_eq!(sphere.with_numbers(1, &[7.0]).unwrap().text(), "Sphere (1:1 9:2)7 1 2 red # (");
+    }
+
+    #[test]
+    fn a_colour_by_its_digits_is_three_numbers_and_no_comment() {
+        let ball = line("Sphere 1 0 0 0  #ff8000 #000000  # ball");
+        let words = ball.words().unwrap();
+        assert_eq!((words.parameters.len(), ball.name().as_deref()), (10, Some("ball")));
+        let numbers: Vec<_> = (4..10).map(|at| ball.parameter(&words, at).unwrap()).collect();
+        assert_eq!(numbers, [1.0, 128.0 / 255.0, 0.0, 0.0, 0.0, 0.0]);
+        let green = ball.with_numbers(4, &[0.0, 1.0, 0.3]).unwrap();
+        assert_eq!(green.text(), "Sphere 1 0 0 0  #00ff4d #000000  # ball");
+        assert_eq!(ball.with_numbers(8, &[2.0]).unwrap().text(), "Sphere 1 0 0 0  #ff8000 #00ff00  # ball");
+        assert_eq!(ball.with_numbers(4, &numbers).unwrap(), ball);
+        assert_eq!(line("Sphere 1 0 0 0 red #ff8000").name().as_deref(), Some("ff8000"));
+        let red = line("Material red diffuse #ff0000 shine #ffffff 60 # it");
+        assert_eq!((red.words().unwrap().parameters.len(), red.name().as_deref()), (9, Some("it")));
+        assert_eq!(line("Background .1 .2 .3 #ff8000").words().unwrap().parameters.len(), 3);
     }
 
     #[test]

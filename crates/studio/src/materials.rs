@@ -177,7 +177,11 @@ pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Sp
         .iter()
         .filter(|(other, _)| !goes(*other))
         .flat_map(|(_, span)| words.parameters[span.clone()].iter());
-    let mut texts: Vec<_> = kept.map(|word| line.word(word).to_owned()).collect();
+    let mut last = None;
+    // A colour such as `#ff8000` is three parameters, of which the first is written.
+    let mut texts: Vec<_> = kept
+        .map(|word| if last.replace(word) == Some(word) { String::new() } else { line.word(word).to_owned() })
+        .collect();
     let mut splices = Vec::new();
     if !has {
         let mut other = plain_names(lines, at).pop();
@@ -203,7 +207,8 @@ pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Sp
     }
     let from =
         all.iter().find(|(other, _)| goes(*other)).map_or(words.parameters.len(), |(_, span)| span.start);
-    let words: Vec<_> = texts.into_iter().enumerate().skip(from).collect();
+    let words = texts.into_iter().enumerate().skip(from);
+    let words: Vec<_> = words.filter(|(_, text)| !text.is_empty()).collect();
     let changed = line.cut(from).and_then(|line| line.with_words(&words));
     // The line itself first: a new line before it would move it.
     splices.splice(0..0, changed.map(|line| set(at, line)));
@@ -226,8 +231,8 @@ pub(crate) fn take(lines: &[Line], which: &[usize]) -> Vec<Splice> {
                 Parameter::Mirror => 6,
                 _ => continue,
             };
-            let word = of.words()?.parameters.get(slot.number)?.clone();
-            numbers[group + slot.number - slot.first] = of.number(&word).unwrap_or(0.5);
+            let words = of.words()?;
+            numbers[group + slot.number - slot.first] = of.parameter(&words, slot.number).unwrap_or(0.5);
         }
         let count = if numbers[6..] == [0.0; 3] { 6 } else { 9 };
         Some(set(at, line.cut(first)?.with_numbers(first, &numbers[..count])?))

@@ -86,7 +86,10 @@ impl SourceMap {
                     let drawn = line.subject().and_then(|name| groups.drawn.get(name)).copied().unwrap_or(0);
                     source_map.draw(&mut groups, number, if hides { 0 } else { drawn });
                 }
-                (_, Role::Object) => source_map.draw(&mut groups, number, 1),
+                (_, Role::Object) => {
+                    let hides = Values::of(line, time).is_some_and(|values| values.hides());
+                    source_map.draw(&mut groups, number, usize::from(!hides));
+                }
                 (_, Role::Light) => source_map.lights.push(number),
                 (_, Role::Camera) => source_map.camera = Some(number),
                 (_, Role::Setting) => {

@@ -42,10 +42,8 @@ impl Values {
     /// Returns `None` for a line without a command.
     pub(crate) fn of(line: &Line, time: f64) -> Option<Self> {
         let (command, words) = (line.command()?, line.words()?);
-        let number = |at: usize| {
-            let word = &words.parameters[at];
-            line.number(word).or_else(|| Some(curve(line, &words, at)?.at(time)))
-        };
+        let number =
+            |at: usize| line.parameter(&words, at).or_else(|| Some(curve(line, &words, at)?.at(time)));
         Some(Self { command, numbers: (0..words.parameters.len()).map(number).collect() })
     }
 
@@ -60,6 +58,12 @@ impl Values {
     /// Returns the written numbers; `None` for a word that is no number.
     pub(crate) fn written(&self) -> &[Option<f64>] {
         &self.numbers
+    }
+
+    /// Returns whether an object is hidden, because its radii are 0.
+    pub(crate) fn hides(&self) -> bool {
+        let numbers: Vec<f64> = self.numbers.iter().map_while(|number| *number).collect();
+        self.command.form().hides(&numbers)
     }
 
     /// Returns three numbers of the line as a vector.
@@ -101,6 +105,12 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
     if to.is_empty() {
         return Some(line.clone());
     }
+    if let ([word], Some(known)) = (&words.parameters[..], command.form().word)
+        && line.word(word).eq_ignore_ascii_case(known)
+    {
+        // The numbers come in place of the word.
+        return changed(&line.cut(0)?, first, to, keying);
+    }
     let mut end = first + to.len();
     // Includes the omitted numbers before it, and the rest of its parameter.
     let start = if count < end { count.min(first) } else { first };
@@ -113,10 +123,12 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
     for at in start..end {
         let value = at.checked_sub(first).and_then(|i| to.get(i)).copied();
         match words.parameters.get(at) {
-            Some(word) => {
+            Some(_) => {
                 let Some(value) = value else { continue };
-                if let Some(old) = line.number(word) {
+                if let Some(old) = line.parameter(&words, at) {
                     if old != value {
+                        // A colour such as `#ff8000` holds no curves.
+                        let keying = if line.is_level(&words, at) { Keying::ALWAYS } else { keying };
                         changes.push((at, begun(command, old, value, keying)));
                     }
                 } else {
@@ -203,6 +215,9 @@ mod tests {
         assert_eq!(after("Use tie", 6, &[2.0], AUTO), "Use tie 0 0 0 0 0 0 (smooth 1:1 25:2)");
         assert_eq!(changed(&Line::new("Sphere 1 0 0 0 red"), 4, &[1.0], plain), None, "a name is no number");
         assert_eq!(after("Screen 4 3", 0, &[8.0], AUTO), "Screen 8 3", "it takes no curves");
+        assert_eq!(after("Fog none # a", 0, &[1.0, 0.5, 0.0, 9.0], plain), "Fog 1 0.5 0 9 # a");
+        let red = "Sphere 1 0 0 0 #ff0000 1 1 1";
+        assert_eq!(after(red, 5, &[1.0], AUTO), "Sphere 1 0 0 0 #ffff00 1 1 1", "a colour holds no curves");
     }
 
     #[test]

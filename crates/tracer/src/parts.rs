@@ -47,13 +47,14 @@ parts! {
     highlights, "highlights", |scene| is_made(scene, |f| f.shine.is_some());
     patterns, "patterns", |scene| is_made(scene, |f| f.pattern.is_some());
     lamps, "lamps", |scene| scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)));
-    skies, "skies", |scene| scene.background.color().is_none();
+    skies, "skies", |scene| scene.surroundings().color().is_none();
     srgb, "srgb", |scene| scene.tone == Tone::Srgb;
     samples, "samples", is_sampled;
     lenses, "lenses", |scene| is_sampled(scene) && scene.lens.radius() > 0.0;
     shutters, "shutters", |scene| is_sampled(scene) && scene.shutter.open() > 0.0;
     // Lights that have an extent.
     extents, "extents", |scene| is_sampled(scene) && scene.lights.iter().any(has_extent);
+    fogs, "fogs", |scene| scene.fog.get().is_some();
 }
 
 /// Rejects a scene that uses a part which this build lacks.

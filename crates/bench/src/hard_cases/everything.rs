@@ -8,7 +8,7 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3Swizzles};
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, Disc, Instance, Lamp, Light, Look,
+    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, Disc, Fog, Instance, Lamp, Light, Look,
     Material, Object, Placement, Plane, Scene, Screen, Sphere, Tone, Torus, Triangle,
 };
 
@@ -91,7 +91,16 @@ pub(crate) fn scaled(scene: &Scene, scale: f64) -> Result<Scene> {
         Light::Directional(_) => Ok(*light),
     });
     scaled.lights = lights.collect::<Result<Vec<_>>>()?.into();
+    scaled.fog = fog_scaled(scene, scale)?;
     Ok(scaled)
+}
+
+/// Returns the fog of a scene in another unit.
+pub(crate) fn fog_scaled(scene: &Scene, scale: f64) -> Result<Fog> {
+    Ok(match scene.fog.get() {
+        Some((color, distance)) => Fog::new(color, scale * distance)?,
+        None => scene.fog,
+    })
 }
 
 /// Returns the object with the cells of its pattern scaled. Those of groups are in the units of the group.
@@ -219,6 +228,11 @@ fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Re
     scene.lights = lights.into();
     scene.tone = if rng.u8(0..4) == 0 { Tone::Srgb } else { Tone::Plain };
     scene.depth = Depth::new(rng.u32(0..7))?;
+    // By dice of its own, so that a seed keeps its other numbers.
+    let mut dice = rng.clone();
+    if dice.u8(0..5) == 0 {
+        scene.fog = Fog::new(color(&mut dice), power(&mut dice, 0.0, 1.5))?;
+    }
     Ok(scene)
 }
 

@@ -29,7 +29,7 @@ use rayfold_scene::Scene;
 
 use crate::backends::Backend;
 
-pub(crate) use everything::scaled;
+pub(crate) use everything::{fog_scaled, scaled};
 pub use figures::{Figure, Size};
 pub(crate) use nasty::{exact_at, is_wrong_at, one_of_each};
 pub use report::{Report, Run};

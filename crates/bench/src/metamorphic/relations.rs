@@ -11,7 +11,7 @@ use rayfold_scene::{
 };
 
 use super::placed::{place, right_turns, turn, written_out};
-use crate::hard_cases::scaled;
+use crate::hard_cases::{fog_scaled, scaled};
 
 /// A relation between scenes.
 pub(super) struct Relation {
@@ -188,6 +188,7 @@ fn seen_along(scene: &Scene, by: &Placement) -> Result<Scene> {
         })
     });
     moved.lights = lights.collect::<Result<Vec<_>>>()?.into();
+    moved.fog = fog_scaled(scene, by.scale())?;
     Ok(moved)
 }
 

@@ -48,17 +48,18 @@ pub(super) const VERSION_2: &[&str] = &[
     "lenses",
     "shutters",
     "extents",
+    "fogs",
 ];
 
 /// Halves of version 2, or less: whichever two of its parts are taken, there is one that has the first and not the second.
-/// Six are enough for 16 parts, and fewer are not (Spencer, "Minimal completely separating systems", 1970). One of the six is
+/// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). One of the six is
 /// here in two, since its nine parts together cost a cylinder more than one part may (0.59 %), and neither half does.
 const OF_VERSION_2: [&[&str]; 7] = [
-    &["planes", "groups", "highlights", "glass", "skies", "extents"],
+    &["planes", "groups", "highlights", "glass", "skies", "extents", "fogs"],
     &["planes", "discs", "highlights", "patterns", "lenses"],
     &["tori", "turned-boxes", "groups", "srgb"],
-    &["turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents"],
-    &["cones", "tori", "turned-boxes", "groups", "glass", "lamps", "skies", "srgb", "shutters"],
+    &["turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents", "fogs"],
+    &["cones", "tori", "turned-boxes", "groups", "glass", "lamps", "skies", "srgb", "shutters", "fogs"],
     &["discs", "cones", "tori", "highlights", "patterns", "lamps", "skies", "extents"],
     &["planes", "discs", "cones", "glass", "srgb", "samples", "lenses", "shutters"],
 ];
@@ -118,6 +119,7 @@ fn has_more_than_version_1(scene: &Scene) -> bool {
         _ => false,
     };
     scene.background.color().is_none()
+        || scene.fog.get().is_some()
         || scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)))
         || scene.objects.iter().any(|object| !is_old(object) || object.material().finish().is_some())
 }

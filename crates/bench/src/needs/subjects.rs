@@ -41,7 +41,7 @@ Ilight 0.9 0.9 0.8   -1 -2 -1
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 16] = [
+const OF_VERSION_2: [(&str, &str); 17] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -111,6 +111,13 @@ Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
     (
         "balls below a sky",
         "Background .8 .8 .8  .2 .4 .9
+Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2
+Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
+        "balls in fog",
+        "Fog .5 .5 .6 20
 Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2
 Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
 ",

@@ -93,10 +93,24 @@ struct Path {
 
 fn color_along(scene: &Scene, line: &Line, path: &Path) -> Vector {
     let Some(hit) = nearest_on(&scene.objects, line, &path.start) else {
+        if let Some((fog, _)) = scene.fog.get() {
+            return fog.into();
+        }
         let (low, high) = scene.background.colors();
         let height = 0.5 + 0.5 * line.direction.unit().0[1].to_f64();
         return (low + (high.unwrap_or(low) - low) * height).into();
     };
+    let Some((fog, distance)) = scene.fog.get() else { return color_at_hit(scene, line, path, &hit) };
+    // The exponential has an error of some roundoffs.
+    let length = &hit.t * &line.direction.dot(&line.direction).root();
+    let clear = (-length.over(&Real::from(distance)).to_f64()).exp();
+    let weight = path.weight.times(&DVec3::splat(clear).into());
+    let color = color_at_hit(scene, line, &Path { start: path.start.clone(), weight, ..*path }, &hit);
+    color.times(&DVec3::splat(clear).into()).plus(&Real::from(1.0 - clear), &fog.into())
+}
+
+/// Returns the colour that a hit sends back along the line.
+fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
     let object = &scene.objects[hit.object];
     let material = object.material();
     let (place, face) = shapes::place(object, line, &hit.t);

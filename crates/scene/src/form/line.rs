@@ -23,6 +23,11 @@ impl<'a> Numbers<'a> {
         Self { rest: values, written, surface }
     }
 
+    /// Returns whether the form's word stands in place of all numbers.
+    pub(crate) fn is_word(&self) -> bool {
+        self.written == 0
+    }
+
     pub(crate) fn number(&mut self) -> f64 {
         let [x] = self.take();
         x

@@ -6,11 +6,13 @@
 //!
 //! Invariants: optional parameters follow required ones. Written numbers read back bit for bit.
 
+mod color;
 mod line;
 
 use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
+pub use color::color_levels;
 pub(crate) use line::{Line, Numbers, write_line, write_number};
 
 use crate::model::{Faults, Parameter};
@@ -30,6 +32,10 @@ pub struct Form {
     pub curves: bool,
     /// The name after the numbers, if there is one.
     pub ends_with: Option<Names>,
+    /// A word that may stand in place of all numbers.
+    pub word: Option<&'static str>,
+    /// The numbers, as indices, that hide the object if all of them are 0.
+    radii: &'static [usize],
     /// The count of required numbers.
     required: usize,
     /// The largest count of numbers.
@@ -175,8 +181,6 @@ pub enum Constraint {
     LooksAside(usize, usize, usize),
     /// The first number is greater than the second.
     Greater(usize, usize),
-    /// One of two numbers that are at least 0 is greater than 0.
-    NotBothZero(usize, usize),
     /// Whole numbers: the first is at most the second.
     InOrder(usize, usize),
 }
@@ -207,8 +211,8 @@ impl Form {
             most += count;
             i += 1;
         }
-        let (subject, constraints, curves, ends_with) = (None, &[], true, None);
-        Self { name, subject, fields, constraints, curves, ends_with, required, most, surface }
+        let (subject, constraints, curves, ends_with, word, radii) = (None, &[], true, None, None, &[]);
+        Self { name, subject, fields, constraints, curves, ends_with, word, radii, required, most, surface }
     }
 
     /// Adds a name before the numbers.
@@ -226,9 +230,31 @@ impl Form {
         Self { constraints, ..self }
     }
 
+    /// Names the numbers, by their indices, that hide the object if all of them are 0.
+    pub(crate) const fn hidden_by(self, radii: &'static [usize]) -> Self {
+        Self { radii, ..self }
+    }
+
+    /// Allows a word in place of all numbers.
+    pub(crate) const fn or_word(self, word: &'static str) -> Self {
+        Self { word: Some(word), ..self }
+    }
+
     /// Forbids curves.
     pub(crate) const fn fixed(self) -> Self {
         Self { curves: false, ..self }
+    }
+
+    /// Returns whether an object with these numbers is hidden, because its radii are 0.
+    pub fn hides(&self, numbers: &[f64]) -> bool {
+        !self.radii.is_empty() && self.radii.iter().all(|&i| numbers.get(i) == Some(&0.0))
+    }
+
+    /// Gives a hidden object a radius, so that its other numbers can be checked.
+    pub(crate) fn show(&self, numbers: &mut [f64]) {
+        if self.hides(numbers) {
+            self.radii.iter().for_each(|&i| numbers[i] = 1.0);
+        }
     }
 
     /// Returns the least and the largest count of numbers.
@@ -292,7 +318,7 @@ impl Form {
     }
 }
 
-/// Writes the usage: `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]`.
+/// Writes the usage: `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]` or `Fog r g b d or none`.
 impl Display for Form {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)?;
@@ -307,7 +333,8 @@ impl Display for Form {
             f.write_str(&field.names.join(" "))?;
         }
         f.write_str(&"]".repeat(open))?;
-        f.write_str(if self.ends_with.is_some() { " NAME" } else { "" })
+        f.write_str(if self.ends_with.is_some() { " NAME" } else { "" })?;
+        self.word.map_or(Ok(()), |word| write!(f, " or {word}"))
     }
 }
 
@@ -457,7 +484,6 @@ impl Constraint {
                 format!("from {} to {} is not parallel to {}, if given", names(from), names(to), names(up))
             }
             Self::Greater(a, b) => format!("{} is greater than {}", names(a), names(b)),
-            Self::NotBothZero(a, b) => format!("{} and {} are not both 0", names(a), names(b)),
             Self::InOrder(a, b) => format!("{} is at most {}", names(a), names(b)),
         }
     }

@@ -24,6 +24,11 @@ impl Background {
         Ok(Self { low: clamped(color)?, high: None })
     }
 
+    /// Makes a background of a fog's colour, whose channels may be any finite numbers.
+    pub(super) fn of_fog(color: DVec3) -> Self {
+        Self { low: color, high: None }
+    }
+
     /// Makes a gradient from one colour, seen straight down, to another, seen straight up.
     ///
     /// # Errors

@@ -100,13 +100,18 @@ impl From<InvalidValue> for Faults {
 pub(crate) enum Lint {
     /// A triangle has no area, so it is never hit.
     DegenerateTriangle,
+    /// An object has the radius 0, so it is hidden.
+    NoRadius,
 }
 
 impl Lint {
-    /// Returns the parameter that the lint is about.
-    pub(crate) fn parameter(self) -> Parameter {
+    /// Returns whether the lint is about the parameter.
+    pub(crate) fn is_about(self, parameter: Parameter) -> bool {
         match self {
-            Self::DegenerateTriangle => Parameter::Vertex,
+            Self::DegenerateTriangle => parameter == Parameter::Vertex,
+            Self::NoRadius => {
+                matches!(parameter, Parameter::Radius | Parameter::RadiusA | Parameter::RadiusB)
+            }
         }
     }
 }
@@ -156,6 +161,10 @@ pub enum Parameter {
     LensRadius,
     /// The distance at which a lens is in focus.
     FocusDistance,
+    /// The colour of fog.
+    FogColor,
+    /// The distance that fog takes to hide most of what is behind it.
+    FogDistance,
     /// The number of rays per pixel.
     Samples,
     /// The error that a picture may have.
@@ -244,6 +253,8 @@ impl fmt::Display for Parameter {
             Self::FieldOfView => "the field of view",
             Self::LensRadius => "the lens's radius",
             Self::FocusDistance => "the lens's distance",
+            Self::FogColor => "the fog",
+            Self::FogDistance => "the fog's distance d",
             Self::Samples => "the number of samples",
             Self::SamplingError => "the error e",
             Self::Shutter => "the shutter",

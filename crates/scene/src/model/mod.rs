@@ -8,6 +8,7 @@
 mod background;
 mod camera;
 mod clause;
+mod fog;
 mod invalid;
 mod lights;
 mod look;
@@ -23,6 +24,7 @@ use glam::DVec3;
 pub use background::Background;
 pub use camera::{Camera, Pinhole};
 pub use clause::Clause;
+pub use fog::Fog;
 pub use invalid::{InvalidValue, Parameter};
 pub use lights::{DirectionalLight, Lamp, Light};
 pub use look::Look;
@@ -66,6 +68,8 @@ pub struct Scene {
     pub depth: Depth,
     /// The lens of the camera.
     pub lens: Lens,
+    /// The fog that rays go through.
+    pub fog: Fog,
 }
 
 impl Scene {
@@ -82,7 +86,13 @@ impl Scene {
             tone: Tone::default(),
             depth: Depth::default(),
             lens: Lens::default(),
+            fog: Fog::default(),
         }
+    }
+
+    /// Returns the colour of rays that hit nothing: the background, or the fog's colour, which hides it.
+    pub fn surroundings(&self) -> Background {
+        self.fog.get().map_or(self.background, |(color, _)| Background::of_fog(color))
     }
 
     /// Sets the background; each channel is clamped to 0..=1.

@@ -120,6 +120,17 @@ pub enum Tone {
 impl Tone {
     /// The words of the tones, in the order of the numbers that represent them.
     const WORDS: &[&str] = &["plain", "srgb"];
+
+    /// Returns the channel of a colour that becomes this level of a pixel, in 0..=1: a share of 255, and with
+    /// [`Self::Srgb`] linear light (IEC 61966-2-1).
+    pub fn light(self, level: u8) -> f64 {
+        let share = f64::from(level) / 255.0;
+        match self {
+            Self::Plain => share,
+            Self::Srgb if share <= 0.040_45 => share / 12.92,
+            Self::Srgb => libm::pow((share + 0.055) / 1.055, 2.4),
+        }
+    }
 }
 
 impl Scripted for Tone {

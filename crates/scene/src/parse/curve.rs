@@ -51,7 +51,7 @@ pub fn parse_curve(word: &str) -> Option<Curve> {
 pub(super) fn parse(text: &str, span: Range<usize>) -> Result<Number, (Range<usize>, CurveFault)> {
     read(text, span).map(|curve| match *curve.keys() {
         [key] => Number::Constant(key.value),
-        _ => Number::Animated(curve),
+        _ => Number::Animated(Box::new(curve)),
     })
 }
 
@@ -161,6 +161,7 @@ mod tests {
         parse(text, 0..text.len()).map(|number| match number {
             Number::Constant(value) => value.to_string(),
             Number::Animated(curve) => curve.to_string(),
+            Number::Level(_) => unreachable!("a curve has no levels"),
         })
     }
 

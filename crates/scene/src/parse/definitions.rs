@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use super::doubts::Looks;
 use super::line::Statement;
-use super::text::{is_name, parameters};
+use super::text::{Parameters, is_name};
 use super::visibility::{Animated, Origin, Suffix, VisibleSpan, join};
 use super::{Parser, curve, number, wording};
 use crate::command::{Command, Effect};
-use crate::form::{Names as Kinds, Numbers};
-use crate::model::{Clause, Coefficients, Material};
+use crate::form::{Names as Kinds, Numbers, color_levels};
+use crate::model::{Clause, Coefficients, Material, Tone};
 use crate::report::Line;
 use crate::row::{Number, Row};
 use crate::script::{ClauseLine, GroupRecorder, NamedMaterial};
@@ -76,6 +76,7 @@ pub(super) struct Pending {
     pub(super) camera: Option<(Option<usize>, usize)>,
     pub(super) lens: Option<(Option<usize>, usize)>,
     pub(super) background: Option<(Option<usize>, usize)>,
+    pub(super) fog: Option<(Option<usize>, usize)>,
     moving: Vec<(usize, usize)>,
     materials: Vec<(usize, usize)>,
     groups: Vec<(usize, usize)>,
@@ -175,6 +176,7 @@ impl<'a> Parser<'a> {
             Effect::Screen
             | Effect::Camera(_)
             | Effect::Background
+            | Effect::Fog
             | Effect::Lens
             | Effect::Samples
             | Effect::Shutter
@@ -200,7 +202,8 @@ impl<'a> Parser<'a> {
         let is_constant = clauses.iter().all(|line| line.row.is_constant())
             && other.is_none_or(|other| {
                 self.materials.get(other).value.as_ref().is_some_and(|info| info.still.is_some())
-            });
+            })
+            && !clauses.iter().any(|line| line.row.depends_on_tone());
         let other_looks = other.and_then(|other| Some(self.materials.get(other).value.as_ref()?.looks));
         let mut named = NamedMaterial { name: name.into(), clauses, still: None };
         if is_constant && is_good {
@@ -208,7 +211,7 @@ impl<'a> Parser<'a> {
                 let info = self.materials.get(other).value.as_ref();
                 Ok(info.and_then(|info| info.still.clone()).unwrap_or_default())
             };
-            named.still = named.at(0.0, coefficients).ok();
+            named.still = named.at(0.0, Tone::Plain, coefficients).ok();
         }
         let info = MaterialInfo {
             still: named.still.clone(),
@@ -233,21 +236,22 @@ impl<'a> Parser<'a> {
     }
 
     /// Parses the clauses after byte `at`. Returns them, and those with curves as indices of all lines with curves.
+    /// Warns of a doubtful comment after them.
     fn clauses(&mut self, s: &Statement<'a, '_>, at: usize) -> (Vec<ClauseLine>, Vec<usize>) {
-        let words = parameters(s.text.as_bytes(), at);
+        let errors_before = self.report.error_count();
+        let mut parameters = Parameters::read(s.text.as_bytes(), at);
         let (mut lines, mut moving): (Vec<ClauseLine>, Vec<usize>) = (Vec::new(), Vec::new());
-        if words.is_empty() {
+        if parameters.words.is_empty() {
             self.report.error(s.line, at..at, wording::no_clause);
         }
         let mut next = 0;
-        while next < words.len() {
-            let place = words[next].clone();
+        while let Some(place) = parameters.words.get(next).cloned() {
             let word = &s.text[place.clone()];
             next += 1;
             let Some(clause) = Clause::from_name(word) else {
                 self.report.error(s.line, place, || wording::unknown_clause(word));
                 // The numbers after an unknown clause are not reported.
-                next += words[next..]
+                next += parameters.words[next..]
                     .iter()
                     .take_while(|word| Clause::from_name(&s.text[(*word).clone()]).is_none())
                     .count();
@@ -260,9 +264,9 @@ impl<'a> Parser<'a> {
                 let first = first.clause;
                 self.report.error(s.line, place.clone(), || wording::clause_twice(clause, first));
             }
-            let (row, spans) = self.clause_numbers(s, clause, &place, &words, &mut next);
+            let (row, spans) = self.clause_numbers(s, clause, &place, &mut parameters, &mut next);
             let other = match clause.form().ends_with {
-                Some(_) => self.clause_material(s, clause, &place, &words, &mut next),
+                Some(_) => self.clause_material(s, clause, &place, &parameters.words, &mut next),
                 None => Some(None),
             };
             if let (Some(row), Some(other)) = (row, other) {
@@ -280,6 +284,9 @@ impl<'a> Parser<'a> {
                 lines.push(ClauseLine { clause, row, other });
             }
         }
+        if self.report.error_count() == errors_before {
+            self.doubt_comment(s, s.text.len() - parameters.comment().len());
+        }
         (lines, moving)
     }
 
@@ -289,21 +296,30 @@ impl<'a> Parser<'a> {
         s: &Statement<'a, '_>,
         clause: Clause,
         place: &Range<usize>,
-        words: &[Range<usize>],
+        parameters: &mut Parameters<'_>,
         next: &mut usize,
     ) -> (Option<Row>, Vec<Range<usize>>) {
         let form = clause.form();
         let (mut numbers, mut spans) = (Vec::new(), Vec::new());
         let mut good = true;
-        for (name, _) in form.numbers() {
+        for (i, (name, _)) in form.numbers().enumerate() {
+            if *next == parameters.words.len() && form.takes_color(i, false) {
+                parameters.read_color();
+            }
+            let words = &parameters.words;
             let word = words.get(*next).map(|span| (span.clone(), &s.text[span.clone()]));
-            let number = match &word {
-                Some((span, word)) if word.starts_with('(') => curve::parse(s.text, span.clone())
+            let levels = word.as_ref().and_then(|(_, word)| color_levels(word.as_bytes()));
+            let number = match (&word, levels) {
+                (Some((span, _)), Some(levels)) => {
+                    let channel = spans.iter().rev().take_while(|before| *before == span).count();
+                    Ok(Number::Level(levels[channel]))
+                }
+                (Some((span, word)), None) if word.starts_with('(') => curve::parse(s.text, span.clone())
                     .map_err(|(span, fault)| (span, wording::curve(fault, name))),
-                Some((span, word)) => number::parse(word)
+                (Some((span, word)), None) => number::parse(word)
                     .map(Number::Constant)
                     .map_err(|fault| (span.clone(), wording::bad_number(fault, name, word, false))),
-                None => Err((0..0, wording::no_clause())),
+                (None, _) => Err((0..0, wording::no_clause())),
             };
             let is_next = word.as_ref().is_none_or(|(_, word)| Clause::from_name(word).is_some());
             match number {
@@ -311,7 +327,7 @@ impl<'a> Parser<'a> {
                 Err(_) if is_next => {
                     let end = words[..*next].last().map_or(place.end, |word| word.end);
                     let found = spans.len();
-                    let color = s.text.find('#').and_then(|at| wording::color_at(&s.text[at..]));
+                    let color = std::str::from_utf8(parameters.comment()).ok().and_then(wording::color_at);
                     self.report
                         .error(s.line, end..end, || wording::clause_too_short(clause, name, found, color));
                     return (None, spans);
@@ -353,7 +369,7 @@ impl<'a> Parser<'a> {
 
     /// Reports the errors in the numbers of a clause.
     fn check_clause(&mut self, s: &Statement<'a, '_>, clause: Clause, row: &Row, spans: &[Range<usize>]) {
-        let values = row.at(0.0);
+        let values = row.at(0.0, Tone::Plain);
         let mut clauses = crate::model::Clauses::default();
         let mut numbers = Numbers::new(&values, row.len(), None);
         let Err(faults) = clauses.add(clause, &mut numbers, Coefficients::default()) else { return };
@@ -510,7 +526,7 @@ impl<'a> Parser<'a> {
     /// Records at the end of the text which Traces rendered each line.
     pub(super) fn settle_all(&mut self) {
         self.settle_scene();
-        for old in [self.pending.camera.take(), self.pending.lens.take()] {
+        for old in [self.pending.camera.take(), self.pending.lens.take(), self.pending.fog.take()] {
             self.settle(old);
         }
         // A group or a material refers only to earlier ones.

@@ -64,11 +64,11 @@ impl Looks {
 }
 
 impl<'a> Parser<'a> {
-    /// Warns of colours far above 1, of a comment that is glued to a word, and of a field of view in radians.
+    /// Warns of colours far above 1, and of a comment that is glued to a word.
     pub(super) fn doubt_line(&mut self, s: &Statement<'a, '_>) {
         let is_comma = s.row.is_none() && decimal_comma(s.text, s.command, s.words).is_some();
         if !is_comma && !matches!(s.command.effect(), Effect::Material) {
-            let count = s.words.count() - usize::from(s.surface.is_some());
+            let count = s.count();
             self.doubt_colors(
                 s,
                 s.command.form(),
@@ -79,7 +79,14 @@ impl<'a> Parser<'a> {
                 |numbers| s.words.span(numbers),
             );
         }
-        if let Some(at) = memchr::memchr(b'#', s.text.as_bytes())
+        if !matches!(s.command.effect(), Effect::Material) {
+            self.doubt_comment(s, s.words.comment());
+        }
+    }
+
+    /// Warns of a comment that is glued to a word, or looks like a colour. It starts at byte `at`.
+    pub(super) fn doubt_comment(&mut self, s: &Statement<'a, '_>, at: usize) {
+        if at < s.text.len()
             && (wording::color_at(&s.text[at..]).is_some()
                 || !matches!(s.text.as_bytes().get(at.wrapping_sub(1)), Some(b' ' | b'\t' | b',')))
         {

@@ -6,7 +6,8 @@ use std::str::Utf8Error;
 use super::text::{Words, is_name};
 use super::{Parser, curve, number, wording};
 use crate::command::{Command, Effect, MAX_NUMBERS};
-use crate::form::{Subject, Values};
+use crate::form::{Subject, Values, color_levels};
+use crate::model::Tone;
 use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
 
@@ -22,10 +23,12 @@ pub(super) struct Statement<'a, 'w> {
     pub(super) subject: Option<Range<usize>>,
     /// The values of the parameters; 0 for omitted ones and for curves.
     pub(super) values: &'w [f64; MAX_NUMBERS],
-    /// The parameters, if one of them is a curve.
+    /// The parameters, if one of them is a curve or a colour such as `#ff8000`.
     pub(super) row: Option<Row>,
     /// The name of a material in place of numbers.
     pub(super) surface: Option<Range<usize>>,
+    /// Whether the word of the command's form stands in place of all numbers.
+    pub(super) is_word: bool,
 }
 
 /// The parts of a line's parameters that are not plain numbers.
@@ -33,6 +36,7 @@ pub(super) struct Statement<'a, 'w> {
 struct Parameters {
     row: Option<Row>,
     surface: Option<Range<usize>>,
+    is_word: bool,
 }
 
 impl<'a> Statement<'a, '_> {
@@ -41,10 +45,14 @@ impl<'a> Statement<'a, '_> {
         (self.line, self.words.command.clone())
     }
 
+    /// Returns the count of numbers.
+    pub(super) fn count(&self) -> usize {
+        if self.is_word { 0 } else { self.words.count() - usize::from(self.surface.is_some()) }
+    }
+
     /// Returns the numbers, if none is a curve.
     pub(super) fn still_row(&self) -> Row {
-        let count = self.words.count() - usize::from(self.surface.is_some());
-        Row::new(self.values[..count].iter().copied().map(Number::Constant).collect())
+        Row::new(self.values[..self.count()].iter().copied().map(Number::Constant).collect())
     }
 
     /// Returns the name before the numbers.
@@ -129,10 +137,13 @@ impl<'a> Parser<'a> {
                 }
             },
         };
+        words.read_colors(text.as_bytes(), command.form());
         if matches!(command.effect(), Effect::Material) {
-            return Some(Statement { line, text, command, words, subject, values, row: None, surface: None });
+            let (row, surface, is_word) = (None, None, false);
+            return Some(Statement { line, text, command, words, subject, values, row, surface, is_word });
         }
-        let Some(Parameters { row, surface }) = self.parameters(line, text, command, words, values) else {
+        let Some(Parameters { row, surface, is_word }) = self.parameters(line, text, command, words, values)
+        else {
             self.faulty_line(line, text, command, subject, words);
             return None;
         };
@@ -142,7 +153,7 @@ impl<'a> Parser<'a> {
         {
             self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
         }
-        Some(Statement { line, text, command, words, subject, values, row, surface })
+        Some(Statement { line, text, command, words, subject, values, row, surface, is_word })
     }
 
     /// Returns the name before the numbers. If it is missing or malformed, returns `None` and reports that.
@@ -221,7 +232,12 @@ impl<'a> Parser<'a> {
     ) -> Option<Parameters> {
         let form = command.form();
         let mut parameters = Parameters::default();
-        let mut curves: Vec<(usize, Number)> = Vec::new();
+        if let ([word], Some(known)) = (words.parameters(), form.word)
+            && text[word.clone()].eq_ignore_ascii_case(known)
+        {
+            return Some(Parameters { is_word: true, ..parameters });
+        }
+        let mut others: Vec<(usize, Number)> = Vec::new();
         let (mut good, mut is_countable) = (true, true);
         let (_, most) = form.arity();
         let takes_words = matches!(form.fields.first().map(|field| field.values), Some(Values::OneOf(_)));
@@ -253,7 +269,7 @@ impl<'a> Parser<'a> {
                         self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
                     }
                     Ok(Number::Constant(value)) => values[i] = value,
-                    Ok(curve) => curves.push((i, curve)),
+                    Ok(curve) => others.push((i, curve)),
                     Err((place, fault)) => {
                         good = false;
                         // Then the unclosed curve may contain the missing numbers.
@@ -261,6 +277,11 @@ impl<'a> Parser<'a> {
                         self.report.error(line, place, || wording::curve(fault, name));
                     }
                 }
+            } else if let Some(levels) = color_levels(word.as_bytes()) {
+                let channel =
+                    words.parameters()[..i].iter().rev().take_while(|before| *before == span).count();
+                values[i] = Tone::Plain.light(levels[channel]);
+                others.push((i, Number::Level(levels[channel])));
             } else if form.surface() == Some(i) && words.count() == i + 1 && is_name(word) {
                 parameters.surface = Some(span.clone());
             } else {
@@ -289,14 +310,14 @@ impl<'a> Parser<'a> {
                     command,
                     words,
                     decimal_comma(text, command, words).map(|comma| &text[comma]),
-                    text.find('#').and_then(|at| wording::color_at(&text[at..])),
+                    wording::color_at(&text[words.comment()..]),
                 )
             });
         }
-        if !curves.is_empty() {
+        if !others.is_empty() {
             let count = count.min(most) - usize::from(parameters.surface.is_some());
             let mut numbers: Vec<_> = values[..count].iter().copied().map(Number::Constant).collect();
-            curves.into_iter().for_each(|(i, curve)| numbers[i] = curve);
+            others.into_iter().for_each(|(i, number)| numbers[i] = number);
             parameters.row = Some(Row::new(numbers));
         }
         good.then_some(parameters)

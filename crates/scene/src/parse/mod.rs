@@ -27,7 +27,7 @@ use crate::diagnostic::Diagnostic;
 use crate::form::{Names as Kinds, Numbers, Scripted};
 use crate::limits::Limits;
 use crate::model::{
-    Background, Camera, Faults, InvalidValue, Lens, Light, Material, Object, Placement, Screen,
+    Background, Camera, Faults, Fog, InvalidValue, Lens, Light, Lint, Material, Object, Placement, Screen,
 };
 use crate::report::{Line, Report};
 use crate::script::{Drawn, Recorder, Script, Template, Value};
@@ -218,6 +218,7 @@ impl<'a> Parser<'a> {
             Effect::End => self.close_group(),
             Effect::Camera(_)
             | Effect::Background
+            | Effect::Fog
             | Effect::Lens
             | Effect::Samples
             | Effect::Shutter
@@ -241,6 +242,7 @@ impl<'a> Parser<'a> {
             Effect::Screen => self.screen(s),
             Effect::Camera(read) => self.camera(s, read),
             Effect::Background => self.background(s),
+            Effect::Fog => self.fog(s),
             Effect::Lens => self.lens(s),
             Effect::Samples => {
                 self.set(s, |recorder, samples| recorder.samples = samples);
@@ -263,9 +265,18 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Makes the item of the line. If its numbers are invalid, returns `None` and reports that.
+    /// Makes the item of the line. If its numbers are invalid, returns `None` and reports that. A hidden object gets a
+    /// radius.
     fn read<T>(&mut self, s: &Statement<'a, '_>, surface: Option<&Material>, reader: Reader<T>) -> Option<T> {
-        match reader(&mut Numbers::new(s.values, s.words.count(), surface)) {
+        let mut shown;
+        let values = if s.command.form().hides(s.values) {
+            shown = *s.values;
+            s.command.form().show(&mut shown);
+            &shown
+        } else {
+            s.values
+        };
+        match reader(&mut Numbers::new(values, s.count(), surface)) {
             Ok(item) => Some(item),
             Err(faults) => {
                 self.invalid(s, faults);
@@ -285,9 +296,14 @@ impl<'a> Parser<'a> {
             None => self.read(s, None, reader).map(|value| (Value::Constant(value), None)),
             Some(row) => {
                 let template = Template { command: s.command, row: row.clone() };
-                let number =
-                    self.keep_moving(s.line, s.words.parameters().to_vec(), Origin::Command(s.command), row);
-                Some((Value::Animated(template), Some(number)))
+                let number = if row.is_constant() {
+                    self.read(s, None, reader)?;
+                    None
+                } else {
+                    let spans = s.words.parameters().to_vec();
+                    Some(self.keep_moving(s.line, spans, Origin::Command(s.command), row))
+                };
+                Some((Value::Animated(template), number))
             }
         }
     }
@@ -339,6 +355,14 @@ impl<'a> Parser<'a> {
         self.record(|recorder| recorder.set_background(background));
     }
 
+    fn fog(&mut self, s: &Statement<'a, '_>) {
+        self.unseen.lasting.get_or_insert_with(|| s.place());
+        let Some((fog, moving)) = self.read_value(s, Fog::read) else { return };
+        let old = self.pending.fog.replace((moving, self.exposures.len()));
+        self.settle(old);
+        self.record(|recorder| recorder.set_fog(fog));
+    }
+
     /// Applies a setting that a `Clear` keeps.
     fn set<T: Scripted>(&mut self, s: &Statement<'a, '_>, set: impl FnOnce(&mut Recorder, T)) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
@@ -368,26 +392,23 @@ impl<'a> Parser<'a> {
         let drawn = if is_constant {
             let material = material.flatten().or(number.map(|_| Material::default()));
             let Some(object) = self.read(s, material.as_ref(), read) else { return };
-            if let Some(lint) = object.lint() {
-                let place = s.command.form().place(|_, parameter| parameter == lint.parameter());
-                self.report.warning(s.line, s.words.span(place), || wording::lint_fault(lint));
-            }
+            self.lint_object(s, &object);
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_of(object.material())));
+            if s.command.form().hides(s.values) {
+                return;
+            }
             Err(object)
         } else {
-            let row = match &s.row {
-                Some(row) => row.clone(),
-                None => {
-                    let fits = self.read(s, Some(&Material::default()), read);
-                    if fits.is_none() {
-                        return;
-                    }
-                    s.still_row()
-                }
-            };
+            let moves = s.row.as_ref().is_some_and(|row| !row.is_constant());
+            if !moves {
+                let surface = s.surface.is_some().then(Material::default);
+                let Some(object) = self.read(s, surface.as_ref(), read) else { return };
+                self.lint_object(s, &object);
+            }
+            let row = s.row.clone().unwrap_or_else(|| s.still_row());
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_in(s.command.form(), &row)));
             let template = Template { command: s.command, row: row.clone() };
-            if s.row.is_some() {
+            if moves {
                 let spans = s.words.parameters().to_vec();
                 let moving = self.keep_moving(s.line, spans, Origin::Command(s.command), &row);
                 self.see_moving(moving);
@@ -405,6 +426,15 @@ impl<'a> Parser<'a> {
             (Some(_), _) => {}
             (None, Err(object)) => self.record(|recorder| recorder.add_object(object, number)),
             (None, Ok(drawn)) => self.record(|recorder| recorder.add_drawn(drawn)),
+        }
+    }
+
+    /// Warns of a valid object that is probably a mistake.
+    fn lint_object(&mut self, s: &Statement<'a, '_>, object: &Object) {
+        let is_hidden = s.command.form().hides(s.values);
+        if let Some(lint) = if is_hidden { Some(Lint::NoRadius) } else { object.lint() } {
+            let place = s.command.form().place(|_, parameter| lint.is_about(parameter));
+            self.report.warning(s.line, s.words.span(place), || wording::lint_fault(lint));
         }
     }
 

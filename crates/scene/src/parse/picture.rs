@@ -44,7 +44,7 @@ impl<'a> Picture<'a> {
             Value::Animated(template) if template.command == Command::Camera => {
                 let still = |number: &Number| match number {
                     Number::Constant(value) => Some(*value),
-                    Number::Animated(_) => None,
+                    Number::Animated(_) | Number::Level(_) => None,
                 };
                 let corners: Option<Vec<_>> = template.row.numbers()[10..].iter().map(still).collect();
                 corners.and_then(|corners| corners.try_into().ok())

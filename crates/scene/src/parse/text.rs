@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::command::MAX_NUMBERS;
+use crate::form::{Form, color_levels};
 use crate::report::{BYTE_ORDER_MARK, Line};
 
 /// Returns the lines of a text without their ends and without the byte-order mark. The last one is empty if the text
@@ -82,13 +83,45 @@ fn next_parameter(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     Some(first.start..end)
 }
 
-/// Returns all parameters of a line from byte `at` on.
-pub(super) fn parameters(line: &[u8], mut at: usize) -> Vec<Range<usize>> {
-    std::iter::from_fn(|| next_parameter(line, &mut at)).collect()
+/// The parameters of a line from a byte on, up to a comment.
+pub(super) struct Parameters<'a> {
+    line: &'a [u8],
+    pub(super) words: Vec<Range<usize>>,
+    end: usize,
 }
 
+impl<'a> Parameters<'a> {
+    pub(super) fn read(line: &'a [u8], at: usize) -> Self {
+        let mut parameters = Self { line, words: Vec::new(), end: at };
+        parameters.read_on();
+        parameters
+    }
+
+    fn read_on(&mut self) {
+        self.words.extend(std::iter::from_fn(|| next_parameter(self.line, &mut self.end)));
+    }
+
+    /// Reads on behind a colour such as `#ff8000`, which becomes three equal words, if one comes next.
+    pub(super) fn read_color(&mut self) {
+        let start = self.end;
+        if color_levels(&self.line[start..]).is_some() {
+            self.end = start + COLOR;
+            self.words.extend([start..self.end, start..self.end, start..self.end]);
+            self.read_on();
+        }
+    }
+
+    /// Returns the comment at the end.
+    pub(super) fn comment(&self) -> &'a [u8] {
+        &self.line[self.end..]
+    }
+}
+
+/// The number of bytes of a colour such as `#ff8000`.
+const COLOR: usize = 7;
+
 /// The words of a line, as ranges of its bytes: its command and its parameters. Parameters beyond the largest number
-/// of any command are only counted. A curve is one parameter.
+/// of any command are only counted. A curve is one parameter, and a colour such as `#ff8000` three with the same range.
 ///
 /// One value is reused for all lines of a text, because it is too large to be passed by value.
 #[derive(Debug)]
@@ -98,6 +131,8 @@ pub(super) struct Words {
     count: usize,
     /// The end of the last word.
     end: usize,
+    /// The start of the comment, or the end of the line.
+    comment: usize,
 }
 
 impl Words {
@@ -105,7 +140,13 @@ impl Words {
 
     /// Makes the words of an empty line.
     pub(super) const fn new() -> Self {
-        Self { command: Self::NOWHERE, parameters: [Self::NOWHERE; MAX_NUMBERS], count: 0, end: 0 }
+        Self {
+            command: Self::NOWHERE,
+            parameters: [Self::NOWHERE; MAX_NUMBERS],
+            count: 0,
+            end: 0,
+            comment: 0,
+        }
     }
 
     /// Splits another line. Returns whether it has a command.
@@ -116,14 +157,42 @@ impl Words {
         let is_there = command.is_some();
         self.command = command.unwrap_or(Self::NOWHERE);
         self.end = self.command.end;
-        while let Some(word) = next_parameter(line, &mut at) {
-            self.end = word.end;
-            if let Some(slot) = self.parameters.get_mut(self.count) {
-                *slot = word;
-            }
-            self.count += 1;
-        }
+        self.read_on(line, at);
         is_there
+    }
+
+    fn read_on(&mut self, line: &[u8], mut at: usize) {
+        while let Some(word) = next_parameter(line, &mut at) {
+            self.push(word);
+        }
+        self.comment = at;
+    }
+
+    fn push(&mut self, word: Range<usize>) {
+        self.end = word.end;
+        if let Some(slot) = self.parameters.get_mut(self.count) {
+            *slot = word;
+        }
+        self.count += 1;
+    }
+
+    /// Reads on behind colours such as `#ff8000`, where the command takes them. A `#` elsewhere begins a comment.
+    pub(super) fn read_colors(&mut self, line: &[u8], form: &Form) {
+        let mut is_behind_color = false;
+        while self.comment < line.len()
+            && form.takes_color(self.count, is_behind_color)
+            && color_levels(&line[self.comment..]).is_some()
+        {
+            let start = self.comment;
+            (0..3).for_each(|_| self.push(start..start + COLOR));
+            self.read_on(line, start + COLOR);
+            is_behind_color = self.end == start + COLOR;
+        }
+    }
+
+    /// Returns the start of the comment, or the end of the line.
+    pub(super) fn comment(&self) -> usize {
+        self.comment
     }
 
     /// Returns the number of parameters.

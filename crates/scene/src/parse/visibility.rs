@@ -12,7 +12,7 @@ use super::wording;
 use crate::command::{Command, Effect};
 use crate::form::{Form, Numbers};
 use crate::model::{
-    Background, Clause, Clauses, Coefficients, Faults, FrameNumbers, Lens, Material, Placement,
+    Background, Clause, Clauses, Coefficients, Faults, Fog, FrameNumbers, Lens, Material, Placement, Tone,
 };
 use crate::report::{Line, Report};
 use crate::row::{Number, Row};
@@ -128,6 +128,7 @@ impl Origin {
                 Effect::Object(read) => read(numbers).err(),
                 Effect::Light(read) => read(numbers).err(),
                 Effect::Background => Background::read(numbers).err(),
+                Effect::Fog => Fog::read(numbers).err(),
                 Effect::Lens => Lens::read(numbers).err(),
                 Effect::Use => Placement::read(numbers).err(),
                 Effect::Screen
@@ -223,7 +224,8 @@ impl Animated<'_> {
     fn is_faulty_at(&self, frames: &[f64], report: &mut Report<'_>) -> bool {
         let form = self.origin.form();
         for &frame in frames {
-            let values = self.row.at(frame);
+            let mut values = self.row.at(frame, Tone::Plain);
+            form.show(&mut values);
             let surface = Material::default();
             let mut numbers = Numbers::new(&values, self.row.len(), form.surface().map(|_| &surface));
             let Some(faults) = self.origin.faults(&mut numbers) else { continue };

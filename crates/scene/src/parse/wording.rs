@@ -538,15 +538,16 @@ pub(super) fn far_above_one(written: &str) -> Fault {
 pub(super) fn glued_comment(color: Option<[f64; 3]>) -> Fault {
     let fault = Fault::new(Code::GluedComment, "`#` begins a comment: nothing from here on counts");
     match color {
-        Some(color) => {
-            fault.expected("expected three numbers from 0 to 1 for a colour").help(color_help(color))
-        }
+        Some(color) => fault
+            .expected("expected a colour only where one is needed, or right behind another as `#rrggbb`")
+            .help(color_help(color)),
         None => fault.expected("expected a blank before the comment"),
     }
 }
 
 fn color_help(color: [f64; 3]) -> String {
-    format!("as numbers, this colour is `{}`", color.map(share).join(" "))
+    let digits: String = color.iter().map(|share| format!("{:02x}", (255.0 * share).round() as u8)).collect();
+    format!("this colour is `#{digits}`, or `{}` as numbers", color.map(share).join(" "))
 }
 
 /// Formats a share with three digits.
@@ -614,6 +615,8 @@ pub(super) fn no_trace() -> Fault {
 
 pub(super) fn lint_fault(lint: Lint) -> Fault {
     match lint {
+        Lint::NoRadius => Fault::new(Code::Unused, "nothing is drawn: the radius is 0")
+            .expected("expected a number greater than 0, or a curve that is not always 0"),
         Lint::DegenerateTriangle => {
             Fault::new(Code::DegenerateTriangle, "a triangle of no area is never hit")
                 .expected("expected three points that are not on a line")

@@ -18,8 +18,8 @@ use std::ops::Range;
 
 use crate::command::Command;
 use crate::model::{
-    Background, Camera, Clause, Depth, FrameNumbers, InvalidValue, Lens, Light, Material, Object, Samples,
-    Scene, Screen, Shutter, Tone,
+    Background, Camera, Clause, Depth, Fog, FrameNumbers, InvalidValue, Lens, Light, Material, Object,
+    Samples, Scene, Screen, Shutter, Tone,
 };
 use crate::row::Row;
 use crate::shared_slice::SharedSlice;
@@ -66,6 +66,7 @@ pub(crate) struct View {
     pub(crate) camera: Value<Camera>,
     pub(crate) background: Value<Background>,
     pub(crate) lens: Value<Lens>,
+    pub(crate) fog: Value<Fog>,
     pub(crate) samples: Samples,
     pub(crate) shutter: Shutter,
     pub(crate) tone: Tone,

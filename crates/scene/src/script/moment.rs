@@ -8,14 +8,17 @@ use std::sync::Arc;
 use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
 use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
-use crate::model::{Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene};
+use crate::model::{
+    Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene, Tone,
+};
 use crate::row::Row;
 use crate::shared_slice::SharedSlice;
 
-/// A script at a time, with the results evaluated so far.
+/// A script at a time and in a tone, with the results evaluated so far.
 struct Moment<'a> {
     script: &'a Script,
     frame: f64,
+    tone: Tone,
     /// The evaluated materials that have curves.
     materials: Vec<Option<Material>>,
     /// The objects of each group, without those of the groups that it uses.
@@ -35,21 +38,22 @@ struct Level {
 impl Script {
     pub(super) fn scene(&self, shot: &Shot, frame: f64) -> Result<Scene, Faults> {
         let view = &self.views[shot.view];
-        let camera = view.camera.at(frame, |effect| match effect {
+        let camera = view.camera.at(frame, view.tone, |effect| match effect {
             Effect::Camera(read) => Some(read),
             _ => None,
         })?;
         let mut scene = Scene::new(view.screen, camera);
-        scene.background = view.background.at(frame, |_| Some(Scripted::read))?;
-        scene.lens = view.lens.at(frame, |_| Some(Scripted::read))?;
+        scene.background = view.background.at(frame, view.tone, |_| Some(Scripted::read))?;
+        scene.lens = view.lens.at(frame, view.tone, |_| Some(Scripted::read))?;
+        scene.fog = view.fog.at(frame, view.tone, |_| Some(Scripted::read))?;
         (scene.samples, scene.shutter) = (view.samples, view.shutter);
         (scene.tone, scene.depth) = (view.tone, view.depth);
-        scene.objects = self.objects_at(&shot.objects, frame)?;
-        scene.lights = self.lights_at(&shot.lights, frame)?;
+        scene.objects = self.objects_at(&shot.objects, frame, view.tone)?;
+        scene.lights = self.lights_at(&shot.lights, frame, view.tone)?;
         Ok(scene)
     }
 
-    fn lights_at(&self, extent: &Extent, frame: f64) -> Result<SharedSlice<Light>, Faults> {
+    fn lights_at(&self, extent: &Extent, frame: f64, tone: Tone) -> Result<SharedSlice<Light>, Faults> {
         let Extent { still, others } = extent.clone();
         if others.is_empty() {
             return Ok(self.lights.still.part(still));
@@ -59,13 +63,13 @@ impl Script {
         for (before, template) in &self.lights.others[others] {
             lights.extend_from_slice(&self.lights.still[next..*before]);
             next = *before;
-            lights.push(template.light(frame)?);
+            lights.push(template.light(frame, tone)?);
         }
         lights.extend_from_slice(&self.lights.still[next..still.end]);
         Ok(lights.into())
     }
 
-    fn objects_at(&self, extent: &Extent, frame: f64) -> Result<SharedSlice<Object>, Faults> {
+    fn objects_at(&self, extent: &Extent, frame: f64, tone: Tone) -> Result<SharedSlice<Object>, Faults> {
         let list = &self.objects.list;
         let Extent { still, others } = extent.clone();
         if others.is_empty() {
@@ -74,6 +78,7 @@ impl Script {
         let mut moment = Moment {
             script: self,
             frame,
+            tone,
             materials: vec![None; self.materials.len()],
             groups: vec![None; self.groups.len()],
         };
@@ -83,7 +88,7 @@ impl Script {
             objects.extend_from_slice(&list.still[next..*before]);
             next = *before;
             match drawn {
-                Drawn::Object { template, surface } => objects.push(moment.object(template, *surface)?),
+                Drawn::Object { template, surface } => objects.extend(moment.object(template, *surface)?),
                 Drawn::Use { group, row } => moment.draw(*group, row, &mut objects)?,
             }
         }
@@ -93,9 +98,10 @@ impl Script {
 }
 
 impl Moment<'_> {
-    fn object(&mut self, template: &Template, surface: Option<usize>) -> Result<Object, Faults> {
+    /// Returns an object, unless it is hidden.
+    fn object(&mut self, template: &Template, surface: Option<usize>) -> Result<Option<Object>, Faults> {
         let surface = surface.map(|material| self.material(material)).transpose()?;
-        template.object(self.frame, surface.as_ref())
+        template.object(self.frame, self.tone, surface.as_ref())
     }
 
     fn material(&mut self, i: usize) -> Result<Material, Faults> {
@@ -104,7 +110,7 @@ impl Moment<'_> {
         }
         let named = &self.script.materials[i];
         // The material that a pattern names has no pattern, so the recursion ends here.
-        let material = named.at(self.frame, |other| self.material(other))?;
+        let material = named.at(self.frame, self.tone, |other| self.material(other))?;
         self.materials[i] = Some(material.clone());
         Ok(material)
     }
@@ -124,7 +130,7 @@ impl Moment<'_> {
                 objects.extend_from_slice(&list.still[next..*before]);
                 next = *before;
                 match drawn {
-                    Drawn::Object { template, surface } => objects.push(self.object(template, *surface)?),
+                    Drawn::Object { template, surface } => objects.extend(self.object(template, *surface)?),
                     Drawn::Use { .. } => {}
                 }
             }
@@ -147,7 +153,9 @@ impl Moment<'_> {
             let still = other.map_or(objects.list.still.len(), |(before, _)| *before);
             let mut count = still - level.still;
             (level.still, level.other) = (still, level.other + 1);
-            if let Some((_, Drawn::Object { .. })) = other {
+            if let Some((_, Drawn::Object { template, .. })) = other
+                && !template.is_hidden(self.frame, self.tone)
+            {
                 count += 1;
             }
             if count > 0 {
@@ -182,7 +190,7 @@ impl Moment<'_> {
         if self.script.groups[group].drawn == 0 {
             return Ok(None);
         }
-        let values = row.at(self.frame);
+        let values = row.at(self.frame, self.tone);
         let Some(own) = Placement::read(&mut Numbers::new(&values, row.len(), None))? else {
             return Ok(None);
         };
@@ -200,6 +208,7 @@ impl NamedMaterial {
     pub(crate) fn at(
         &self,
         frame: f64,
+        tone: Tone,
         mut other: impl FnMut(usize) -> Result<Material, Faults>,
     ) -> Result<Material, Faults> {
         let mut clauses = Clauses::default();
@@ -208,7 +217,7 @@ impl NamedMaterial {
                 Some(material) => other(material)?.coefficients(),
                 None => Coefficients::default(),
             };
-            let values = line.row.at(frame);
+            let values = line.row.at(frame, tone);
             clauses.add(line.clause, &mut Numbers::new(&values, line.row.len(), None), coefficients)?;
         }
         Ok(clauses.material()?)
@@ -220,35 +229,50 @@ impl Template {
     pub(crate) fn at<T>(
         &self,
         frame: f64,
+        tone: Tone,
         surface: Option<&Material>,
         reader: Reader<T>,
     ) -> Result<T, Faults> {
-        let values = self.row.at(frame);
+        let values = self.row.at(frame, tone);
         reader(&mut Numbers::new(&values, self.row.len(), surface))
     }
 
-    pub(crate) fn object(&self, frame: f64, surface: Option<&Material>) -> Result<Object, Faults> {
+    /// Returns whether it is an object that its radii hide.
+    fn is_hidden(&self, frame: f64, tone: Tone) -> bool {
+        self.command.form().hides(&self.row.at(frame, tone))
+    }
+
+    /// Returns the object, unless it is hidden.
+    pub(crate) fn object(
+        &self,
+        frame: f64,
+        tone: Tone,
+        surface: Option<&Material>,
+    ) -> Result<Option<Object>, Faults> {
+        if self.is_hidden(frame, tone) {
+            return Ok(None);
+        }
         let Effect::Object(read) = self.command.effect() else {
             unreachable!("`{}` is no object", self.command)
         };
-        self.at(frame, surface, read)
+        self.at(frame, tone, surface, read).map(Some)
     }
 
-    pub(crate) fn light(&self, frame: f64) -> Result<Light, Faults> {
+    pub(crate) fn light(&self, frame: f64, tone: Tone) -> Result<Light, Faults> {
         let Effect::Light(read) = self.command.effect() else {
             unreachable!("`{}` is no light", self.command)
         };
-        self.at(frame, None, read)
+        self.at(frame, tone, None, read)
     }
 }
 
 impl<T: Clone> Value<T> {
     /// Evaluates the value. `reader` selects the function that reads it from the effect of its command.
-    fn at(&self, frame: f64, reader: impl Fn(Effect) -> Option<Reader<T>>) -> Result<T, Faults> {
+    fn at(&self, frame: f64, tone: Tone, reader: impl Fn(Effect) -> Option<Reader<T>>) -> Result<T, Faults> {
         match self {
             Self::Constant(value) => Ok(value.clone()),
             Self::Animated(template) => match reader(template.command.effect()) {
-                Some(read) => template.at(frame, None, read),
+                Some(read) => template.at(frame, tone, None, read),
                 None => unreachable!("`{}` is no such thing", template.command),
             },
         }

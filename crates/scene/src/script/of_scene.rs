@@ -30,6 +30,7 @@ impl From<&Scene> for Script {
         recorder.set_camera(Value::Constant(scene.camera));
         recorder.set_background(Value::Constant(scene.background));
         recorder.set_lens(Value::Constant(scene.lens));
+        recorder.set_fog(Value::Constant(scene.fog));
         (recorder.samples, recorder.shutter) = (scene.samples, scene.shutter);
         (recorder.tone, recorder.depth) = (scene.tone, scene.depth);
         recorder.numbers = FrameNumbers::default();

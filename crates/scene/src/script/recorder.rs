@@ -2,7 +2,7 @@
 
 use super::{Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, Template, Value, View};
 use crate::model::{
-    Background, Camera, Depth, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
+    Background, Camera, Depth, Fog, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
 };
 
 /// The state that commands change, and the shots so far.
@@ -16,6 +16,7 @@ pub(crate) struct Recorder {
     camera: Value<Camera>,
     background: Value<Background>,
     lens: Value<Lens>,
+    fog: Value<Fog>,
     /// The current settings. The screen is passed to each `Trace`.
     pub(crate) samples: Samples,
     pub(crate) shutter: Shutter,
@@ -109,6 +110,10 @@ impl Recorder {
         set(&mut self.lens, lens);
     }
 
+    pub(crate) fn set_fog(&mut self, fog: Value<Fog>) {
+        set(&mut self.fog, fog);
+    }
+
     /// Forgets everything except the settings of a `Trace`.
     pub(crate) fn forget(&mut self) {
         *self = Self { shutter: self.shutter, numbers: self.numbers, ..Self::default() };
@@ -129,6 +134,7 @@ impl Recorder {
                 camera: self.camera.clone(),
                 background: self.background.clone(),
                 lens: self.lens.clone(),
+                fog: self.fog.clone(),
                 samples: self.samples,
                 shutter: self.shutter,
                 tone: self.tone,
@@ -157,11 +163,12 @@ impl Recorder {
 
     /// Returns whether `view` equals the current state, which is the common case.
     fn is_seen_by(&self, view: &View, screen: Screen) -> bool {
-        let View { screen: size, camera, background, lens, samples, shutter, tone, depth } = view;
+        let View { screen: size, camera, background, lens, fog, samples, shutter, tone, depth } = view;
         *size == screen
             && *camera == self.camera
             && *background == self.background
             && *lens == self.lens
+            && *fog == self.fog
             && (*samples, *shutter, *tone, *depth) == (self.samples, self.shutter, self.tone, self.depth)
     }
 

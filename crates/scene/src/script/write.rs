@@ -15,7 +15,7 @@ use std::fmt::{self, Display, Formatter};
 use super::{Drawn, Extent, NamedMaterial, Objects, Script, Shot, Template, Value, View};
 use crate::command::Command;
 use crate::form::write_line;
-use crate::model::{Background, Camera, FrameNumbers, Lens, Scene, Screen};
+use crate::model::{Background, Camera, Fog, FrameNumbers, Lens, Scene, Screen};
 
 /// Writes a script: materials and groups, then for each shot the changes since the previous one, and a `Trace`.
 impl Display for Script {
@@ -133,6 +133,7 @@ impl View {
             camera: Value::default(),
             background: Value::default(),
             lens: Value::default(),
+            fog: Value::default(),
             samples: Default::default(),
             shutter: Default::default(),
             tone: Default::default(),
@@ -151,6 +152,12 @@ impl View {
         if self.lens != last.lens {
             match &self.lens {
                 Value::Constant(lens) => write_line::<Lens>(f, lens, None)?,
+                Value::Animated(template) => template.write(f, None)?,
+            }
+        }
+        if self.fog != last.fog {
+            match &self.fog {
+                Value::Constant(fog) => write_line::<Fog>(f, fog, None)?,
                 Value::Animated(template) => template.write(f, None)?,
             }
         }

@@ -53,6 +53,7 @@ mirror! {
         together: Vec<String>,
         curves: bool,
         material_instead_from: Option<&'static str>,
+        word_instead: Option<&'static str>,
         ends_with: Option<&'static str>,
     }
     LanguageSubject of SubjectEntry {

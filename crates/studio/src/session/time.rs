@@ -190,7 +190,7 @@ impl Session {
                 .parameters
                 .iter()
                 .enumerate()
-                .filter(|(number, word)| line.number(word).is_none() && !curves.contains(number))
+                .filter(|(number, _)| line.parameter(&words, *number).is_none() && !curves.contains(number))
                 .map(|(number, word)| (number, line.word(word).to_owned()))
                 .collect(),
             curves,

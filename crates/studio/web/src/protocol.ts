@@ -367,7 +367,7 @@ more: boolean, };
 
 export type Language = { version: number, commands: ReadonlyArray<LanguageEntry>, clauses: ReadonlyArray<LanguageEntry>, curve_modes: ReadonlyArray<CurveMode>, };
 
-export type LanguageEntry = { name: string, usage: string, about: string, subject?: LanguageSubject, parameters: ReadonlyArray<LanguageParameter>, together?: ReadonlyArray<string>, curves: boolean, material_instead_from?: string, ends_with?: string, };
+export type LanguageEntry = { name: string, usage: string, about: string, subject?: LanguageSubject, parameters: ReadonlyArray<LanguageParameter>, together?: ReadonlyArray<string>, curves: boolean, material_instead_from?: string, word_instead?: string, ends_with?: string, };
 
 export type LanguageSubject = { role: string, of: string, };
 

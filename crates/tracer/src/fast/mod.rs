@@ -313,7 +313,7 @@ impl<'a, E: Real> Setup<'a, E> {
     fn draw<By: Formulas<E>>(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let Self { scene, options, prepared, window, bodies, side } = self;
         let size = (scene.screen.width(), scene.screen.height());
-        let background = FlatBackground::new::<E>(scene.background.colors().0, scene.tone);
+        let background = FlatBackground::new::<E>(scene.surroundings().colors().0, scene.tone);
         let level = options.level.unwrap_or_else(Level::new);
         let bounces = options.bounces(scene);
         // Boxed, because it is passed from band to band by value.

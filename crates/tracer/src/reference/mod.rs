@@ -36,7 +36,7 @@ pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
 pub(crate) use sampled::render_rows as render_exposed_rows;
 pub use sampled::{Estimate, estimate, render_exposed};
-pub(crate) use shading::{FAINT, FAINT_LINEAR};
+pub(crate) use shading::{FAINT, FAINT_LINEAR, clearness};
 pub use shapes::Surface;
 pub(crate) use shapes::{
     Place, has_inside, is_flat_at, normal_and_width, power, triangle_normal, turns_axes_to_axes,

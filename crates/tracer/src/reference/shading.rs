@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::DVec3;
 use rayfold_scene::Tone;
 
+use super::Hit;
 use super::glass::{Refraction, refract};
 use super::light::{arriving, held, highlight};
 use super::pattern::coefficients;
@@ -17,6 +18,11 @@ pub(crate) const FAINT: f64 = 1.0 / 4096.0;
 
 /// The limit of the weight for pictures of linear light, whose tone curve expands dark tones.
 pub(crate) const FAINT_LINEAR: f64 = 1.0 / 65536.0;
+
+/// Returns the share that fog leaves of what a ray brings over a length.
+pub(crate) fn clearness(length: f64, distance: f64) -> f64 {
+    libm::exp(-length / distance)
+}
 
 /// A shader: traces rays and computes their colours.
 pub(super) struct Shader<'a> {
@@ -51,7 +57,16 @@ impl Shader<'_> {
             return DVec3::ZERO;
         }
         let world = self.world;
-        let Some(hit) = world.nearest(ray) else { return world.scene.background.along(ray.direction) };
+        let Some(hit) = world.nearest(ray) else { return world.scene.surroundings().along(ray.direction) };
+        let Some((fog, distance)) = world.scene.fog.get() else { return self.color_at(ray, &hit, path) };
+        let clear = clearness(hit.distance, distance);
+        let color = self.color_at(ray, &hit, Path { weight: path.weight * clear, ..path });
+        held(clear * color + (1.0 - clear) * fog)
+    }
+
+    /// Returns the colour that a hit sends back along the ray.
+    fn color_at(&self, ray: Ray, hit: &Hit, path: Path) -> DVec3 {
+        let world = self.world;
         let (object, place, local_normal) = world.in_script(hit.object, &hit.surface);
         let coefficients = coefficients(object, place, local_normal, &hit.surface);
         let normal = hit.surface.normal;

@@ -80,7 +80,8 @@ impl Scripted for Cone {
             surface::MIRROR,
         ],
     )
-    .with(&[Constraint::NotBothZero(0, 1), Constraint::Differ(2, 3)]);
+    .with(&[Constraint::Differ(2, 3)])
+    .hidden_by(&[0, 1]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let radii = [numbers.number(), numbers.number()];

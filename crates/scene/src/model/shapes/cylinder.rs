@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Motion, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
-use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
 use crate::model::surface;
 use crate::model::vector::{across, furthest};
@@ -65,7 +65,7 @@ impl Scripted for Cylinder {
     const FORM: Form = Form::new(
         "Cylinder",
         &[
-            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::NotNegative),
             Field::new(Parameter::AxisEnd, &["ax", "ay", "az"], Kind::Position, Values::Any),
             Field::new(Parameter::AxisEnd, &["bx", "by", "bz"], Kind::Position, Values::Any),
             surface::AMBIENT,
@@ -73,10 +73,12 @@ impl Scripted for Cylinder {
             surface::MIRROR,
         ],
     )
-    .with(&[Constraint::Differ(1, 2)]);
+    .with(&[Constraint::Differ(1, 2)])
+    .hidden_by(&[0]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, ends) = (numbers.number(), [numbers.vector(), numbers.vector()]);
+        not_negative(Parameter::Radius, radius)?;
         Ok(Self::new(radius, ends, Material::read(numbers)?)?)
     }
 

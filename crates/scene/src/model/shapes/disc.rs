@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
-use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
 use crate::model::surface;
 use crate::model::vector::across;
@@ -68,17 +68,19 @@ impl Scripted for Disc {
     const FORM: Form = Form::new(
         "Disc",
         &[
-            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::NotNegative),
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             Field::new(Parameter::Normal, &["nx", "ny", "nz"], Kind::Direction, Values::NotZero),
             surface::AMBIENT,
             surface::DIFFUSE,
             surface::MIRROR,
         ],
-    );
+    )
+    .hidden_by(&[0]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
         let (radius, center, normal) = (numbers.number(), numbers.vector(), numbers.vector());
+        not_negative(Parameter::Radius, radius)?;
         Ok(Self::new(radius, center, normal, Material::read(numbers)?)?)
     }
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Motion, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
-use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, positive};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
 use crate::model::surface;
 
@@ -59,16 +59,18 @@ impl Scripted for Sphere {
     const FORM: Form = Form::new(
         "Sphere",
         &[
-            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::Positive),
+            Field::new(Parameter::Radius, &["R"], Kind::Length, Values::NotNegative),
             Field::new(Parameter::Center, &["cx", "cy", "cz"], Kind::Position, Values::Any),
             surface::AMBIENT,
             surface::DIFFUSE,
             surface::MIRROR,
         ],
-    );
+    )
+    .hidden_by(&[0]);
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
-        Ok(Self::new(numbers.number(), numbers.vector(), Material::read(numbers)?)?)
+        let radius = not_negative(Parameter::Radius, numbers.number())?;
+        Ok(Self::new(radius, numbers.vector(), Material::read(numbers)?)?)
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {

@@ -41,7 +41,18 @@ export const defined = computed(() => {
   return found;
 });
 
-const WORD = /#.*|\([^)#]*\)?|[^\s,(#]+/g;
+const WORD = /#[\da-f]{6}(?![^\s,#():])|#.*|\([^)#]*\)?|[^\s,(#]+/gi;
+
+/** Whether a colour such as `#ff8000` may stand after some numbers of a command or clause. */
+function takesColor(entry: LanguageEntry | null, given: number, behindColor: boolean): boolean {
+  let first = 0;
+  for (const parameter of entry?.parameters ?? []) {
+    const isColor = parameter.names.length === 3 && (parameter.kind === "colour" || parameter.kind === "coefficients");
+    if (first === given && isColor && (behindColor || parameter.presence === "required")) return true;
+    first += parameter.names.length;
+  }
+  return false;
+}
 
 /** The next slot after some numbers of a command or clause. */
 function slot(entry: LanguageEntry, given: number): Slot {
@@ -53,7 +64,8 @@ function slot(entry: LanguageEntry, given: number): Slot {
       if (at === 0) {
         const from = entry.material_instead_from;
         // The name of a material may come in place of the first of these numbers alone.
-        const names = from === number ? (defined.value["material"] ?? []) : parameter.words ?? [];
+        const word = given === 0 && entry.word_instead ? [entry.word_instead] : [];
+        const names = from === number ? (defined.value["material"] ?? []) : (parameter.words ?? word);
         return { entry, parameter, number, names, clauses: false };
       }
       at -= 1;
@@ -72,14 +84,24 @@ export function read(text: string): { readonly words: readonly Word[]; readonly 
   let isMaterial = false;
   let given = 0;
   let needsName = false;
+  let behindColor = false;
   for (const { 0: word, index } of text.matchAll(WORD)) {
     const add = (kind: Kind, of: Slot = NOTHING): void => {
       words.push({ from: index, to: index + word.length, text: word, kind, entry: of.entry, parameter: of.parameter, number: of.number });
     };
     if (word.startsWith("#")) {
-      add("comment");
-      break;
+      const isColor = word.length === 7 && !needsName && takesColor(next.entry, given, behindColor);
+      if (!isColor) {
+        words.push({ from: index, to: text.length, text: text.slice(index), kind: "comment", entry: null, parameter: null, number: "" });
+        break;
+      }
+      add("number", next);
+      given += 3;
+      behindColor = true;
+      next = next.entry ? { ...slot(next.entry, given), clauses: isMaterial } : NOTHING;
+      continue;
     }
+    behindColor = false;
     if (words.length === 0) {
       const bare = word.replace(/^\uFEFF/, "");
       const entry = commands.value.get(bare.toLowerCase()) ?? null;
@@ -119,7 +141,7 @@ export function choices(text: string, column: number): readonly { readonly label
   const table = language.value;
   if (!table) return [];
   const before = text.slice(0, column);
-  if (before.includes("#")) return [];
+  if (read(before).words.at(-1)?.kind === "comment") return [];
   const open = before.lastIndexOf("(");
   if (open > before.lastIndexOf(")")) return table.curve_modes.map(({ name, about }) => ({ label: name, about }));
   const start = before.search(/[^\s,(]*$/);

@@ -1,4 +1,4 @@
-//! Features that few scenes use: other shapes, lamps, highlights, patterns, glass. Separate code draws them, so that
+//! Features that few scenes use: other shapes, lamps, highlights, patterns, glass, fog. Separate code draws them, so that
 //! scenes without them run no extra instructions.
 
 use rayfold_scene::Scene;
@@ -8,6 +8,7 @@ use crate::fast::bodies::Bodies;
 use crate::fast::build::features::BUILT;
 use crate::fast::lights::lamp::Lamp;
 use crate::fast::materials::finish::Finishes;
+use crate::fast::materials::fog::Fog;
 use crate::fast::materials::glass::Glass;
 use crate::fast::placement::geometry::Geometry;
 use crate::parts;
@@ -19,6 +20,7 @@ pub(crate) struct Extensions<E> {
     lamps: Vec<Lamp<E>>,
     finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
+    fog: Option<Fog>,
 }
 
 impl<E: Real> Extensions<E> {
@@ -29,6 +31,7 @@ impl<E: Real> Extensions<E> {
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
             glass: Glass::new(scene),
+            fog: Fog::new(scene, geometry.scale),
         })
     }
 
@@ -42,6 +45,12 @@ impl<E: Real> Extensions<E> {
     #[inline(always)]
     pub(crate) fn glass(&self) -> Option<&Glass<E>> {
         if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    /// Returns the fog, if there is any.
+    #[inline(always)]
+    pub(crate) fn fog(&self) -> Option<&Fog> {
+        if parts::BUILT.fogs { self.fog.as_ref() } else { None }
     }
 
     #[inline(always)]
@@ -68,5 +77,5 @@ impl<E: Real> Extensions<E> {
 
 /// Returns whether the scene uses any of these features. If it does, it is drawn in `f64`.
 pub(crate) fn is_needed(geometry: &Geometry) -> bool {
-    !geometry.bodies.is_empty() || !geometry.lamps.is_empty() || geometry.is_finished
+    !geometry.bodies.is_empty() || !geometry.lamps.is_empty() || geometry.is_finished || geometry.is_foggy
 }

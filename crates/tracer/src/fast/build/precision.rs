@@ -169,6 +169,10 @@ impl Colors {
         for light in scene.lights.iter() {
             least = least.min(light.color().min_element());
         }
+        if let Some((fog, _)) = scene.fog.get() {
+            ambient += fog.abs().max_element();
+            least = least.min(fog.min_element());
+        }
         let scattered = arriving * diffuse;
         let seen = |weight: f64, _| weight * mirror + ambient.max(1.0) + scattered;
         let largest = (0..=bounces).fold(1.0, seen).max(mirror.powi(bounces as i32));

@@ -19,6 +19,7 @@ use crate::fast::bodies::{ANY, Bodies};
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{BUILT, Needs};
 use crate::fast::lights::sun::{Direction, Outline, Outlines, Sun};
+use crate::fast::materials::fog::Fog;
 use crate::fast::materials::sky::Sky;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::placement::tile_lists::TileLists;
@@ -143,7 +144,8 @@ impl<E: Real> Prepared<E> {
             needs.mirrors |= entry.mirrors;
             of_kind.push(place as u32);
         }
-        let sky = Sky::new(scene.background);
+        let surroundings = scene.surroundings();
+        let sky = Sky::new(surroundings);
         let beyond = Extensions::new(scene, geometry);
         let shared = geometry.shared.clone().filter(|_| BUILT.beyond);
         needs.beyond = beyond.is_some() || sky.is_some() || shared.is_some();
@@ -196,7 +198,7 @@ impl<E: Real> Prepared<E> {
             counts,
             row,
             needs,
-            background: narrow(scene.background.colors().0),
+            background: narrow(surroundings.colors().0),
             sky,
             tree,
             sights,
@@ -240,6 +242,12 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn sky(&self) -> Option<&Sky<E>> {
         if parts::BUILT.skies { self.sky.as_ref() } else { None }
+    }
+
+    /// Returns its fog, if it has any.
+    #[inline(always)]
+    pub(crate) fn fog(&self) -> Option<&Fog> {
+        self.beyond.as_ref().and_then(Extensions::fog)
     }
 
     /// Returns whether it has glass.

@@ -297,6 +297,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     } else {
         add_all_lights::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, occluders);
     }
+    let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
 
@@ -363,6 +364,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
         occluders.find_bodies(simd, scene, hits);
     }
     light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, occluders);
+    let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
 
@@ -378,6 +380,20 @@ fn paint<S: Simd, E: Real, const EYE: bool>(
         finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
     }
     painted.is_some()
+}
+
+/// Mixes fog into the colours of hits. Returns whether the mirror coefficients are stored with the hits: after patterns
+/// (`is_painted`) and in fog.
+#[inline(always)]
+fn dim<S: Simd, E: Real, const EYE: bool>(
+    scene: &Prepared<E>,
+    is_painted: bool,
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+) -> bool {
+    let Some(fog) = scene.fog() else { return is_painted };
+    fog.dim::<E, EYE>(&scene.entries, queue, hits, (Lanes::<S, E>::LEN, is_painted));
+    true
 }
 
 /// Spawns the rays of mirrors and glass.

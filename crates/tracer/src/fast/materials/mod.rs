@@ -3,5 +3,6 @@
 //! In: materials of the scene. Out: tables that the steps of [`super::transport`] read. Read [`finish`] first.
 
 pub(crate) mod finish;
+pub(crate) mod fog;
 pub(crate) mod glass;
 pub(crate) mod sky;

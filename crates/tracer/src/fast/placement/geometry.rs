@@ -42,6 +42,8 @@ pub(crate) struct Geometry {
     pub(crate) lens: Option<Lens>,
     /// Whether any surface has a finish in addition to its coefficients.
     pub(crate) is_finished: bool,
+    /// Whether there is fog.
+    pub(crate) is_foggy: bool,
     /// The objects that share surfaces, after [the search for them](Self::with_shared_surfaces).
     pub(crate) shared: Option<SharedSurfaces>,
     /// A length of the scene times this is a length in these coordinates.
@@ -109,6 +111,7 @@ impl Geometry {
             lamps,
             lens: lens.map(|lens| lens.scaled(scale)),
             is_finished,
+            is_foggy: scene.fog.get().is_some(),
             shared: None,
             scale,
             center,

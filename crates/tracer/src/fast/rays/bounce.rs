@@ -87,8 +87,11 @@ pub(crate) struct Hits<E> {
     /// The diffuse coefficient times the ray's weight.
     pub(crate) diffuse: Columns<E>,
     pub(crate) color: Columns<E>,
-    /// The mirror coefficient times the ray's weight. Filled only for scenes with patterns.
+    /// The mirror coefficient times the ray's weight, and times what fog leaves of it. Filled only for scenes with
+    /// patterns or fog.
     pub(crate) mirror: [Vec<E>; 3],
+    /// The share that fog leaves of what a ray brings. Filled only for scenes with fog.
+    pub(crate) clearness: Vec<E>,
     /// For each packet with hits: its first index, and the spheres that can occlude its light, as bits.
     pub(crate) packets: Vec<(usize, u64)>,
     /// For each packet with mirrors: its first index, and the lanes that hit them, as bits.
@@ -106,6 +109,7 @@ impl<E: Real> Hits<E> {
             diffuse: columns(),
             color: columns(),
             mirror: [vec![], vec![], vec![]],
+            clearness: vec![],
             packets: Vec::with_capacity(PIXELS),
             mirrors: Vec::new(),
         }

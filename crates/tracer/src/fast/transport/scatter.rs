@@ -15,7 +15,7 @@ use crate::fast::transport::ray_queue::{RayQueues, SpawnedRays};
 use crate::fast::transport::surfaces::{HitPacket, mirrored};
 
 /// Adds the rays that mirrors and glass spawn to the queues. With `PAINTED` the mirror coefficients are stored with the
-/// hits.
+/// hits, and in fog they are.
 #[inline(never)]
 pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>(
     simd: S,
@@ -30,12 +30,19 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
         || {
             let zero = Vec3::zero(simd);
             let one = constant::<S, E>(simd, 1.0);
+            let is_foggy = scene.fog().is_some();
             for &(at, bits) in &hits.mirrors {
                 let met = HitPacket::<S, E>::new(simd, at, &hits.distance, &hits.order);
                 let origin = if EYE { zero } else { Vec3::load(simd, &queue.origin, at) };
                 let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
                 let weight =
                     if EYE { Vec3::<S, E>::new(one, one, one) } else { Vec3::load(simd, &queue.weight, at) };
+                let weight = if is_foggy {
+                    let lanes = at..at + Lanes::<S, E>::LEN;
+                    weight.scale(Lanes::<S, E>::from_slice(simd, &hits.clearness[lanes]))
+                } else {
+                    weight
+                };
                 let normal = Vec3::load(simd, &hits.normal, at);
                 let start = Vec3::load(simd, &hits.start, at);
                 let lanes = at..at + Lanes::<S, E>::LEN;

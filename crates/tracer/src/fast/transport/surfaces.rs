@@ -132,8 +132,7 @@ pub(crate) fn surfaces<
     simd.vectorize(
         #[inline(always)]
         || {
-            let Hits { distance, order, start, normal, sides, diffuse, color, packets, mirrors, mirror: _ } =
-                hits;
+            let Hits { distance, order, start, normal, sides, diffuse, color, packets, mirrors, .. } = hits;
             mirrors.clear();
             let zero = Vec3::zero(simd);
             for (at, others) in packets {
