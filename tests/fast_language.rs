@@ -11,8 +11,8 @@ mod hold;
 use glam::DVec3;
 use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Camera, Cone, Cylinder, Disc, Fog, Lamp, Lens, Light, Look, Material, Object, Plane, Samples, Scene,
-    Torus,
+    Camera, Capsule, Cone, Cylinder, Disc, Fog, Lamp, Lens, Light, Look, Material, Object, Plane, Samples,
+    Scene, Torus,
 };
 use rayfold_tracer::{Precision, RenderOptions, reference};
 
@@ -206,6 +206,37 @@ fn highlights_and_patterns_are_the_references() {
 }
 
 #[test]
+fn capsules_are_the_references() {
+    let mut dice = Dice::new("capsules", SEED);
+    let mut scenes: Vec<Scene> = vec![];
+    for count in [1, 3, 10, 30, 90] {
+        scenes.extend([(); 3].map(|()| {
+            let objects = (0..count)
+                .map(|_| {
+                    let (at, material) = (dice.point(3.0), dice.finished());
+                    let way = match dice.0.u8(0..5) {
+                        0 => DVec3::AXES[dice.0.usize(0..3)],
+                        1 => DVec3::ZERO,
+                        _ => dice.point(1.5),
+                    };
+                    let radius = dice.within(0.05, 0.7);
+                    let capsule = Capsule::new(radius, [at, at + way], material).unwrap().into();
+                    match dice.0.u8(0..4) {
+                        0 => placed(&mut dice, capsule),
+                        1 => dice.body(6),
+                        _ => capsule,
+                    }
+                })
+                .collect();
+            let mut scene = dice.scene(objects);
+            dice.add_lamps(&mut scene);
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+#[test]
 fn fog_is_the_references() {
     let mut dice = Dice::new("fog", SEED);
     let mut scenes: Vec<Scene> = vec![];
@@ -278,7 +309,7 @@ const PARALLEL: &str =
     "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
 
 /// Cases in which an almost correct formula fails.
-const EDGES: [(&str, &str, &str); 17] = [
+const EDGES: [(&str, &str, &str); 20] = [
     (
         "eye in a cylinder",
         FROM_THE_FRONT,
@@ -288,6 +319,22 @@ const EDGES: [(&str, &str, &str); 17] = [
         "eye in a cone",
         FROM_THE_FRONT,
         "Cone 3 0.5  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  0 1 8",
+    ),
+    (
+        "eye in a capsule",
+        FROM_THE_FRONT,
+        "Capsule 3  0 -2 8.5  0 2 8.5  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  1 1 8",
+    ),
+    (
+        "eye on a capsule",
+        FROM_THE_FRONT,
+        "Capsule 0.5  0.3 -2 9.4  0.3 2 9.4  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "capsules along the rays, and one on a ball and a cylinder of its own",
+        PARALLEL,
+        "Capsule 8  20 20 -60  20 20 -20  0.1 0.2 0.3  0.5 0.5 0.5\nSphere 5  6 30 -40  0.3 0.2 0.1  0.5 0.5 0.5\n\
+         Capsule 5  6 30 -40  6 12 -40  0.1 0.1 0.3  0.5 0.5 0.5\nCylinder 5  6 25 -40  6 8 -40  0.1 0.3 0.1  0.5 0.5 0.5",
     ),
     (
         "eye in the tube of a torus",

@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Camera, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Lamp, Lens, Light, Look,
+    Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Lamp, Lens, Light, Look,
     MATERIAL, ORTHOCAMERA, Object, Pinhole, Samples, Screen, Shutter, Tone, USE, shapes, with_shapes,
 };
 
@@ -186,6 +186,18 @@ impl Command {
         chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
     }
 
+    /// Returns whether a colour as `#rrggbb` may stand after these parameters, without the name before them. A colour
+    /// is three equal words.
+    pub fn takes_color(self, words: &[&str]) -> bool {
+        let is_behind_color = words.last().is_some_and(|word| word.starts_with('#'));
+        if !matches!(self.effect(), Effect::Material) {
+            return self.form().takes_color(words.len(), is_behind_color);
+        }
+        let clauses = words.iter().map(|word| Clause::from_name(word)).enumerate();
+        let last = clauses.filter_map(|(at, clause)| Some((at, clause?))).last();
+        last.is_some_and(|(at, clause)| clause.form().takes_color(words.len() - at - 1, is_behind_color))
+    }
+
     /// Returns the command that was probably meant: one with a similar name, or one that starts with `name`.
     pub(crate) fn nearest(name: &str) -> Option<Self> {
         // A longer word is no typo, and the distance takes quadratic time.
@@ -241,5 +253,27 @@ mod tests {
         check("12.5", None);
         check("x", None);
         check("ä", None);
+    }
+
+    #[test]
+    fn colours_stand_where_one_must_or_behind_one_written_so() {
+        let check = |command: Command, words: &str, expect: bool| {
+            let words: Vec<_> = words.split_whitespace().collect();
+            assert_eq!(command.takes_color(&words), expect, "{command} {words:?}");
+        };
+        check(Command::Background, "", true);
+        check(Command::Background, "1 2 3", false);
+        check(Command::Background, "#112233 #112233 #112233", true);
+        check(Command::Sphere, "1 0 0 0", true);
+        check(Command::Sphere, "1 0 0", false);
+        check(Command::Sphere, "1 0 0 0 1 2 3 #112233 #112233 #112233", true);
+        check(Command::Sphere, "1 0 0 0 1 2 3 1 2 3", false);
+        check(Command::Ilight, "", true);
+        check(Command::Ilight, "#112233 #112233 #112233", false);
+        check(Command::Material, "", false);
+        check(Command::Material, "diffuse", true);
+        check(Command::Material, "diffuse #112233 #112233 #112233", false);
+        check(Command::Material, "diffuse 1 2 3 shine", true);
+        check(Command::Material, "checker", false);
     }
 }

@@ -37,7 +37,8 @@ pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Va
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::shapes::{
-    Cone, Cuboid, Cylinder, Disc, Instance, Motion, Object, Placement, Plane, Sphere, Torus, Triangle,
+    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Motion, Object, Placement, Plane, Sphere, Torus,
+    Triangle,
 };
 pub use model::{
     Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, InvalidValue,

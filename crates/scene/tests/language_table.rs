@@ -24,6 +24,7 @@ fn sample(command: Command) -> &'static str {
         Command::Cylinder => "Cylinder 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Cone => "Cone 1 2 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Torus => "Torus 3e300 5e-324 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Capsule => "Capsule 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Material => "Material red diffuse 1 0 0",
         Command::Group => "Group ball",
         Command::End => "End",

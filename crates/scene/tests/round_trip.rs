@@ -7,9 +7,9 @@
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use rayfold_scene::{
-    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish, Glass,
-    Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Samples, Scene, Screen,
-    Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
+    Background, Camera, Capsule, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
+    Glass, Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Samples, Scene,
+    Screen, Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
 };
 
 fn script(text: &str) -> Script {
@@ -87,6 +87,7 @@ fn object() -> BoxedStrategy<Object> {
         (size(), size(), vector(), vector(), material()).prop_filter_map("a ring", |(a, b, c, n, m)| {
             Torus::new(a.max(b), a.min(b), c, n, m).ok().map(Object::from)
         }),
+        (size(), ends(), material()).prop_map(|(r, e, m)| Capsule::new(r, e, m).unwrap().into()),
     ]
     .boxed()
 }

@@ -28,6 +28,8 @@ mod tests {
             "Cylinder 0.3  -0.6 0 0  0.5 0.9 0.2",
             "Cone 0.6 0.1  0 -0.4 0  0.3 0.8 -0.2",
             "Torus 0.7 0.2  0.1 0 0  0.2 1 0.3",
+            "Capsule 0.3  -0.6 0 0  0.5 0.9 0.2",
+            "Capsule 0.3  -0.6 0 0  -0.6 0 0",
         ];
         for shape in shapes {
             for place in ["Use a", "Use a  0.3 -0.2 0.5  30 50 -70  1.5"] {

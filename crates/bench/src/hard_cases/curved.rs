@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use glam::DVec3;
-use rayfold_scene::{Cone, Cylinder, Disc, Material, Object, Plane, Torus};
+use rayfold_scene::{Capsule, Cone, Cylinder, Disc, Material, Object, Plane, Torus};
 
 use super::figures::{Figures, Size, unless_single, worse};
 use super::setup::{direction, from_eyes, random, truths};
@@ -35,6 +35,10 @@ fn cone(axis: DVec3, radii: [f64; 2], grown: f64) -> Result<Object> {
     Ok(Cone::new(radii, ends, surface())?.into())
 }
 
+fn capsule(axis: DVec3, grown: f64) -> Result<Object> {
+    Ok(Capsule::new(0.75 + grown, [CENTER, CENTER + 0.5 * axis], surface())?.into())
+}
+
 const BODIES: &[(&str, Grown)] = &[
     ("disc", |grown| Ok(Disc::new(1.25 + grown, CENTER, ALONG, surface())?.into())),
     ("disc aslant", |grown| Ok(Disc::new(1.25 + grown, CENTER, ASLANT, surface())?.into())),
@@ -44,6 +48,8 @@ const BODIES: &[(&str, Grown)] = &[
     ("cone aslant", |grown| cone(ASLANT, [1.0, 0.5], grown)),
     ("torus", |grown| Ok(Torus::new(1.0, 0.25 + grown, CENTER, ALONG, surface())?.into())),
     ("torus aslant", |grown| Ok(Torus::new(1.0, 0.625 + grown, CENTER, ASLANT, surface())?.into())),
+    ("capsule", |grown| capsule(ALONG, grown)),
+    ("capsule aslant", |grown| capsule(ASLANT, grown)),
 ];
 
 /// Returns rays that pass a body at all distances from its outline, on all sides of it.
@@ -133,6 +139,7 @@ pub(super) fn exact(backends: &[Backend], _: Size, figures: &mut Figures) -> Res
     let can: Object = Cylinder::new(2.0, [DVec3::ZERO, 4.0 * up], surface())?.into();
     let tip: Object = Cone::new([2.0, 0.0], [DVec3::ZERO, 4.0 * up], surface())?.into();
     let ring: Object = Torus::new(3.0, 1.0, DVec3::ZERO, up, surface())?.into();
+    let pill: Object = Capsule::new(2.0, [DVec3::ZERO, 4.0 * up], surface())?.into();
     let plate: Object = Disc::new(5.0, DVec3::ZERO, up, surface())?.into();
     let ground: Object = Plane::new(DVec3::ZERO, up, surface())?.into();
     let cases: &[Exact] = &[
@@ -156,6 +163,13 @@ pub(super) fn exact(backends: &[Backend], _: Size, figures: &mut Figures) -> Res
         ("on the top of a torus", &ring, [9.0, 1.0, 0.0], [-1.0, 0.0, 0.0], Some(6.0)),
         ("from a torus outwards", &ring, [4.0, 0.0, 0.0], [1.0, 0.0, 0.0], None),
         ("from a torus inwards", &ring, [4.0, 0.0, 0.0], [-1.0, 0.0, 0.0], Some(2.0)),
+        ("onto the end of a capsule", &pill, [0.0, 9.0, 0.0], [0.0, -1.0, 0.0], Some(3.0)),
+        ("tangent to a capsule", &pill, [2.0, 1.0, 6.0], [0.0, 0.0, -1.0], Some(6.0)),
+        ("tangent to its end", &pill, [9.0, 6.0, 0.0], [-1.0, 0.0, 0.0], Some(9.0)),
+        ("above its end", &pill, [9.0, 6.0 + 1e-5, 0.0], [-1.0, 0.0, 0.0], None),
+        ("from a capsule outwards", &pill, [2.0, 1.0, 0.0], [1.0, 0.0, 0.0], None),
+        ("from a capsule inwards", &pill, [2.0, 1.0, 0.0], [-1.0, 0.0, 0.0], Some(4.0)),
+        ("from its end inwards", &pill, [0.0, 6.0, 0.0], [0.0, -1.0, 0.0], Some(8.0)),
         ("onto a rim", &plate, [3.0, 7.0, 4.0], [0.0, -1.0, 0.0], Some(7.0)),
         ("beside a rim", &plate, [3.0, 7.0, 4.0 + 1e-5], [0.0, -1.0, 0.0], None),
         ("edge on", &plate, [9.0, 0.0, 0.0], [-1.0, 0.0, 0.0], None),

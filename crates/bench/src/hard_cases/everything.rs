@@ -8,8 +8,8 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3Swizzles};
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, Disc, Fog, Instance, Lamp, Light, Look,
-    Material, Object, Placement, Plane, Scene, Screen, Sphere, Tone, Torus, Triangle,
+    Background, Camera, Capsule, Coefficients, Cone, Cuboid, Cylinder, Depth, Disc, Fog, Instance, Lamp,
+    Light, Look, Material, Object, Placement, Plane, Scene, Screen, Sphere, Tone, Torus, Triangle,
 };
 
 use super::figures::{Figures, Size};
@@ -169,7 +169,10 @@ fn some(rng: &mut Rng) -> Result<Material> {
 
 /// Returns a random object of about this size.
 fn any(rng: &mut Rng, at: DVec3, size: f64, material: Material) -> Result<Object> {
-    Ok(match rng.u32(0..8) {
+    // By dice of its own, so that a seed keeps its other numbers.
+    let mut dice = rng.clone();
+    let rare = dice.u8(0..8) == 0;
+    let object: Object = match rng.u32(0..8) {
         0 => Sphere::new(0.5 * size, at, material)?.into(),
         1 => Cuboid::new([at, at + point(rng, 0.7 * size)], material)?.into(),
         2 => Triangle::new([at, at + point(rng, size), at + point(rng, size)], material)?.into(),
@@ -187,7 +190,13 @@ fn any(rng: &mut Rng, at: DVec3, size: f64, material: Material) -> Result<Object
             let radius = 0.4 * size;
             Torus::new(radius, within(rng, 0.05, 0.95) * radius, at, direction(rng), material)?.into()
         }
-    })
+    };
+    if !rare {
+        return Ok(object);
+    }
+    let (radius, end) = (within(&mut dice, 0.05, 0.5) * size, at + size * direction(&mut dice));
+    let end = if dice.u8(0..8) == 0 { at } else { end };
+    Ok(Capsule::new(radius, [at, end], object.material().clone())?.into())
 }
 
 type Surface = fn(&mut Rng) -> Result<Material>;
@@ -371,6 +380,7 @@ fn lamps(rng: &mut Rng) -> Result<Scene> {
                 Object::Cylinder(cylinder) => cylinder.ends()[0],
                 Object::Cone(cone) => cone.ends()[1],
                 Object::Torus(torus) => torus.center(),
+                Object::Capsule(capsule) => capsule.ends()[0],
                 _ => DVec3::ZERO,
             },
             _ => point(rng, 1.5),

@@ -41,7 +41,7 @@ Ilight 0.9 0.9 0.8   -1 -2 -1
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 17] = [
+const OF_VERSION_2: [(&str, &str); 18] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -65,6 +65,12 @@ Cone 1 0   1.5 -1 -1  1.5 2 -1  .1 .1 .1  .2 .6 .2
         "tori",
         "Torus 1.2 .4  -1 0 0  .2 1 .1  .1 .1 .1  .6 .2 .2
 Torus 1.2 .2   1 1 -2  -.2 .5 1  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
+        "capsules",
+        "Capsule .8  -1.5 -1 0  -1 1.5 0  .1 .1 .1  .6 .2 .2
+Capsule .5   1.5 -1 -1  1.5 2 -1  .1 .1 .1  .2 .6 .2
 ",
     ),
     (

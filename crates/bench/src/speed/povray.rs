@@ -147,6 +147,12 @@ fn shape(object: &Object) -> Result<String> {
             let ([a, b], [from, to]) = (c.ends().map(vector), c.radii());
             format!("cone {{ {a}, {from:e}, {b}, {to:e}")
         }
+        Object::Capsule(c) => {
+            let ([a, b], r) = (c.ends().map(vector), c.radius());
+            format!(
+                "merge {{ sphere {{ {a}, {r:e} }} sphere {{ {b}, {r:e} }} cylinder {{ {a}, {b}, {r:e} open }}"
+            )
+        }
         Object::Torus(t) => {
             // POV-Ray's tori are around the second axis.
             let y = t.normal().normalize();

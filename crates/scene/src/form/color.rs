@@ -1,8 +1,6 @@
 //! Colours that are written as `#rrggbb`, and where one may stand.
 
 use super::{Field, Form, Kind, Presence};
-use crate::command::{Command, Effect};
-use crate::model::Clause;
 
 /// The number of characters of a colour.
 const LENGTH: usize = 7;
@@ -46,20 +44,6 @@ impl Form {
     }
 }
 
-impl Command {
-    /// Returns whether a colour as `#rrggbb` may stand after these parameters, without the name before them. A colour
-    /// is three equal words.
-    pub fn takes_color(self, words: &[&str]) -> bool {
-        let is_behind_color = words.last().is_some_and(|word| word.starts_with('#'));
-        if !matches!(self.effect(), Effect::Material) {
-            return self.form().takes_color(words.len(), is_behind_color);
-        }
-        let clauses = words.iter().map(|word| Clause::from_name(word)).enumerate();
-        let last = clauses.filter_map(|(at, clause)| Some((at, clause?))).last();
-        last.is_some_and(|(at, clause)| clause.form().takes_color(words.len() - at - 1, is_behind_color))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,27 +64,5 @@ mod tests {
         ] {
             assert_eq!(color_levels(text.as_bytes()), levels, "{text}");
         }
-    }
-
-    #[test]
-    fn colours_stand_where_one_must_or_behind_one_written_so() {
-        let check = |command: Command, words: &str, expect: bool| {
-            let words: Vec<_> = words.split_whitespace().collect();
-            assert_eq!(command.takes_color(&words), expect, "{command} {words:?}");
-        };
-        check(Command::Background, "", true);
-        check(Command::Background, "1 2 3", false);
-        check(Command::Background, "#112233 #112233 #112233", true);
-        check(Command::Sphere, "1 0 0 0", true);
-        check(Command::Sphere, "1 0 0", false);
-        check(Command::Sphere, "1 0 0 0 1 2 3 #112233 #112233 #112233", true);
-        check(Command::Sphere, "1 0 0 0 1 2 3 1 2 3", false);
-        check(Command::Ilight, "", true);
-        check(Command::Ilight, "#112233 #112233 #112233", false);
-        check(Command::Material, "", false);
-        check(Command::Material, "diffuse", true);
-        check(Command::Material, "diffuse #112233 #112233 #112233", false);
-        check(Command::Material, "diffuse 1 2 3 shine", true);
-        check(Command::Material, "checker", false);
     }
 }

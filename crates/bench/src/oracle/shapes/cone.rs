@@ -9,7 +9,7 @@ use crate::oracle::line::Line;
 use crate::oracle::real::{Real, Vector};
 
 /// A cone or a cylinder.
-struct Round {
+pub(super) struct Round {
     radii: [Real; 2],
     ends: [Vector; 2],
     /// The vector from one end to the other, followed by the square of its length.
@@ -18,7 +18,7 @@ struct Round {
 }
 
 impl Round {
-    fn new(radii: [f64; 2], ends: [DVec3; 2]) -> Self {
+    pub(super) fn new(radii: [f64; 2], ends: [DVec3; 2]) -> Self {
         let ends = ends.map(Vector::from);
         let axis = ends[1].minus(&ends[0]);
         let square = axis.dot(&axis);
@@ -31,12 +31,12 @@ impl Round {
     }
 
     /// Returns the height along the axis, from 0 at the first end to 1 at the second.
-    fn height(&self, point: &Vector) -> Real {
+    pub(super) fn height(&self, point: &Vector) -> Real {
         point.minus(&self.ends[0]).dot(&self.axis).over(&self.square)
     }
 
     /// Returns the hits of the line with the quadric |(p - a) × v|²·v² = (Ra·v² + (Rb - Ra)·((p - a)·v))².
-    fn side(&self, line: &Line) -> Vec<Real> {
+    pub(super) fn side(&self, line: &Line) -> Vec<Real> {
         let from = line.origin.minus(&self.ends[0]);
         let (turn, start) = (line.direction.cross(&self.axis), from.cross(&self.axis));
         let growth = self.growth();
@@ -70,7 +70,7 @@ impl Round {
         side.chain(caps).filter(|t| t > start).reduce(|a, b| if b < a { b } else { a })
     }
 
-    fn is_between_the_ends(&self, point: &Vector) -> bool {
+    pub(super) fn is_between_the_ends(&self, point: &Vector) -> bool {
         let height = self.height(point);
         let hair = Real::from(1.0).shifted(-400);
         height >= -&hair && height <= &Real::from(1.0) + &hair

@@ -1,5 +1,6 @@
 //! Hits of a line with an object: textbook formulas, decided exactly. One file per shape.
 
+mod capsule;
 mod cone;
 mod cuboid;
 mod disc;
@@ -54,6 +55,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Cylinder(cylinder) => cylinder,
         Object::Cone(cone) => cone,
         Object::Torus(torus) => torus,
+        Object::Capsule(capsule) => capsule,
         Object::Instance(instance) => instance,
     }
 }

@@ -3,6 +3,7 @@
 //! Each shape has a file with its checking constructor, its extent and its syntax. A new shape needs a file, its `mod`
 //! and a line in `with_shapes` here, and its export in `lib.rs`. A parameter that no other shape has is added to `Parameter`.
 
+mod capsule;
 mod cone;
 mod cuboid;
 mod cylinder;
@@ -39,6 +40,7 @@ macro_rules! with_shapes {
                 cylinder::Cylinder: "A closed cylinder.";
                 cone::Cone: "A closed cone or truncated cone.";
                 torus::Torus: "A ring (torus).";
+                capsule::Capsule: "A cylinder with round ends.";
             }
         }
     };

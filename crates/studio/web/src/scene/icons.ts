@@ -1,7 +1,7 @@
 // The icons of commands.
 
 import {
-  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Settings2, Shapes, Square, Sun, Torus, Triangle, Video,
+  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Pill, Settings2, Shapes, Square, Sun, Torus, Triangle, Video,
 } from "lucide";
 
 import type { Role } from "../protocol";
@@ -15,6 +15,7 @@ const COMMANDS: Readonly<Record<string, IconNode>> = {
   Cylinder,
   Cone,
   Torus,
+  Capsule: Pill,
   Ilight: Sun,
   Plight: Lightbulb,
 };

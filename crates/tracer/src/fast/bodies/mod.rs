@@ -1,4 +1,4 @@
-//! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, and rotated boxes.
+//! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, capsules, and rotated boxes.
 //!
 //! Each shape has its own file, with its intersection and its surface in the shape's coordinates. The common parts are
 //! here: the transformation into these coordinates and back, the offset of new rays, and the search. None of it is part
@@ -11,6 +11,7 @@
 //! New rays start off a surface by twice that ([`Solid::offset`]).
 
 mod body_culler;
+mod capsule;
 mod cone;
 mod cuboid;
 mod disc;
@@ -23,6 +24,7 @@ use fearless_simd::prelude::*;
 use rayfold_scene::Object;
 
 use self::body_culler::BodyCuller;
+use self::capsule::{Capsule, CapsuleForm};
 use self::cone::{Cone, ConeForm};
 use self::cuboid::{Cuboid, CuboidForm};
 use self::disc::{Disc, DiscForm};
@@ -61,6 +63,7 @@ enum AnyForm {
     Disc(DiscForm),
     Cone(ConeForm),
     Torus(TorusForm),
+    Capsule(CapsuleForm),
     Cuboid(CuboidForm),
 }
 
@@ -76,6 +79,7 @@ impl AnyForm {
             Object::Cylinder(o) => of(Self::Cone)(ConeForm::new([o.radius(); 2], o.ends(), place)),
             Object::Cone(o) => of(Self::Cone)(ConeForm::new(o.radii(), o.ends(), place)),
             Object::Torus(o) => of(Self::Torus)(TorusForm::new(o, place)),
+            Object::Capsule(o) => of(Self::Capsule)(CapsuleForm::new(o, place)),
             Object::Instance(o) => of(Self::Cuboid)(CuboidForm::new(turned_box(o)?, o.placement(), place)),
             _ => return None,
         })
@@ -87,6 +91,7 @@ impl AnyForm {
             Self::Disc(form) => form,
             Self::Cone(form) => form,
             Self::Torus(form) => form,
+            Self::Capsule(form) => form,
             Self::Cuboid(form) => form,
         }
     }
@@ -100,6 +105,7 @@ enum Shape<E> {
     /// A cone, and the centre of its end b.
     Cone(Cone<E>, [E; 3]),
     Torus(Torus<E>),
+    Capsule(Capsule<E>),
     Cuboid(Cuboid<E>),
 }
 
@@ -112,6 +118,7 @@ impl<E> Shape<E> {
             Self::Disc(_) => BUILT.discs,
             Self::Cone(..) => BUILT.cones,
             Self::Torus(_) => BUILT.tori,
+            Self::Capsule(_) => BUILT.capsules,
             Self::Cuboid(_) => BUILT.turned_boxes,
         }
     }
@@ -139,6 +146,9 @@ impl<E: Real> Body<E> {
                 Shape::Cone(Cone::new(radii, height), end.to_array().map(E::narrow))
             }
             AnyForm::Torus(TorusForm { radius, thickness }) => Shape::Torus(Torus::new(radius, thickness)),
+            AnyForm::Capsule(CapsuleForm { radius, height, .. }) => {
+                Shape::Capsule(Capsule::new(radius, height))
+            }
             AnyForm::Cuboid(CuboidForm { half }) => Shape::Cuboid(Cuboid::new(half)),
         };
         Self {
@@ -213,6 +223,7 @@ impl<E: Real> Body<E> {
                     let (hit, distance) = match &self.shape {
                         Shape::Cone(cone, end) => cone.intersect(simd, local, self.over(simd, *end, ray)),
                         Shape::Torus(torus) => torus.intersect(simd, local, nearest.distance),
+                        Shape::Capsule(capsule) => capsule.intersect(simd, local),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
                         Shape::Plane | Shape::Disc(_) => return,
                     };
@@ -252,6 +263,9 @@ impl<E: Real> Body<E> {
                         let local = self.local(simd, ray);
                         let over = self.over(simd, *end, ray);
                         self.in_scene(simd, cone.surface(simd, local, over, distance))
+                    }
+                    Shape::Capsule(capsule) => {
+                        self.in_scene(simd, capsule.surface(simd, self.local(simd, ray), distance))
                     }
                     Shape::Torus(torus) => {
                         self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance))

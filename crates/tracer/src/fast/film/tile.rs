@@ -392,7 +392,8 @@ fn dim<S: Simd, E: Real, const EYE: bool>(
     hits: &mut Hits<E>,
 ) -> bool {
     let Some(fog) = scene.fog() else { return is_painted };
-    fog.dim::<E, EYE>(&scene.entries, queue, hits, (Lanes::<S, E>::LEN, is_painted));
+    let mirror = |order: usize| scene.entries[order].mirror;
+    fog.dim::<E, EYE>(mirror, queue, hits, (Lanes::<S, E>::LEN, is_painted));
     true
 }
 

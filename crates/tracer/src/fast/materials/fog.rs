@@ -7,7 +7,6 @@ use glam::DVec3;
 use rayfold_scene::Scene;
 
 use crate::fast::arithmetic::real::Real;
-use crate::fast::build::prepare::Entry;
 use crate::fast::rays::bounce::{Columns, Hits, ROOM, RayBatch};
 use crate::reference::clearness;
 
@@ -27,12 +26,12 @@ impl Fog {
     }
 
     /// Mixes the fog into the colours of the hits. Stores what it leaves of the rays' weight ([`Hits::clearness`]), and
-    /// the mirror coefficients times that. `is_painted` says that the mirror coefficients are stored already. With
-    /// `EYE` the rays have a weight of 1.
+    /// the mirror coefficients times that. `mirror` returns those of an object by its order; `is_painted` says that
+    /// the hits have them already. With `EYE` the rays have a weight of 1.
     #[inline(never)]
     pub(crate) fn dim<E: Real, const EYE: bool>(
         &self,
-        entries: &[Entry<E>],
+        mirror: impl Fn(usize) -> [E; 3],
         queue: &RayBatch<E>,
         hits: &mut Hits<E>,
         (lanes, is_painted): (usize, bool),
@@ -50,16 +49,15 @@ impl Fog {
                 let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
                 let own = read(&hits.color, lane);
                 let color = clear * own + (1.0 - clear) * self.color * weight;
-                let mirror = if is_painted {
+                let share = if is_painted {
                     DVec3::from_array([0, 1, 2].map(|channel: usize| hits.mirror[channel][lane].widen()))
                 } else {
-                    let entry = &entries[hits.order.0[lane].to_index()];
-                    DVec3::from_array(entry.mirror.map(E::widen)) * weight
+                    DVec3::from_array(mirror(hits.order.0[lane].to_index()).map(E::widen)) * weight
                 };
                 hits.clearness[lane] = E::narrow(clear);
                 for channel in 0..3 {
                     hits.color[channel].0[lane] = E::narrow(color[channel]);
-                    hits.mirror[channel][lane] = E::narrow(clear * mirror[channel]);
+                    hits.mirror[channel][lane] = E::narrow(clear * share[channel]);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use rayfold_scene::model::unit;
-use rayfold_scene::{Cuboid, Light, Object, Scene, Shine};
+use rayfold_scene::{Capsule, Cuboid, Light, Object, Scene, Shine};
 
 use crate::fast::placement::lens::Lens;
 use crate::fast::rays::view::{View, view};
@@ -174,6 +174,7 @@ fn curvature(object: &Object) -> Option<(f64, DVec3)> {
         Object::Cylinder(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
         Object::Cone(o) => Some((o.radii()[0].max(o.radii()[1]), 0.5 * (o.ends()[0] + o.ends()[1]))),
         Object::Torus(o) => Some((o.thickness(), o.center())),
+        Object::Capsule(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
         Object::Instance(o) => curvature(&in_world(o)?),
         Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) => None,
     }
@@ -226,6 +227,11 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
             let points = rings.into_iter().flat_map(|c| ring(c, o.normal(), outer)).collect();
             Hull { points, girth: 2.0 * o.thickness(), is_flat: false }
         }
+        Object::Capsule(o) => {
+            let [tip, end] = tips(o);
+            let round = round([o.radius(); 2], o.ends());
+            Hull { points: round.points.into_iter().chain([tip, end]).collect(), ..round }
+        }
         Object::Instance(o) => match in_world(o) {
             Some(object) => return hull(&object),
             None => match o.object() {
@@ -236,8 +242,21 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
     })
 }
 
+/// The outermost points of a capsule along its axis.
+pub(super) fn tips(capsule: &Capsule) -> [DVec3; 2] {
+    let [a, b] = capsule.ends();
+    let reach = capsule.radius() * along(a, b);
+    [a - reach, b + reach]
+}
+
+/// The unit vector from one point to another; any if they are the same.
+fn along(a: DVec3, b: DVec3) -> DVec3 {
+    if a == b { DVec3::Z } else { unit(b - a) }
+}
+
 fn round(radii: [f64; 2], [a, b]: [DVec3; 2]) -> Hull {
-    let points = ring(a, b - a, radii[0]).chain(ring(b, b - a, radii[1])).collect();
+    let axis = along(a, b);
+    let points = ring(a, axis, radii[0]).chain(ring(b, axis, radii[1])).collect();
     let thick = 2.0 * radii[0].max(radii[1]);
     let girth = if 4.0 * thick < a.distance(b) { thick } else { f64::INFINITY };
     Hull { points, girth, is_flat: false }
@@ -273,6 +292,8 @@ mod tests {
             ("Cylinder .05 -5 0 -10 5 0 -10", 1.0),
             ("Cone .05 .02 -5 0 -10 5 0 -10", 1.0),
             ("Torus 3 .05 0 0 -10 0 0 1", 1.0),
+            ("Capsule .05 -5 0 -10 5 0 -10", 1.0),
+            ("Capsule .05 0 0 -10 0 0 -10", 1.0),
             ("Box -5 -.05 -10.1 5 .05 -10", 1.0),
             ("Triangle -5 0 -10 5 0 -10 5 .1 -10", 1.0),
             ("Disc 1 0 0 -10 0 1 .05", 1.0),

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{
-    Cone, Cuboid, Cylinder, Instance, Material, Object, Placement, SharedSlice, Sphere, Torus, Triangle,
+    Capsule, Cone, Cuboid, Cylinder, Instance, Material, Object, Placement, SharedSlice, Sphere, Torus,
+    Triangle,
 };
 
-use super::gauge::Gauge;
+use super::gauge::{Gauge, tips};
 use crate::fast::shapes::instance::in_world;
 
 /// How often what is long is halved, at most, because pixels are not of one size along it.
@@ -82,6 +83,7 @@ impl<'a> Widener<'a> {
                     self.make(Sphere::new(o.radius() + thick, o.center(), material));
                 }
             }
+            Object::Capsule(o) => self.rod([o.radius(); 2], tips(o), HALVINGS),
             Object::Instance(o) => match (in_world(o), o.object()) {
                 (Some(object), _) => self.widen(&object),
                 (None, Object::Cuboid(cuboid)) => {
@@ -149,6 +151,7 @@ pub(super) fn repainted(object: &Object, material: Material) -> Option<Object> {
         Object::Torus(o) => {
             Object::from(Torus::new(o.radius(), o.thickness(), o.center(), o.normal(), material).ok()?)
         }
+        Object::Capsule(o) => Object::from(Capsule::new(o.radius(), o.ends(), material).ok()?),
         Object::Instance(o) => return repainted(&in_world(o)?, material),
         Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) => return None,
     };

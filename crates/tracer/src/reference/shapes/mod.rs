@@ -3,6 +3,7 @@
 //! Each shape has a file. Bounds on rounding errors are multiples of the unit roundoff and of the largest number in the
 //! computation.
 
+mod capsule;
 mod cone;
 mod cuboid;
 mod cylinder;
@@ -96,6 +97,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Cylinder(cylinder) => cylinder,
         Object::Cone(cone) => cone,
         Object::Torus(torus) => torus,
+        Object::Capsule(capsule) => capsule,
         Object::Instance(instance) => instance,
     }
 }
