@@ -49,6 +49,15 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-studio",
         ],
     ),
+    (
+        "rayfold-python",
+        &[
+            "rayfold-scene",
+            "rayfold-files",
+            "rayfold-tracer",
+            "rayfold-movie",
+        ],
+    ),
     ("rayfold-xtask", &["rayfold-scene"]),
     (
         "rayfold-bench",

@@ -4,11 +4,13 @@
 //! that the command makes.
 
 use std::fmt;
+use std::ops::Range;
 
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Lamp, Lens, Light, Look,
-    MATERIAL, ORTHOCAMERA, Object, Pinhole, Samples, Screen, Shutter, Tone, USE, shapes, with_shapes,
+    Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, InvalidValue, Lamp, Lens,
+    Light, Look, MATERIAL, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples, Screen, Shutter, Tone,
+    USE, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -198,6 +200,40 @@ impl Command {
         last.is_some_and(|(at, clause)| clause.form().takes_color(words.len() - at - 1, is_behind_color))
     }
 
+    /// Returns the errors in the numbers of a line without curves, each with the range of the numbers that it is about.
+    /// `numbers` are as many as the form takes, those from [`Form::surface`] on left out if a material is named.
+    pub fn check(self, numbers: &[f64]) -> Vec<(InvalidValue, Range<usize>)> {
+        let form = self.form();
+        let mut values = [0.0; MAX_NUMBERS];
+        values[..numbers.len()].copy_from_slice(numbers);
+        form.show(&mut values);
+        let surface = form.surface().filter(|&first| numbers.len() <= first).map(|_| Material::default());
+        let faults = self.faults(&mut Numbers::new(&values, numbers.len(), surface.as_ref()));
+        let placed =
+            |fault: InvalidValue| (fault, form.place(|name, parameter| fault.is_about(parameter, name)));
+        faults.map(|faults| faults.0.into_iter().map(placed).collect()).unwrap_or_default()
+    }
+
+    /// Returns the errors in the numbers of a line.
+    pub(crate) fn faults(self, numbers: &mut Numbers<'_>) -> Option<Faults> {
+        match self.effect() {
+            Effect::Screen => Screen::read(numbers).err(),
+            Effect::Camera(read) => read(numbers).err(),
+            Effect::Background => Background::read(numbers).err(),
+            Effect::Fog => Fog::read(numbers).err(),
+            Effect::Lens => Lens::read(numbers).err(),
+            Effect::Samples => Samples::read(numbers).err(),
+            Effect::Shutter => Shutter::read(numbers).err(),
+            Effect::Tone => Tone::read(numbers).err(),
+            Effect::Depth => Depth::read(numbers).err(),
+            Effect::Frames => FrameNumbers::read(numbers).err(),
+            Effect::Object(read) => read(numbers).err(),
+            Effect::Light(read) => read(numbers).err(),
+            Effect::Use => Placement::read(numbers).err(),
+            Effect::Material | Effect::Group | Effect::End | Effect::Clear | Effect::Trace => None,
+        }
+    }
+
     /// Returns the command that was probably meant: one with a similar name, or one that starts with `name`.
     pub(crate) fn nearest(name: &str) -> Option<Self> {
         // A longer word is no typo, and the distance takes quadratic time.
@@ -220,6 +256,7 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Parameter;
 
     #[test]
     fn names_are_not_shared() {
@@ -230,6 +267,20 @@ mod tests {
         for none in ["", "S", "Zoom", "Äpfel", "{", "@", "Spheres", "spher", "1"] {
             assert_eq!(Command::from_name(none), None, "{none}");
         }
+    }
+
+    #[test]
+    fn numbers_are_checked_without_a_line() {
+        let ball = [-1.0, 0.0, f64::NAN, 0.0];
+        assert_eq!(Command::Sphere.check(&ball), [(InvalidValue::NotPositive(Parameter::Radius), 0..1)]);
+        assert_eq!(
+            Command::Sphere.check(&[1.0, 0.0, f64::NAN, 0.0]),
+            [(InvalidValue::NotFinite(Parameter::Center), 1..4)]
+        );
+        assert_eq!(Command::Sphere.check(&[1.0, 0.0, 0.0, 0.0]), []);
+        assert_eq!(Command::Frames.check(&[7.0, 3.0]), [(InvalidValue::FramesBackwards, 0..2)]);
+        assert_eq!(Command::Frames.check(&[7.0]), []);
+        assert_eq!(Command::Trace.check(&[]), []);
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub use model::{
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;
-pub use parse::{Parsed, parse, parse_curve};
+pub use parse::{Parsed, is_name, parse, parse_curve};
 pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};
 pub use shared_slice::SharedSlice;

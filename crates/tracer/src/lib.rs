@@ -159,6 +159,22 @@ pub fn render_frame(
     Some(render_exposed(Exposure::moving(&scene, &after), options))
 }
 
+/// Draws the light of frame `k` of a script, counted from 0, on the current rayon pool ([`Drawing::draw_light`]). Returns
+/// `None` after the last frame.
+///
+/// # Errors
+/// The errors of [`render`].
+pub fn light_of_frame(
+    script: &Script,
+    k: usize,
+    options: &RenderOptions,
+) -> Option<Result<Vec<f32>, RenderError>> {
+    let scene = script.frame(k)?;
+    let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
+    let exposure = Exposure::moving(&scene, &after);
+    Some(Drawing::exposed(exposure, options).and_then(|drawing| drawing.draw_light()))
+}
+
 /// Draws a scene like [`render`] in single precision, by textbook formulas that ignore rounding errors. It is the
 /// baseline for measuring the cost of robustness. All other code is the same.
 ///

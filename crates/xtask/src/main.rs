@@ -1,7 +1,7 @@
 //! `cargo xtask`: chores that need more than Cargo, without a shell.
 //!
-//! Packages the function binaries for Lambda and the programs of a release without knowing what they do, and draws the
-//! pictures of the language page from the scripts in it.
+//! Packages the function binaries for Lambda, the programs of a release and the Python package without knowing what they
+//! do, and draws the pictures of the language page from the scripts in it.
 
 use clap::{Parser, Subcommand};
 
@@ -14,6 +14,7 @@ mod pictures;
 mod plot;
 mod sources;
 mod toolchain;
+mod wheel;
 
 /// Chores of the project.
 #[derive(Debug, Parser)]
@@ -29,6 +30,8 @@ enum Chore {
     Package(package::Args),
     /// Build the archive of a release for this machine: target/dist/rayfold-VERSION-TARGET.zip
     Dist(dist::Args),
+    /// Build the wheel of the Python package for this machine: target/wheels/rayfold-VERSION-cp310-abi3-PLATFORM.whl
+    Wheel,
     /// Draw the pictures of docs/language.md from the scripts in it, into docs/images/language
     Pictures(pictures::Args),
 }
@@ -37,6 +40,7 @@ fn main() -> anyhow::Result<()> {
     match Xtask::parse().chore {
         Chore::Package(args) => package::run(&args),
         Chore::Dist(args) => dist::run(&args),
+        Chore::Wheel => wheel::run(),
         Chore::Pictures(args) => pictures::run(&args),
     }
 }

@@ -1,7 +1,7 @@
-//! The linker: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild.
+//! Tools that come by pip: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild; and
+//! maturin, which builds wheels.
 //!
-//! Both are pinned, because other versions may give other bytes, and kept in a folder of their own
-//! in the user's cache.
+//! All are pinned, because other versions may give other bytes, and kept in folders of their own in the user's cache.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -11,6 +11,7 @@ use anyhow::{Context, bail, ensure};
 
 const ZIG: &str = "0.15.2";
 const CARGO_ZIGBUILD: &str = "0.24.0";
+const MATURIN: &str = "1.16.0";
 
 /// The installed tools.
 pub(crate) struct Toolchain {
@@ -20,15 +21,10 @@ pub(crate) struct Toolchain {
 impl Toolchain {
     /// Returns the tools of the cache. Installs them first if they are missing.
     pub(crate) fn get() -> anyhow::Result<Self> {
-        let folder = cache()?.join(format!("zig-{ZIG}-zigbuild-{CARGO_ZIGBUILD}"));
-        let binaries = folder.join("bin");
-        if !binaries.join("cargo-zigbuild").is_file() {
-            say(&format!(
-                "installing zig {ZIG} and cargo-zigbuild {CARGO_ZIGBUILD} into {}",
-                folder.display()
-            ));
-            install(&folder).context("zig and cargo-zigbuild come by pip, which needs Python 3 with venv")?;
-        }
+        let packages = [format!("ziglang=={ZIG}"), format!("cargo-zigbuild=={CARGO_ZIGBUILD}")];
+        let program =
+            installed(&format!("zig-{ZIG}-zigbuild-{CARGO_ZIGBUILD}"), &packages, "cargo-zigbuild")?;
+        let binaries = program.parent().context("a program without a folder")?.to_owned();
         Ok(Self { binaries })
     }
 
@@ -45,18 +41,36 @@ impl Toolchain {
     }
 }
 
-/// Installs the tools. Deletes an incomplete installation first.
-fn install(folder: &Path) -> anyhow::Result<()> {
+/// Returns the program maturin of the cache. Installs it first if it is missing.
+pub(crate) fn maturin() -> anyhow::Result<PathBuf> {
+    installed(&format!("maturin-{MATURIN}"), &[format!("maturin=={MATURIN}")], "maturin")
+}
+
+/// Returns a program of a folder in the cache. Installs the packages, of which the last one has the program, if it is missing.
+fn installed(name: &str, packages: &[String], program: &str) -> anyhow::Result<PathBuf> {
+    let folder = cache()?.join(name);
+    let path = folder.join("bin").join(program);
+    if !path.is_file() {
+        let packages_shown = packages.join(" and ");
+        say(&format!("installing {packages_shown} into {}", folder.display()));
+        install(&folder, packages)
+            .with_context(|| format!("{packages_shown} come by pip, which needs Python 3 with venv"))?;
+    }
+    Ok(path)
+}
+
+/// Installs packages. Deletes an incomplete installation first.
+fn install(folder: &Path, packages: &[String]) -> anyhow::Result<()> {
     let parent = folder.parent().context("the cache has no parent")?;
     std::fs::create_dir_all(parent)?;
     if folder.exists() {
         std::fs::remove_dir_all(folder)?;
     }
-    // A virtual environment cannot be moved. So its marker, cargo-zigbuild, is installed last.
+    // A virtual environment cannot be moved. So its marker, the last package, is installed last.
     run(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
     let pip = folder.join("bin/pip");
-    for package in [format!("ziglang=={ZIG}"), format!("cargo-zigbuild=={CARGO_ZIGBUILD}")] {
-        run(Command::new(&pip).args(["install", "--quiet", "--no-deps", &package]))?;
+    for package in packages {
+        run(Command::new(&pip).args(["install", "--quiet", "--no-deps", package]))?;
     }
     Ok(())
 }

@@ -371,7 +371,7 @@ impl Presence {
 
 impl Values {
     /// Returns whether a number may have all values from `low` to `high`. Ignores constraints on several components.
-    pub(crate) fn take(self, low: f64, high: f64) -> bool {
+    pub fn take(self, low: f64, high: f64) -> bool {
         match self {
             Self::Any | Self::Clamped | Self::NotZero => low.is_finite() && high.is_finite(),
             Self::Positive => low > 0.0,

@@ -1,5 +1,7 @@
 //! The clauses of a `Material`.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
@@ -77,6 +79,17 @@ impl Clause {
     /// Returns the clause with this name, in any letter case.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|c| c.name().eq_ignore_ascii_case(name))
+    }
+
+    /// Returns the errors in the numbers of a clause without curves, each with the range of the numbers that it is about.
+    /// `numbers` are as many as the form takes.
+    pub fn check(self, numbers: &[f64]) -> Vec<(InvalidValue, Range<usize>)> {
+        let form = self.form();
+        let mut numbers = Numbers::new(numbers, numbers.len(), None);
+        let added = Clauses::default().add(self, &mut numbers, Coefficients::default());
+        let placed =
+            |fault: InvalidValue| (fault, form.place(|name, parameter| fault.is_about(parameter, name)));
+        added.map_or_else(|faults| faults.0.into_iter().map(placed).collect(), |()| Vec::new())
     }
 
     /// Returns whether the clause is a pattern. A material has at most one.

@@ -37,6 +37,7 @@ use doubts::{Doubts, looks_in, looks_of};
 use line::Statement;
 use names::Names;
 use picture::Picture;
+pub use text::is_name;
 use text::{Words, lines};
 use visibility::{Animated, Exposure, Origin};
 

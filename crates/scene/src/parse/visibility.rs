@@ -9,11 +9,9 @@
 use std::ops::Range;
 
 use super::wording;
-use crate::command::{Command, Effect};
+use crate::command::Command;
 use crate::form::{Form, Numbers};
-use crate::model::{
-    Background, Clause, Clauses, Coefficients, Faults, Fog, FrameNumbers, Lens, Material, Placement, Tone,
-};
+use crate::model::{Clause, Clauses, Coefficients, Faults, FrameNumbers, Material, Tone};
 use crate::report::{Line, Report};
 use crate::row::{Number, Row};
 
@@ -120,29 +118,9 @@ impl Origin {
 
     /// Returns the errors in these numbers.
     fn faults(self, numbers: &mut Numbers<'_>) -> Option<Faults> {
-        use crate::form::Scripted;
         match self {
             Self::Clause(clause) => Clauses::default().add(clause, numbers, Coefficients::default()).err(),
-            Self::Command(command) => match command.effect() {
-                Effect::Camera(read) => read(numbers).err(),
-                Effect::Object(read) => read(numbers).err(),
-                Effect::Light(read) => read(numbers).err(),
-                Effect::Background => Background::read(numbers).err(),
-                Effect::Fog => Fog::read(numbers).err(),
-                Effect::Lens => Lens::read(numbers).err(),
-                Effect::Use => Placement::read(numbers).err(),
-                Effect::Screen
-                | Effect::Samples
-                | Effect::Shutter
-                | Effect::Tone
-                | Effect::Depth
-                | Effect::Frames
-                | Effect::Material
-                | Effect::Group
-                | Effect::End
-                | Effect::Clear
-                | Effect::Trace => unreachable!("`{command}` has no curves"),
-            },
+            Self::Command(command) => command.faults(numbers),
         }
     }
 }

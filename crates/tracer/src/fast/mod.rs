@@ -154,6 +154,22 @@ impl<'a> Drawing<'a> {
         }
     }
 
+    /// Draws the light of the image before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from the
+    /// top, before [`rayfold_scene::Tone`]. With one sample per pixel the reference tracer draws it, which takes as long as
+    /// it has objects.
+    ///
+    /// # Errors
+    /// The errors of [`crate::render`].
+    pub fn draw_light(&self) -> Result<Vec<f32>, RenderError> {
+        match &self.0 {
+            Backend::SampledSingle(sampled) => sampled.light(),
+            Backend::SampledDouble(sampled) => sampled.light(),
+            Backend::Single(setup) => crate::reference::light(Exposure::still(setup.scene), setup.options),
+            Backend::Double(setup) => crate::reference::light(Exposure::still(setup.scene), setup.options),
+            Backend::Reference(exposure, options) => crate::reference::light(*exposure, options),
+        }
+    }
+
     fn draw_within(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
         let end = rows.end.min(self.height());
         let rows = rows.start.min(end)..end;

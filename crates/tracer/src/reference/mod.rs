@@ -34,8 +34,8 @@ use rayfold_scene::{Object, Scene};
 
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
-pub(crate) use sampled::render_rows as render_exposed_rows;
 pub use sampled::{Estimate, estimate, render_exposed};
+pub(crate) use sampled::{light, render_rows as render_exposed_rows};
 pub(crate) use shading::{FAINT, FAINT_LINEAR, clearness};
 pub use shapes::Surface;
 pub(crate) use shapes::{

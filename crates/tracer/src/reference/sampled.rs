@@ -38,38 +38,86 @@ pub(crate) fn render_rows(
     options: &RenderOptions,
 ) -> Result<RgbImage, RenderError> {
     let scene = exposure.scene();
-    let samples = scene.samples.most();
-    if samples == 1 {
+    if scene.samples.most() == 1 {
         return super::render_rows(scene, rows, options);
     }
+    let image = with_pixels(exposure, options, |color| {
+        bands(
+            scene.screen,
+            rows,
+            1,
+            options,
+            || (),
+            |(), row, band| {
+                for (pixel, column) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
+                    pixel.copy_from_slice(&tone::toned(scene.tone, color(column, row)));
+                }
+            },
+        )
+    })?;
+    if is_cancelled(options) { Err(RenderError::Cancelled) } else { Ok(image) }
+}
+
+/// Returns the light of a scene, before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from the
+/// top. With one sample it is the light along the ray through the pixel's middle.
+///
+/// # Errors
+/// The errors of [`crate::render`].
+pub(crate) fn light(exposure: Exposure, options: &RenderOptions) -> Result<Vec<f32>, RenderError> {
+    use rayon::prelude::*;
+
+    let screen = exposure.scene().screen;
+    let row = |color: &Color, row: u32| -> Vec<f32> {
+        let color = |column| if is_cancelled(options) { DVec3::ZERO } else { color(column, row) };
+        (0..screen.width())
+            .flat_map(|column| color(column).to_array().map(|channel| channel as f32))
+            .collect()
+    };
+    let rows = with_pixels(exposure, options, |color| {
+        (0..screen.height()).into_par_iter().flat_map_iter(|j| row(color, j)).collect()
+    });
+    if is_cancelled(options) { Err(RenderError::Cancelled) } else { Ok(rows) }
+}
+
+/// Returns the colour of a pixel, clamped. Columns count from the left, rows from the top.
+type Color<'a> = dyn Fn(u32, u32) -> DVec3 + Sync + 'a;
+
+/// Calls `draw` with a function that gives the mean colour of a pixel, with the largest number of samples.
+fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce(&Color) -> T) -> T {
+    let scene = exposure.scene();
+    let samples = scene.samples.most();
     let scenes = exposure.moments();
     let dimensions = Dimensions::new(&scenes);
     let bounces = options.bounces(scene);
     let moments =
         scenes.iter().map(|scene| Moment { world: World::new(scene), dimensions: &dimensions, bounces });
     let moments: Vec<Moment> = moments.collect();
-    let image = bands(
-        scene.screen,
-        rows,
-        1,
-        options,
-        || (),
-        |(), row, band| {
-            for (pixel, column) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-                let seed = pixel_seed(column, row);
-                let mut sum = DVec3::ZERO;
-                for sample in 0..samples {
-                    let number = |dimension| coordinate(seed, sample, dimension);
-                    let time = dimensions.time.map_or(0.0, number) * moments.len() as f64;
-                    let moment = &moments[time as usize];
-                    sum += moment.color(scene, (column, row), number, options);
-                }
-                pixel.copy_from_slice(&tone::toned(scene.tone, sum / f64::from(samples)));
-            }
-        },
-    )?;
-    let is_cancelled = options.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed));
-    if is_cancelled { Err(RenderError::Cancelled) } else { Ok(image) }
+    let middles = moments[0].world.middles();
+    draw(&|column, row| {
+        if samples == 1 {
+            let world = &moments[0].world;
+            let ray = world.rays.ray(f64::from(column), f64::from(scene.screen.height() - 1 - row));
+            return clamped(Shader { world, lights: &middles, cancel: options.cancel }.color(ray, bounces));
+        }
+        let seed = pixel_seed(column, row);
+        let mut sum = DVec3::ZERO;
+        for sample in 0..samples {
+            let number = |dimension| coordinate(seed, sample, dimension);
+            let time = dimensions.time.map_or(0.0, number) * moments.len() as f64;
+            let moment = &moments[time as usize];
+            sum += moment.color(scene, (column, row), number, options);
+        }
+        sum / f64::from(samples)
+    })
+}
+
+/// Returns a colour in 0..1. A NaN is black.
+fn clamped(color: DVec3) -> DVec3 {
+    DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO)
+}
+
+fn is_cancelled(options: &RenderOptions) -> bool {
+    options.cancel.is_some_and(|flag| flag.load(std::sync::atomic::Ordering::Relaxed))
 }
 
 impl Moment<'_> {
@@ -86,9 +134,7 @@ impl Moment<'_> {
         let ray = self.ray(i, j, &number);
         let lights = self.light_points(&number);
         let shader = Shader { world: &self.world, lights: &lights, cancel: options.cancel };
-        let color = shader.color(ray, self.bounces);
-        // A NaN is black.
-        DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO)
+        clamped(shader.color(ray, self.bounces))
     }
 
     /// Returns the ray from a point of the lens through the point where the eye's own ray is in focus.

@@ -209,6 +209,23 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(())
     }
 
+    /// Returns the light of the image, before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from the
+    /// top.
+    pub(super) fn light(&self) -> Result<Vec<f32>, RenderError> {
+        let (width, height) = (self.scene.screen.width(), self.scene.screen.height());
+        let film = self.expose(0..height, |_| Ok(()))?;
+        let mut light = Vec::new();
+        let length = (width as usize).checked_mul(CHANNELS * height as usize);
+        let too_large = || RenderError::TooLarge { width, height };
+        light.try_reserve_exact(length.ok_or_else(too_large)?).map_err(|_| too_large())?;
+        for row in 0..height as usize {
+            film.each_of_row(row, |color| {
+                light.extend(color.unit().to_array().map(|channel| channel as f32))
+            });
+        }
+        Ok(light)
+    }
+
     /// Levels of rows of the image, from a film with so many rows above it.
     fn develop(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let (width, tone) = (self.scene.screen.width(), self.scene.tone);

@@ -1,0 +1,55 @@
+"""Ray-traced pictures and animations.
+
+    import rayfold as rf
+
+    scene = rf.Scene(320, 240, samples=16, background="#8cb4e6")
+    scene.look(eye=(0, 2, 8), at=(0, 1, 0), fov=34)
+    scene.ilight("#ffffff", (-1, -2, -1))
+    scene.plane((0, 0, 0), (0, 1, 0), diffuse=0.6)
+    scene.sphere(1, (0, 1, 0), diffuse="#c04020", mirror=0.2)
+    scene.render()
+"""
+
+from . import _rayfold
+from ._animation import Animation, animation, gif, load
+from ._errors import SceneError, SceneWarning
+from ._picture import Picture
+from ._rayfold import Curve, Diagnostic, Material, __version__
+from ._scene import Scene, parse
+
+__all__ = [
+    "Animation",
+    "Curve",
+    "Diagnostic",
+    "Material",
+    "Picture",
+    "Scene",
+    "SceneError",
+    "SceneWarning",
+    "__version__",
+    "animation",
+    "gif",
+    "keys",
+    "linear",
+    "load",
+    "parse",
+]
+
+
+Material.__doc__ = _rayfold.material_doc
+
+
+def keys(keys, mode="linear", cycle=False):
+    return _rayfold.keys(keys, mode, cycle)
+
+
+keys.__doc__ = _rayfold.keys_doc
+
+
+def linear(color):
+    """Returns the channels of a colour such as `"#c04020"` as linear light, for scenes with `tone("srgb")`."""
+    digits = color[1:]
+    if not (isinstance(color, str) and color.startswith("#") and len(digits) == 6 and digits.isalnum()):
+        raise ValueError(f"linear(): expected a colour such as '#c04020', not {color!r}")
+    channels = (int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4))
+    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)

@@ -1,0 +1,45 @@
+"""Arrays of pixels that a notebook shows as pictures."""
+
+import os
+
+import numpy as np
+
+from . import _rayfold
+
+
+class Picture(np.ndarray):
+    """An array of height x width x 3: levels as `uint8`, or light from 0 to 1 as `float32`."""
+
+    def png(self):
+        """Returns the picture as a PNG file. Light becomes levels without a curve."""
+        return image_of(self).png()
+
+    def save(self, path):
+        """Writes the picture as a PNG file, which appears whole or not at all."""
+        _rayfold.write_file(os.fspath(path), self.png())
+
+    def _repr_png_(self):
+        # A part of a picture, such as a row of it or a sum, may be none.
+        return self.png() if self.ndim == 3 and self.shape[2] == 3 and self.size > 0 else None
+
+
+def picture_of(image, linear=False):
+    """Returns an image of the extension as an array."""
+    width, height = image.size
+    array = np.frombuffer(image.data(), np.float32 if linear else np.uint8)
+    return array.reshape(height, width, 3).view(Picture)
+
+
+def image_of(array, name="the picture"):
+    """Returns an array as an image of the extension."""
+    array = np.asarray(array)
+    if array.ndim == 2:
+        array = np.repeat(array[:, :, None], 3, axis=2)
+    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
+        raise ValueError(f"{name} has the shape {array.shape}: expected (height, width, 3) or (height, width)")
+    if array.dtype.kind == "f":
+        array = np.round(255.0 * np.nan_to_num(array, nan=0.0).clip(0.0, 1.0))
+    elif array.dtype != np.uint8:
+        raise TypeError(f"{name} has the type {array.dtype}: expected uint8 from 0 to 255, or floats from 0 to 1")
+    height, width = array.shape[:2]
+    return _rayfold.Image(width, height, np.ascontiguousarray(array, np.uint8).tobytes())

@@ -1,0 +1,152 @@
+"""Scenes: a method for each command of the language, made from its table."""
+
+import inspect
+import os
+
+from . import _rayfold
+from ._picture import picture_of
+
+METHODS = _rayfold.methods()
+SETTINGS = frozenset(_rayfold.settings())
+
+
+class Scene(_rayfold.Script):
+    """A scene: its commands in order, as a script has them.
+
+    `Scene(640, 360)` sets the size of the picture. Each command of the scene language that sets something may be a keyword:
+    `samples=64`, `samples=(64, 1)`, `background="#204080"`. A tuple holds the arguments of the command, a dict its keywords.
+    """
+
+    def __init__(self, width=None, height=None, **settings):
+        if width is not None or height is not None:
+            self.screen(width, height)
+        for name, value in settings.items():
+            if name not in SETTINGS:
+                raise TypeError(f"Scene() has no parameter {name!r}; its keywords are {', '.join(sorted(SETTINGS))}")
+            if value is None:
+                continue
+            method = getattr(self, name)
+            if isinstance(value, dict):
+                method(**value)
+            elif isinstance(value, tuple) and not _is_first_argument(name, value):
+                method(*value)
+            else:
+                method(value)
+
+    def copy(self):
+        """Returns a copy, to which other commands can be added."""
+        other = Scene()
+        other._assign(self)
+        return other
+
+    __copy__ = copy
+
+    def __deepcopy__(self, _memo):
+        return self.copy()
+
+    def __reduce__(self):
+        # Text and name are all that there is.
+        return _read, (str(self), self._name)
+
+    def render(self, frame=1, *, linear=False):
+        """Draws a frame, counted from 1.
+
+        Returns an array of height x width x 3: levels from 0 to 255 as `uint8`, or with `linear` the light before `tone` and
+        rounding, from 0 to 1, as `float32`.
+        """
+        return picture_of(self._draw(frame, linear), linear)
+
+    def save(self, path, frame=1):
+        """Draws a frame and writes it as PNG; or writes the script, for a path that ends in `.txt`."""
+        path = os.fspath(path)
+        if path.lower().endswith(".txt"):
+            _rayfold.write_file(path, str(self).encode())
+        elif path.lower().endswith(".png"):
+            _rayfold.write_file(path, self._draw(frame).png())
+        else:
+            raise ValueError(f"cannot tell what {path!r} should be: expected .png, or .txt for the script")
+
+    def _draw(self, frame, linear=False):
+        ahead = _rayfold.Ahead()
+        if frame < 1:
+            raise ValueError(f"frames are counted from 1, not {frame}")
+        ahead.start(self, frame - 1, linear)
+        return ahead.take()
+
+    def _repr_png_(self):
+        return self._draw(1).png()
+
+
+class Group:
+    """An open group: `with scene.group("leg"):` ends it after the block."""
+
+    def __init__(self, scene):
+        self._scene = scene
+
+    def __enter__(self):
+        return self._scene
+
+    def __exit__(self, kind, _value, _traceback):
+        if kind is None:
+            self._scene.end()
+        return False
+
+
+def _read(text, name):
+    scene = Scene()
+    scene._read(text, name)
+    return scene
+
+
+def parse(text, name="scene"):
+    """Makes a scene of a script's text. Commands that are added belong to its last frame."""
+    return _read(text, name)
+
+
+def _is_first_argument(name, value):
+    """Whether a tuple is a vector, the first argument of a command, rather than all of its arguments."""
+    _, _, parameters, _ = METHODS[INDEX[name]]
+    return len(value) == parameters[0][2] > 1 and not any(
+        isinstance(number, (str, tuple, list)) or hasattr(number, "__len__") for number in value
+    )
+
+
+def _signature(parameters, has_clauses):
+    kind = inspect.Parameter
+    listed = [kind("self", kind.POSITIONAL_ONLY)]
+    is_optional = False
+    for name, is_required, _ in parameters:
+        is_optional |= not is_required
+        listed.append(kind(name, kind.POSITIONAL_OR_KEYWORD, default=None if is_optional else kind.empty))
+    if has_clauses:
+        listed.extend(kind(name, kind.KEYWORD_ONLY, default=None) for name, _ in _rayfold.clauses())
+    return inspect.Signature(listed)
+
+
+def _method(index, name, doc, parameters, has_clauses):
+    add = _rayfold.Script._add
+
+    if name == "group":
+
+        def method(self, *args, **kwargs):
+            add(self, index, args, kwargs)
+            return Group(self)
+
+    else:
+
+        def method(self, *args, **kwargs):
+            return add(self, index, args, kwargs)
+
+    method.__name__ = name
+    method.__qualname__ = f"Scene.{name}"
+    method.__doc__ = doc
+    method.__module__ = "rayfold"
+    method.__signature__ = _signature(parameters, has_clauses)
+    return method
+
+
+INDEX = {}
+for _index, (_name, *_rest) in enumerate(METHODS):
+    INDEX[_name] = _index
+    setattr(Scene, _name, _method(_index, _name, *_rest))
+Scene.__module__ = "rayfold"

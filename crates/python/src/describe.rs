@@ -1,0 +1,213 @@
+//! Docstrings and the type stub, from the table of the language.
+//!
+//! `__init__.pyi` is the text of [`stub`]; a test compares the two. What does not come from the table stands in `stub.pyi`.
+
+use std::fmt::Write;
+
+use rayfold_scene::{Clause, Curve, Field, Form, Kind, Mode, Names, Subject, Unit, Values};
+
+use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, is_color};
+
+/// The parts of the stub that are written by hand, with lines in place of what the table gives.
+const TEMPLATE: &str = include_str!("stub.pyi");
+
+/// Returns the text of `__init__.pyi`.
+pub(crate) fn stub() -> String {
+    let mut text = String::new();
+    for line in TEMPLATE.lines() {
+        match line.trim() {
+            "# commands" => METHODS.iter().for_each(|method| write_method(&mut text, method)),
+            "# settings" => settings().for_each(|method| {
+                let Signature { method, .. } = method;
+                text += &format!("        {method}: Any = ...,\n");
+            }),
+            "# clauses" => CLAUSES.iter().for_each(|keyword| {
+                text += &format!("        {}: {} | None = None,\n", keyword.name, keyword_type(keyword));
+            }),
+            "# modes" => text += &format!("Mode: TypeAlias = Literal[{}]\n", quoted(modes())),
+            _ => text += &format!("{line}\n"),
+        }
+    }
+    text
+}
+
+/// Returns the commands that may be keywords of `Scene`: those that take arguments, but neither a name nor a material.
+pub(crate) fn settings() -> impl Iterator<Item = &'static Signature> {
+    METHODS.iter().filter(|method| {
+        let form = method.command.form();
+        !method.parameters.is_empty()
+            && form.subject.is_none()
+            && form.surface().is_none()
+            && method.method != "screen"
+    })
+}
+
+/// Returns the docstring of a method.
+pub(crate) fn method_doc(method: &Signature) -> String {
+    let form = method.command.form();
+    let mut text = format!("{}\n\nIn a script: `{form}`.\n", method.command.summary());
+    if !method.parameters.is_empty() || method.has_clauses() {
+        text += "\nParameters\n----------\n";
+    }
+    for parameter in &method.parameters {
+        let type_name = parameter_type(form, parameter);
+        let default = if parameter.is_required { "" } else { ", optional" };
+        let _ = writeln!(text, "{} : {type_name}{default}", parameter.name);
+        let about = match parameter.role {
+            Role::Name(Subject::Defines(names)) => format!("the name of the new {}", names.noun()),
+            Role::Name(Subject::Refers(names)) => format!("the name of a {}", names.noun()),
+            Role::Field(i) => field_doc(&form.fields[i]),
+            Role::Material(_) => {
+                "the surface: a `Material`, the name of one, or a colour for `diffuse`; in its \
+                                  place the clauses below. Black by default"
+                    .to_owned()
+            }
+        };
+        let _ = writeln!(text, "    {about}.");
+    }
+    if method.has_clauses() {
+        let names: Vec<&str> = CLAUSES.iter().map(|keyword| keyword.name.as_str()).collect();
+        let _ =
+            writeln!(text, "{}\n    the clauses of a material, as those of `Material`.", names.join(", "));
+    }
+    if let Some(word) = form.word {
+        let _ = writeln!(text, "\n`{}({word:?})` in place of all arguments.", method.method);
+    }
+    let together: Vec<String> = form.constraints.iter().map(|constraint| constraint.describe(form)).collect();
+    if !together.is_empty() {
+        let _ = writeln!(text, "\nIn the names of the script, {}.", together.join("; "));
+    }
+    text
+}
+
+/// Returns the docstring of `Material`.
+pub(crate) fn material_doc() -> String {
+    let mut text = "A surface, of the clauses that are given.\n\nA scene defines it where it is used first. Without a \
+                    name it gets one there.\n\nParameters\n----------\nname : str, optional\n    its name in scripts.\n"
+        .to_owned();
+    for keyword in &*CLAUSES {
+        let form = keyword.clause.form();
+        let _ = writeln!(text, "{} : {}, optional", keyword.name, keyword_type(keyword));
+        let _ = writeln!(text, "    {}", keyword.clause.summary());
+        for (entry, field) in keyword.entries.iter().zip(form.fields) {
+            let of = if keyword.entries.len() > 1 { format!("{entry}: ") } else { String::new() };
+            let _ = writeln!(text, "    {of}{}.", field_doc(field));
+        }
+        if form.ends_with.is_some() {
+            text += "    other: the other material, a `Material` or a name.\n";
+        }
+    }
+    text
+}
+
+/// Returns the words with which a curve may start, in the order of the documentation.
+pub(crate) fn modes() -> impl Iterator<Item = &'static str> {
+    Mode::ALL.iter().map(|mode| mode.name())
+}
+
+/// Returns the docstring of `keys`.
+pub(crate) fn keys_doc() -> String {
+    let example =
+        rayfold_scene::parse_curve("(smooth 1:0 50:3)").as_ref().map(Curve::to_string).unwrap_or_default();
+    let modes: String = rayfold_scene::language()
+        .curve_modes
+        .iter()
+        .map(|mode| format!("    {} : {}\n", mode.name, mode.about))
+        .collect();
+    format!(
+        "A number, or several, that change from frame to frame.\n\nIn a script: `{example}`.\n\nParameters\n----------\n\
+         keys : dict\n    values by the numbers of frames. A value is a number, or a vector or colour: then the result \
+         is a tuple of curves.\nmode : str or tuple\n    the interpolation between two keys. A tuple is \
+         `(\"bezier\", a, b, c, d)`.\ncycle : bool\n    whether the curve restarts at its last key.\n\nModes\n-----\n{modes}"
+    )
+}
+
+fn field_doc(field: &Field) -> String {
+    let unit = match (field.kind, field.kind.unit()) {
+        (Kind::Word, _) | (_, Unit::One) => String::new(),
+        (_, unit) => format!(" in {unit}"),
+    };
+    let range = match field.values {
+        Values::Any => String::new(),
+        values => format!(", {values}"),
+    };
+    let default =
+        field.presence.default().map(|default| format!("; by default {default}")).unwrap_or_default();
+    format!("{} (`{}`): {}{unit}{range}{default}", field.parameter, field.names.join(" "), field.kind)
+}
+
+fn write_method(text: &mut String, method: &Signature) {
+    let form = method.command.form();
+    let mut parameters = vec!["self".to_owned()];
+    let mut is_optional = false;
+    for parameter in &method.parameters {
+        let type_name = parameter_type(form, parameter);
+        let type_name = match form.word.filter(|_| parameters.len() == 1) {
+            Some(word) => format!("{type_name} | Literal[\"{word}\"]"),
+            None => type_name,
+        };
+        is_optional |= !parameter.is_required || form.word.is_some() && parameters.len() > 1;
+        parameters.push(if is_optional {
+            format!("{}: {type_name} | None = None", parameter.name)
+        } else {
+            format!("{}: {type_name}", parameter.name)
+        });
+    }
+    if method.has_clauses() {
+        parameters.push("*".to_owned());
+        let clause = |keyword: &Keyword| format!("{}: {} | None = None", keyword.name, keyword_type(keyword));
+        parameters.extend(CLAUSES.iter().map(clause));
+    }
+    let result = match form.subject {
+        Some(Subject::Defines(Names::Materials)) => "Material",
+        Some(Subject::Defines(Names::Groups)) => "AbstractContextManager[Scene]",
+        _ => "None",
+    };
+    let _ = writeln!(text, "    def {}(", method.method);
+    for parameter in parameters {
+        let _ = writeln!(text, "        {parameter},");
+    }
+    let _ = writeln!(text, "    ) -> {result}:");
+    let doc = method_doc(method);
+    let lines = doc.trim_end().lines().collect::<Vec<_>>().join("\n        ");
+    let lines = lines.replace("\n        \n", "\n\n");
+    let _ = writeln!(text, "        \"\"\"{lines}\n        \"\"\"");
+}
+
+fn parameter_type(form: &Form, parameter: &Parameter) -> String {
+    match parameter.role {
+        Role::Name(_) => "str".to_owned(),
+        Role::Field(i) => field_type(form, &form.fields[i]),
+        Role::Material(_) => "Material | str".to_owned(),
+    }
+}
+
+fn field_type(form: &Form, field: &Field) -> String {
+    match field.values {
+        Values::OneOf(words) => return format!("Literal[{}]", quoted(words.iter().copied())),
+        Values::Whole(..) => return "int".to_owned(),
+        _ => {}
+    }
+    let name = match (field.names.len(), is_color(field)) {
+        (_, true) => "Color",
+        (1, _) => "Number",
+        _ => "Vector",
+    };
+    if form.curves { name.to_owned() } else { format!("Fixed{name}") }
+}
+
+/// Returns the type of a clause's value.
+fn keyword_type(keyword: &Keyword) -> String {
+    let form: &Form = Clause::form(keyword.clause);
+    let mut types: Vec<String> = form.fields.iter().map(|field| field_type(form, field)).collect();
+    types.extend(form.ends_with.map(|_| "Material | str".to_owned()));
+    match types.as_slice() {
+        [] => "bool".to_owned(),
+        [one] => one.clone(),
+        several => format!("tuple[{}]", several.join(", ")),
+    }
+}
+
+fn quoted(words: impl Iterator<Item = &'static str>) -> String {
+    words.map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+}

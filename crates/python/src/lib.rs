@@ -1,0 +1,90 @@
+//! The extension module of the Python package: scenes as text, pictures, animations.
+//!
+//! Python's side (`python/rayfold`) is small: it makes a method of each command in [`signature::METHODS`], gives arrays
+//! their shape, and takes scenes from functions and iterators. All checks, texts and pictures are made here. A scene is the
+//! text of its script ([`script`]), so what Python draws is what `rayfold render` draws of that text.
+//!
+//! `unsafe`: this crate writes none. PyO3's attributes expand to it where Python calls a function of Rust, for pointers that
+//! CPython passes. The lint allows that in code of other crates' macros, so that `forbid` holds here as in the whole
+//! workspace.
+//!
+//! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. No panic leaves the module as one. The
+//! library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
+
+mod curve;
+mod describe;
+mod drawing;
+mod encoder;
+mod error;
+mod folder;
+mod material;
+mod place;
+mod script;
+mod signature;
+mod value;
+
+use pyo3::prelude::*;
+use pyo3::types::PyModule;
+
+/// A method of `Scene`: its name, its documentation, its parameters, and whether it takes the clauses of a material.
+type Method = (String, String, Vec<Parameter>, bool);
+/// The name of a parameter, whether it is required, and the count of its numbers.
+type Parameter = (String, bool, usize);
+
+/// The methods of `Scene`, in the order in which `Script._add` counts them.
+#[pyfunction]
+fn methods() -> Vec<Method> {
+    let parameter = |method: &signature::Signature, parameter: &signature::Parameter| {
+        let numbers = match parameter.role {
+            signature::Role::Field(i) => method.command.form().fields[i].names.len(),
+            signature::Role::Name(_) | signature::Role::Material(_) => 0,
+        };
+        (parameter.name.clone(), parameter.is_required, numbers)
+    };
+    let method = |method: &signature::Signature| {
+        let parameters = method.parameters.iter().map(|p| parameter(method, p)).collect();
+        (method.method.clone(), describe::method_doc(method), parameters, method.has_clauses())
+    };
+    signature::METHODS.iter().map(method).collect()
+}
+
+/// The keywords of a material, each with the entries of its value.
+#[pyfunction]
+fn clauses() -> Vec<(String, Vec<String>)> {
+    signature::CLAUSES.iter().map(|keyword| (keyword.name.clone(), keyword.entries.clone())).collect()
+}
+
+/// The names of the commands that may be keywords of `Scene`.
+#[pyfunction]
+fn settings() -> Vec<String> {
+    describe::settings().map(|method| method.method.clone()).collect()
+}
+
+/// The text of `__init__.pyi`.
+#[pyfunction]
+fn stub() -> String {
+    describe::stub()
+}
+
+#[pymodule]
+fn _rayfold(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("material_doc", describe::material_doc())?;
+    module.add("keys_doc", describe::keys_doc())?;
+    module.add_class::<curve::Curve>()?;
+    module.add_class::<drawing::Ahead>()?;
+    module.add_class::<drawing::Image>()?;
+    module.add_class::<encoder::Encoder>()?;
+    module.add_class::<error::Diagnostic>()?;
+    module.add_class::<material::Material>()?;
+    module.add_class::<script::Script>()?;
+    module.add_function(wrap_pyfunction!(methods, module)?)?;
+    module.add_function(wrap_pyfunction!(clauses, module)?)?;
+    module.add_function(wrap_pyfunction!(settings, module)?)?;
+    module.add_function(wrap_pyfunction!(stub, module)?)?;
+    module.add_function(wrap_pyfunction!(curve::keys, module)?)?;
+    module.add_function(wrap_pyfunction!(encoder::write_file, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::read_folder, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::settings_text, module)?)?;
+    Ok(())
+}
