@@ -149,11 +149,13 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::ScreenWidth => "width",
         Meaning::ScreenHeight => "height",
         Meaning::Background if field.names[0] == "R" => "top",
-        Meaning::Background | Meaning::LightColor | Meaning::Shine | Meaning::Glass => "color",
+        Meaning::Background | Meaning::LightColor | Meaning::FogColor | Meaning::Shine | Meaning::Glass => {
+            "color"
+        },
         Meaning::Center => "center",
         Meaning::Target => "at",
         Meaning::Up => "up",
-        Meaning::WindowDistance => "distance",
+        Meaning::WindowDistance | Meaning::FogDistance => "distance",
         Meaning::WindowCorner if field.names[0] == "au" => "lower_left",
         Meaning::WindowCorner => "upper_right",
         Meaning::LightDirection => "direction",

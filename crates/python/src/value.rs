@@ -228,17 +228,17 @@ pub(crate) fn refused(
         end += field.names.len();
         if start < place.end && place.start < end && start < values.len() {
             let given = &values[start..end.min(values.len())];
+            // The table's range says more than the fault of the model, which knows nothing of hidden objects.
+            if given.iter().any(|value| value.is_finite() && !field.values.take(*value, *value)) {
+                range = Some(format!("{} must be {}", field.parameter, field.values));
+            }
             let given: Vec<String> = given.iter().map(f64::to_string).collect();
             let given = if given.len() == 1 { given[0].clone() } else { format!("({})", given.join(", ")) };
             about.push(format!("{name}={given}"));
-            range = Some(field.values).filter(|_| about.len() == 1);
         }
     }
-    let range = match (fault, range) {
-        (InvalidValue::NotFinite(_), _) | (_, Some(Values::Any | Values::NotZero) | None) => String::new(),
-        (_, Some(values)) => format!(" (allowed: {values})"),
-    };
-    PyValueError::new_err(format!("{method}({}): {fault}{range}", about.join(", ")))
+    let reason = range.unwrap_or_else(|| fault.to_string());
+    PyValueError::new_err(format!("{method}({}): {reason}", about.join(", ")))
 }
 
 /// Checks the constant numbers and the keys of a line with curves. Values between keys are checked with the frames.

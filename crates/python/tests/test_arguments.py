@@ -17,7 +17,7 @@ def scene():
 @pytest.mark.parametrize(
     "call, error, words",
     [
-        (lambda s: s.sphere(-1, (0, 0, 0), diffuse=1), ValueError, ["sphere(radius=-1)", "greater than 0"]),
+        (lambda s: s.sphere(-1, (0, 0, 0), diffuse=1), ValueError, ["sphere(radius=-1)", "at least 0"]),
         (lambda s: s.sphere("1", (0, 0, 0), diffuse=1), TypeError, ["sphere(): radius", "a number", "'1'"]),
         (lambda s: s.sphere(None, (0, 0, 0), diffuse=1), TypeError, ["sphere()", "radius"]),
         (lambda s: s.sphere(1, (0, 0), diffuse=1), TypeError, ["sphere(): center", "3 numbers", "(0, 0)"]),
@@ -55,6 +55,8 @@ def scene():
         (lambda s: s.tone(1), TypeError, ['"plain" or "srgb"']),
         (lambda s: s.depth(65), ValueError, ["bounces=65"]),
         (lambda s: s.shutter(1.5), ValueError, ["open=1.5", "from 0 to 1"]),
+        (lambda s: s.fog("nun"), TypeError, ["fog() lacks distance"]),
+        (lambda s: s.fog("#ffffff", 0), ValueError, ["distance=0"]),
         (lambda s: s.frames(7, 3), ValueError, ["a=7", "b=3"]),
         (lambda s: s.torus(1, 2, (0, 0, 0), (0, 1, 0), diffuse=1), ValueError, ["thickness"]),
         (lambda s: s.cylinder(1, (0, 0, 0), (0, 0, 0), diffuse=1), ValueError, ["differ"]),

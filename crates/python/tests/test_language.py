@@ -15,7 +15,7 @@ CLAUSES = dict(_rayfold.clauses())
 
 def usage(doc):
     """The names of the numbers in the syntax that a docstring shows."""
-    return re.search(r"In a script: `(.*)`", doc)[1].replace("[", "").replace("]", "").split()
+    return re.search(r"In a script: `(.*?)( or \w+)?`", doc)[1].replace("[", "").replace("]", "").split()
 
 
 def numbers(step, first):
@@ -146,7 +146,7 @@ def test_what_the_package_has_is_what_its_types_say():
 
 
 def test_docstrings_have_units_ranges_and_defaults():
-    assert "length in world units, greater than 0" in rf.Scene.sphere.__doc__
+    assert "length in world units, at least 0" in rf.Scene.sphere.__doc__
     assert "by default 0" in rf.Scene.ilight.__doc__
     assert "whole, from 1" in rf.Scene.samples.__doc__
     assert "the index of refraction" in rf.Material.__doc__

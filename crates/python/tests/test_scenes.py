@@ -112,6 +112,13 @@ def test_copies_go_their_own_ways(stage):
     assert str(stage) == str(pickled) == str(deep) == before != str(other)
 
 
+def test_a_word_may_stand_in_place_of_all_arguments():
+    scene = rf.Scene(8, 6)
+    scene.fog("#ffffff", 10)
+    scene.fog("none")
+    assert str(scene) == "Screen 8 6\nFog 1 1 1 10\nFog none\nTrace\n"
+
+
 def test_curves_are_written_and_evaluated():
     curve = rf.keys({25: 3, 1: 0}, "smooth")
     assert str(curve) == "(smooth 1:0 25:3)" and curve.at(13) == 1.5
