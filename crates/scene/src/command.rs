@@ -195,8 +195,7 @@ impl Command {
         if !matches!(self.effect(), Effect::Material) {
             return self.form().takes_color(words.len(), is_behind_color);
         }
-        let clauses = words.iter().map(|word| Clause::from_name(word)).enumerate();
-        let last = clauses.filter_map(|(at, clause)| Some((at, clause?))).last();
+        let last = words.iter().enumerate().rev().find_map(|(at, word)| Some((at, Clause::from_name(word)?)));
         last.is_some_and(|(at, clause)| clause.form().takes_color(words.len() - at - 1, is_behind_color))
     }
 
