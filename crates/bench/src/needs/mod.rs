@@ -31,6 +31,24 @@ pub struct Args {
     /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
+    /// Use the build without all parts of version 2, and a third of those without some of them; write nothing
+    #[arg(long)]
+    slice: bool,
+}
+
+impl Args {
+    fn builds(&self) -> Vec<Build> {
+        let (of_version_2, mut builds): (Vec<_>, Vec<_>) =
+            builds().into_iter().partition(|build| build.is_of_version_2);
+        if self.slice {
+            // The last one is without all of version 2.
+            builds = builds.pop().into_iter().collect();
+        }
+        let step = if self.slice { 3 } else { 1 };
+        builds.extend(of_version_2.into_iter().step_by(step));
+        builds.retain(|build| build.name.contains(&self.only));
+        builds
+    }
 }
 
 /// The goal: a scene executes at most this many more instructions than in a build without its unused parts, in percent.
@@ -77,7 +95,7 @@ pub fn run(args: &Args) -> Result<()> {
         "valgrind cannot be run; on Debian: apt-get install valgrind"
     );
     let folder = tempfile::tempdir()?;
-    let builds: Vec<Build> = builds().into_iter().filter(|build| build.name.contains(&args.only)).collect();
+    let builds = args.builds();
     let programs = build(&builds, folder.path())?;
     let subjects = subjects()?;
     let scripts: Vec<PathBuf> = subjects
@@ -99,7 +117,7 @@ pub fn run(args: &Args) -> Result<()> {
     rows.sort_by_key(|row| builds.iter().position(|build| build.name == row.without));
     let report = report(&rows)?;
     eprintln!("{report}");
-    if !args.check && args.only.is_empty() {
+    if !args.check && !args.slice && args.only.is_empty() {
         std::fs::create_dir_all(&args.output)?;
         let path = args.output.join("needs.md");
         OutputFile::write(&path, &report, false)?;
