@@ -207,17 +207,30 @@ error: nothing was written: 1 error
 }
 
 #[test]
-fn zero_radius() {
-    render(BALL.replace("Sphere 1", "Sphere 0")).stderr_eq(str![[r#"
-error: the radius must be greater than zero
+fn negative_radius() {
+    render(BALL.replace("Sphere 1", "Sphere -1")).stderr_eq(str![[r#"
+error: the radius must not be negative
+ --> a.txt:4:8
+  |
+4 | Sphere -1  0 0 0  .1 .1 .1  .8 .2 .1
+  |        ^^ expected a number from 0
+
+error: nothing was written: 1 error
+
+"#]]);
+}
+
+#[test]
+fn a_radius_of_zero_is_drawn_as_nothing_with_a_warning() {
+    let folder = Folder::with("a.txt", BALL.replace("Sphere 1", "Sphere 0"));
+    folder.rayfold("check a.txt").assert().success().stderr_eq(str![[r#"
+warning: nothing is drawn: the radius is 0
  --> a.txt:4:8
   |
 4 | Sphere 0  0 0 0  .1 .1 .1  .8 .2 .1
-  |        ^ expected a number greater than 0
-  |
-  = help: to make an object vanish, put it into a group: the scale of its `Use` may shrink to 0
+  |        ^ expected a number greater than 0, or a curve that is not always 0
 
-error: nothing was written: 1 error
+1 file, 1 frame: no errors, 1 warning
 
 "#]]);
 }

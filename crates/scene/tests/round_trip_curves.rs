@@ -102,7 +102,7 @@ fn numbers(form: &Form, draft: &Draft) -> String {
             continue;
         }
         if let Number::Constant(x) = number
-            && draft.name % 2 == 0
+            && draft.name.is_multiple_of(2)
             && i + 3 <= count
             && form.takes_color(i, is_behind_color)
         {

@@ -70,7 +70,7 @@ test("in Firefox an object is dragged, and undo brings back every byte", async (
 test("in Firefox what is typed is the text of the file", async (t) => {
   const { page, path, faults } = await open(t);
   const before = readFileSync(path, "utf8");
-  await (await page.waitForSelector(".cm-content")).focus();
+  await (await page.waitForSelector(">>> .cm-content")).focus();
   await page.keyboard.down("Control");
   await page.keyboard.press("End");
   await page.keyboard.up("Control");

@@ -43,7 +43,14 @@ export function Keys(): JSX.Element | null {
         </tbody>
       </table>
       <form method="dialog">
-        <button type="button" onClick={() => ((help.value = false), (tour.value = 0))}>
+        <button
+          type="button"
+          onClick={(event) => {
+            // At once, so that the next key is the tour's.
+            event.currentTarget.closest("dialog")?.close();
+            tour.value = 0;
+          }}
+        >
           Tour
         </button>
         <button>Close</button>
