@@ -49,15 +49,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-studio",
         ],
     ),
-    (
-        "rayfold-python",
-        &[
-            "rayfold-scene",
-            "rayfold-files",
-            "rayfold-tracer",
-            "rayfold-movie",
-        ],
-    ),
+    ("rayfold-python", &["rayfold-scene", "rayfold-files", "rayfold-tracer", "rayfold-movie"]),
     ("rayfold-xtask", &["rayfold-scene"]),
     (
         "rayfold-bench",

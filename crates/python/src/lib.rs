@@ -1,8 +1,8 @@
 //! The extension module of the Python package: scenes as text, pictures, animations.
 //!
-//! Python's side (`python/rayfold`) is small: it makes a method of each command in [`signature::METHODS`], gives arrays
+//! Python's side (`python/rayfold`) is small: it makes a method of each command in `signature::METHODS`, gives arrays
 //! their shape, and takes scenes from functions and iterators. All checks, texts and pictures are made here. A scene is the
-//! text of its script ([`script`]), so what Python draws is what `rayfold render` draws of that text.
+//! text of its script (`script`), so what Python draws is what `rayfold render` draws of that text.
 //!
 //! `unsafe`: this crate writes none. PyO3's attributes expand to it where Python calls a function of Rust, for pointers that
 //! CPython passes. The lint allows that in code of other crates' macros, so that `forbid` holds here as in the whole

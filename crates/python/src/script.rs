@@ -469,7 +469,8 @@ impl Script {
 
 /// Returns whether a word is the only argument.
 fn is_only(word: &str, args: &Bound<'_, PyTuple>, kwargs: Option<&Bound<'_, PyDict>>) -> bool {
-    let is_word = |value: Bound<'_, PyAny>| value.extract::<String>().is_ok_and(|text| text.eq_ignore_ascii_case(word));
+    let is_word =
+        |value: Bound<'_, PyAny>| value.extract::<String>().is_ok_and(|text| text.eq_ignore_ascii_case(word));
     args.len() == 1 && kwargs.is_none_or(|kwargs| kwargs.is_empty()) && args.get_item(0).is_ok_and(is_word)
 }
 

@@ -151,7 +151,7 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::Background if field.names[0] == "R" => "top",
         Meaning::Background | Meaning::LightColor | Meaning::FogColor | Meaning::Shine | Meaning::Glass => {
             "color"
-        },
+        }
         Meaning::Center => "center",
         Meaning::Target => "at",
         Meaning::Up => "up",
