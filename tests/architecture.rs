@@ -13,6 +13,7 @@ use serde_json::Value;
 
 /// The crates of the project that each one may use. A new crate needs an entry here and a section in ARCHITECTURE.md.
 const KNOWS: &[(&str, &[&str])] = &[
+    ("rayfold-assets", &[]),
     ("rayfold-scene", &[]),
     ("rayfold-files", &["rayfold-scene"]),
     ("rayfold-gif", &[]),
@@ -87,7 +88,7 @@ const ROOMS: [&str; 14] = [
 ];
 
 /// The crates of pure functions, without side effects.
-const CORE: [&str; 4] = ["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-movie"];
+const CORE: [&str; 5] = ["rayfold-assets", "rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-movie"];
 
 /// Packages that open sockets, read clocks or draw random numbers, by the start of their names.
 const OUTSIDE_THE_CORE: &[&str] = &[

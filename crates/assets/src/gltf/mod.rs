@@ -1,0 +1,367 @@
+//! glTF 2.0, as JSON with files beside it and as one binary file.
+//!
+//! The JSON is read by `serde`; its indices, ranges and nodes are checked here where they are used.
+
+mod accessor;
+mod document;
+
+use glam::{DMat3, DMat4, DQuat, DVec3, Vec2};
+
+use self::accessor::Buffers;
+use self::document::{Document, Material, Node, Primitive};
+use crate::decode::Referred;
+use crate::error::Fault;
+use crate::limits;
+use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
+
+/// The extensions that a file may require.
+const KNOWN: [&str; 5] = [
+    "KHR_mesh_quantization",
+    "EXT_texture_webp",
+    "KHR_texture_transform",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+];
+
+/// Reads a binary file: a header, the JSON, and the first buffer.
+pub(crate) fn read_binary(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Parts, Fault> {
+    let cut = || Fault::new("the file is cut off");
+    let number = |at: usize| {
+        let four = bytes.get(at..at + 4).ok_or_else(cut)?;
+        Ok::<_, Fault>(u32::from_le_bytes([four[0], four[1], four[2], four[3]]) as usize)
+    };
+    if number(4)? != 2 {
+        return Err(Fault::new(format!("it is glTF of version {}, not 2", number(4)?)));
+    }
+    let bytes = bytes.get(..number(8)?).ok_or_else(cut)?;
+    let (mut at, mut json, mut binary) = (12, None, None);
+    while at < bytes.len() {
+        let (length, kind) = (number(at)?, number(at + 4)?);
+        let end = (at + 8).checked_add(length).ok_or_else(cut)?;
+        let chunk = bytes.get(at + 8..end).ok_or_else(cut)?;
+        match kind {
+            0x4e4f_534a if json.is_none() => json = Some(chunk),
+            0x004e_4942 if binary.is_none() => binary = Some(chunk),
+            _ => {}
+        }
+        // Chunks begin at multiples of four.
+        at = end.next_multiple_of(4);
+    }
+    read(name, json.ok_or_else(|| Fault::new("it has no JSON"))?, binary, referred)
+}
+
+/// Reads a JSON file.
+pub(crate) fn read_text(name: &str, text: &[u8], referred: &mut Referred<'_>) -> Result<Parts, Fault> {
+    read(name, text, None, referred)
+}
+
+fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<'_>) -> Result<Parts, Fault> {
+    let document: Document = serde_json::from_slice(json)
+        .map_err(|error| Fault::at(error.line(), format!("its JSON: {error}")))?;
+    if !document.asset.version.starts_with("2.") {
+        return Err(Fault::new("it is not glTF of version 2"));
+    }
+    if let Some(unknown) = document.extensions_required.iter().find(|e| !KNOWN.contains(&e.as_str())) {
+        return Err(referred.extension(name, unknown));
+    }
+    let buffers = buffers(&document, binary, referred)?;
+    let mut parts = Parts { space: Colors::Linear, ..Parts::default() };
+    parts.looks = document.materials.iter().map(|material| look(material, &mut parts.warnings)).collect();
+    parts.looks.push(Look { factor: Some(DVec3::ONE), ..Look::PLAIN });
+    let mut maker =
+        Maker { document: &document, buffers: &buffers, parts, has_normals: false, left_out: false };
+    maker.scene()?;
+    let Maker { mut parts, has_normals, left_out, .. } = maker;
+    if !has_normals {
+        parts.normal_of = Vec::new();
+    }
+    if left_out {
+        parts.warnings.push("points and lines are left out".into());
+    }
+    if let Some(unused) = unused(&document) {
+        parts.warnings.push(unused);
+    }
+    Ok(parts)
+}
+
+/// Returns the contents of the buffers.
+fn buffers(
+    document: &Document,
+    binary: Option<&[u8]>,
+    referred: &mut Referred<'_>,
+) -> Result<Buffers, Fault> {
+    let mut contents = Vec::new();
+    let mut left = limits::FILE_BYTES;
+    for (number, buffer) in document.buffers.iter().enumerate() {
+        let mut content = match (&buffer.uri, binary) {
+            (None, Some(binary)) if number == 0 => binary.to_vec(),
+            (None, _) => return Err(Fault::new(format!("buffer {number} has neither a file nor data"))),
+            (Some(uri), _) if uri.starts_with("data:") => data(uri)?,
+            (Some(uri), _) => {
+                let path = percent_encoding::percent_decode_str(uri);
+                let path = path.decode_utf8().map_err(|_| Fault::new(format!("`{uri}` is not UTF-8")))?;
+                match referred.read(&path)? {
+                    Some(content) => content,
+                    None => return Err(referred.absent(&path)),
+                }
+            }
+        };
+        if (content.len() as u64) < buffer.byte_length {
+            return Err(Fault::new(format!(
+                "buffer {number} has {} bytes of {}: it is cut off",
+                content.len(),
+                buffer.byte_length
+            )));
+        }
+        content.truncate(buffer.byte_length as usize);
+        left = left
+            .checked_sub(content.len() as u64)
+            .ok_or_else(|| Fault::new(format!("its buffers have more than {} bytes", limits::FILE_BYTES)))?;
+        contents.push(content);
+    }
+    Ok(Buffers { contents })
+}
+
+/// Returns the bytes of a `data:` address.
+fn data(uri: &str) -> Result<Vec<u8>, Fault> {
+    let (head, body) = uri.split_once(',').ok_or_else(|| Fault::new("a `data:` address has no comma"))?;
+    if !head.to_ascii_lowercase().ends_with(";base64") {
+        return Ok(percent_encoding::percent_decode_str(body).collect());
+    }
+    base64_simd::forgiving_decode_to_vec(body.as_bytes())
+        .map_err(|_| Fault::new("the data of a `data:` address is not Base64"))
+}
+
+/// Returns the colour and glow of a material.
+fn look(material: &Material, warnings: &mut Vec<String>) -> Look {
+    let pbr = &material.pbr_metallic_roughness;
+    let finite = |v: [f64; 3]| {
+        let v = DVec3::from(v);
+        if v.is_finite() { v } else { DVec3::ZERO }
+    };
+    let [r, g, b, _] = pbr.base_color_factor.unwrap_or([1.0; 4]);
+    let mut factor = Some(finite([r, g, b]));
+    let mut glow = finite(material.emissive_factor.unwrap_or_default());
+    if let Some(strength) = &material.extensions.strength {
+        glow *= strength.emissive_strength.filter(|x| x.is_finite()).unwrap_or(1.0).max(0.0);
+    }
+    let mut without = |what: &str| {
+        let warning = format!("pictures of models are not read: {what}");
+        if !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
+    };
+    if pbr.base_color_texture.is_some() {
+        factor = None;
+        without("what has one is grey");
+    }
+    if material.emissive_texture.is_some() && glow != DVec3::ZERO {
+        glow = DVec3::ZERO;
+        without("what has one of its glow does not glow");
+    }
+    Look { factor, glow, unlit: material.extensions.unlit.is_some() }
+}
+
+/// Names the parts of a file that are not used.
+fn unused(document: &Document) -> Option<String> {
+    let any = |has: fn(&Material) -> bool| document.materials.iter().any(has);
+    let targets = |mesh: &document::Mesh| mesh.primitives.iter().any(|p| !p.targets.is_empty());
+    let parts = [
+        (!document.skins.is_empty(), "skins"),
+        (!document.animations.is_empty(), "animations"),
+        (document.meshes.iter().any(targets), "morph targets"),
+        (!document.cameras.is_empty(), "cameras"),
+        (document.extensions_used.iter().any(|e| e == "KHR_lights_punctual"), "lights"),
+        (any(|m| m.pbr_metallic_roughness.metallic_factor.is_some()), "metal"),
+        (any(|m| m.pbr_metallic_roughness.roughness_factor.is_some()), "roughness"),
+        (
+            any(|m| m.pbr_metallic_roughness.metallic_roughness_texture.is_some()),
+            "maps of metal and roughness",
+        ),
+        (any(|m| m.normal_texture.is_some()), "normal maps"),
+        (any(|m| m.occlusion_texture.is_some()), "occlusion maps"),
+    ];
+    let names: Vec<&str> = parts.iter().filter(|(is_there, _)| *is_there).map(|(_, name)| *name).collect();
+    (!names.is_empty()).then(|| format!("its {} are not used", names.join(", ")))
+}
+
+/// A model that is made of the nodes of a scene.
+struct Maker<'a> {
+    document: &'a Document,
+    buffers: &'a Buffers,
+    parts: Parts,
+    has_normals: bool,
+    /// Whether there are points or lines.
+    left_out: bool,
+}
+
+impl Maker<'_> {
+    /// Adds the default scene; without one the first, without any all root nodes.
+    fn scene(&mut self) -> Result<(), Fault> {
+        let document = self.document;
+        if document.nodes.len() > limits::NODES {
+            return Err(Fault::new(format!("it has more than {} nodes", limits::NODES)));
+        }
+        let roots = match document.scene {
+            Some(number) => {
+                let scene = document.scenes.get(number);
+                scene.ok_or_else(|| Fault::new(format!("there is no scene {number}")))?.nodes.clone()
+            }
+            None => match document.scenes.first() {
+                Some(scene) => scene.nodes.clone(),
+                None => {
+                    let mut is_child = vec![false; document.nodes.len()];
+                    for child in document.nodes.iter().flat_map(|node| &node.children) {
+                        if let Some(is_child) = is_child.get_mut(*child) {
+                            *is_child = true;
+                        }
+                    }
+                    (0..document.nodes.len()).filter(|node| !is_child[*node]).collect()
+                }
+            },
+        };
+        // A stack instead of recursion, and each node once: neither depth nor circles can hurt.
+        let mut is_drawn = vec![false; document.nodes.len()];
+        let mut pending: Vec<(usize, DMat4)> =
+            roots.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
+        while let Some((number, outer)) = pending.pop() {
+            let node = document.nodes.get(number);
+            let node = node.ok_or_else(|| Fault::new(format!("there is no node {number}")))?;
+            if std::mem::replace(&mut is_drawn[number], true) {
+                return Err(Fault::new(format!("node {number} has two parents, or is within itself")));
+            }
+            let place = outer * transform(node);
+            if let Some(mesh) = node.mesh {
+                let of = document.meshes.get(mesh);
+                let of = of.ok_or_else(|| Fault::new(format!("there is no mesh {mesh}")))?;
+                of.primitives.iter().try_for_each(|primitive| self.add(primitive, place))?;
+            }
+            pending.extend(node.children.iter().rev().map(|child| (*child, place)));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, primitive: &Primitive, place: DMat4) -> Result<(), Fault> {
+        let Self { document, buffers, parts, .. } = self;
+        let mode = primitive.mode.unwrap_or(4);
+        if mode < 4 {
+            self.left_out = true;
+            return Ok(());
+        }
+        let Some(position) = primitive.attributes.position else { return Ok(()) };
+        let first = parts.positions.len();
+        let linear = DMat3::from_mat4(place);
+        let mirrors = linear.determinant() < 0.0;
+        let side = if mirrors { -1.0 } else { 1.0 };
+        let count = buffers.each(document, position, &[("VEC3", 3)], |p: [f64; 3]| {
+            parts.positions.push(place.transform_point3(p.into()));
+        })?;
+        if parts.positions.len() > limits::VERTICES {
+            return Err(Fault::new(format!("it has more than {} vertices", limits::VERTICES)));
+        }
+        let same = |what: &str, other: usize| match other == count {
+            true => Ok(()),
+            false => Err(Fault::new(format!("{other} {what} of {count} vertices"))),
+        };
+        let first_normal = parts.normals.len();
+        if let Some(normal) = primitive.attributes.normal {
+            let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+            let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * side;
+            let normals = buffers.each(document, normal, &[("VEC3", 3)], |n: [f64; 3]| {
+                parts.normals.push(unit((cofactors * DVec3::from(n)).normalize_or_zero().as_vec3()));
+            })?;
+            same("normals", normals)?;
+            self.has_normals = true;
+        }
+        let first_uv = parts.uvs.len();
+        if let Some(uv) = primitive.attributes.uv {
+            let uvs = buffers.each(document, uv, &[("VEC2", 2)], |[u, v]: [f64; 2]| {
+                parts.uvs.push(Vec2::new(u as f32, v as f32));
+            })?;
+            same("texture coordinates", uvs)?;
+        }
+        if let Some(color) = primitive.attributes.color {
+            parts.colors.resize(first, glam::Vec3::ONE);
+            let kinds = [("VEC3", 3), ("VEC4", 4)];
+            let colors = buffers.each(document, color, &kinds, |[r, g, b, _]: [f64; 4]| {
+                parts.colors.push(DVec3::new(r, g, b).as_vec3());
+            })?;
+            same("colours", colors)?;
+        } else if !parts.colors.is_empty() {
+            parts.colors.resize(parts.positions.len(), glam::Vec3::ONE);
+        }
+        let look = match primitive.material {
+            None => document.materials.len(),
+            Some(material) if material < document.materials.len() => material,
+            Some(material) => return Err(Fault::new(format!("there is no material {material}"))),
+        };
+        if document.materials.get(look).is_some_and(is_invisible) {
+            return Ok(());
+        }
+        let mut order: Vec<u32> = Vec::new();
+        match primitive.indices {
+            Some(indices) => {
+                buffers.each(document, indices, &[("SCALAR", 1)], |[index]: [f64; 1]| {
+                    order.push(index as u32)
+                })?;
+            }
+            None => order.extend(0..count as u32),
+        }
+        if let Some(index) = order.iter().find(|index| **index as usize >= count) {
+            return Err(Fault::new(format!("a triangle has the vertex {index} of {count}")));
+        }
+        let has = |is_there: bool, first: usize, of: [u32; 3]| {
+            if is_there { of.map(|i| first as u32 + i) } else { [NONE; 3] }
+        };
+        let mut add = |[a, b, c]: [u32; 3]| {
+            let of = if mirrors { [b, a, c] } else { [a, b, c] };
+            parts.triangles.push(of.map(|i| first as u32 + i));
+            parts.normal_of.push(has(primitive.attributes.normal.is_some(), first_normal, of));
+            parts.uv_of.push(has(primitive.attributes.uv.is_some(), first_uv, of));
+            parts.look_of.push(look as u32);
+            if parts.triangles.len() > limits::TRIANGLES { Err(too_many_triangles()) } else { Ok(()) }
+        };
+        match mode {
+            4 => order.chunks_exact(3).try_for_each(|of| add([of[0], of[1], of[2]]))?,
+            5 => {
+                for (k, of) in order.windows(3).enumerate() {
+                    add(if k % 2 == 0 { [of[0], of[1], of[2]] } else { [of[1], of[0], of[2]] })?;
+                }
+            }
+            6 => {
+                for pair in order.get(1..).unwrap_or_default().windows(2) {
+                    add([order[0], pair[0], pair[1]])?;
+                }
+            }
+            _ => return Err(Fault::new(format!("a primitive has the mode {mode}"))),
+        }
+        if !parts.colors.is_empty() {
+            parts.colors.resize(parts.positions.len(), glam::Vec3::ONE);
+        }
+        Ok(())
+    }
+}
+
+/// Returns whether faces of this material have no hits, because their alpha is below the cutoff.
+fn is_invisible(material: &Material) -> bool {
+    let cutoff = match material.alpha_mode.as_deref() {
+        Some("MASK") => material.alpha_cutoff.unwrap_or(0.5),
+        Some("BLEND") => 0.5,
+        _ => return false,
+    };
+    let has_picture = material.pbr_metallic_roughness.base_color_texture.is_some();
+    !has_picture && material.pbr_metallic_roughness.base_color_factor.is_some_and(|factor| factor[3] < cutoff)
+}
+
+/// Returns the transform of a node.
+fn transform(node: &Node) -> DMat4 {
+    if let Some(matrix) = &node.matrix {
+        return DMat4::from_cols_array(matrix);
+    }
+    let scale = node.scale.map_or(DVec3::ONE, DVec3::from);
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |q| {
+        let rotation = DQuat::from_array(q);
+        if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
+    });
+    DMat4::from_scale_rotation_translation(scale, rotation, node.translation.map_or(DVec3::ZERO, DVec3::from))
+}

@@ -1,0 +1,43 @@
+//! The files that scripts name, from bytes to models.
+//!
+//! Knows no other crate of the project and does no I/O. A caller implements [`Files`], which hands over files as bytes by
+//! name, and asks a [`Library`] for models. The content decides what a file is, not its name.
+//!
+//! Invariants: what a file claims about its size is compared with its bytes and with [`limits`] before memory is spent.
+//! Numbers of a [`Model`] are finite, and its indices in range. Foreign bytes never cause a panic.
+//!
+//! ```
+//! use rayfold_assets::{Library, MemoryFiles, Smoothing};
+//!
+//! let corners = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+//! let library = Library::new(MemoryFiles::from([("corner.obj", corners.to_vec())]));
+//! let model = library.model("corner.obj", Smoothing::OfFile)?;
+//! assert_eq!(model.triangle_count(), 1);
+//! # Ok::<(), rayfold_assets::AssetError>(())
+//! ```
+
+mod closure;
+mod decode;
+mod error;
+mod files;
+mod gltf;
+mod library;
+pub mod limits;
+mod model;
+mod normals;
+mod obj;
+mod ply;
+mod srgb;
+mod stl;
+
+pub use closure::Closure;
+pub use decode::{Referred, decode};
+pub use error::AssetError;
+pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, same_but_for_case};
+pub use library::Library;
+pub use model::{Colors, Look, Model, Smoothing};
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

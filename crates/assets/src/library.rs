@@ -1,0 +1,189 @@
+//! Models by name, each read and decoded once.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::decode::{Referred, absent, content, decode};
+use crate::error::AssetError;
+use crate::files::{FileInfo, Files, NoFiles};
+use crate::limits;
+use crate::model::{Model, Smoothing};
+
+/// The models of a folder. A model is decoded again only if its files have changed.
+pub struct Library {
+    files: Box<dyn Files>,
+    kept: Mutex<Vec<Kept>>,
+}
+
+/// A decoded model, and the files that it was made of.
+struct Kept {
+    name: String,
+    smoothing: Smoothing,
+    sources: Vec<Source>,
+    model: Arc<Model>,
+}
+
+/// A file that a model was made of, or that it lacked.
+#[derive(Clone)]
+struct Source {
+    name: String,
+    path: String,
+    info: Option<FileInfo>,
+}
+
+impl Library {
+    /// Makes the library of some files.
+    pub fn new(files: impl Files + 'static) -> Self {
+        Self { files: Box::new(files), kept: Mutex::default() }
+    }
+
+    /// Makes a library for callers that read no files: every model is an error that says so.
+    pub fn none() -> Self {
+        Self::new(NoFiles)
+    }
+
+    /// Returns the model in the file of this name.
+    ///
+    /// # Errors
+    /// If the file is absent, or is no model.
+    pub fn model(&self, name: &str, smoothing: Smoothing) -> Result<Arc<Model>, AssetError> {
+        if !self.files.are_readable() {
+            return Err(AssetError::NotHere { name: name.into() });
+        }
+        // Held while a model is decoded, so that scripts that are parsed at the same time decode it once.
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.retain(|kept| kept.name != name || self.is_current(&kept.sources));
+        if let Some(kept) = kept.iter().find(|kept| kept.name == name && kept.smoothing == smoothing) {
+            return Ok(kept.model.clone());
+        }
+        let of_file = kept.iter().find(|kept| kept.name == name && kept.smoothing == Smoothing::OfFile);
+        let (model, sources) = match of_file {
+            Some(base) => (base.model.clone(), base.sources.clone()),
+            None => {
+                let (model, sources) = self.decode(name)?;
+                let (smoothing, model) = (Smoothing::OfFile, Arc::new(model));
+                kept.push(Kept {
+                    name: name.into(),
+                    smoothing,
+                    sources: sources.clone(),
+                    model: model.clone(),
+                });
+                (model, sources)
+            }
+        };
+        let model = match smoothing {
+            Smoothing::OfFile => model,
+            _ => {
+                let model = Arc::new(model.with(smoothing));
+                kept.push(Kept { name: name.into(), smoothing, sources, model: model.clone() });
+                model
+            }
+        };
+        forget_unused(&mut kept);
+        Ok(model)
+    }
+
+    /// Returns the names of the files that a model was made of, or lacks, with their paths in it: after itself those that it
+    /// refers to. There are none for a model that was not asked for, or is faulty.
+    pub fn sources(&self, name: &str) -> Vec<(String, String)> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let sources = kept.iter().find(|kept| kept.name == name).map(|kept| &kept.sources[..]);
+        sources.unwrap_or_default().iter().map(|source| (source.name.clone(), source.path.clone())).collect()
+    }
+
+    fn decode(&self, name: &str) -> Result<(Model, Vec<Source>), AssetError> {
+        let info = self.look(name)?.ok_or_else(|| absent(&*self.files, name))?;
+        let bytes = content(&*self.files, name)?;
+        let mut referred = Referred::new(&*self.files);
+        let model = decode(name, &bytes, &mut referred)?;
+        let mut sources = vec![Source { name: name.into(), path: name.into(), info: Some(info) }];
+        sources.extend(referred.sources().map(|(name, path, info)| Source {
+            name: name.into(),
+            path: path.into(),
+            info,
+        }));
+        Ok((model, sources))
+    }
+
+    fn look(&self, name: &str) -> Result<Option<FileInfo>, AssetError> {
+        self.files.look(name).map_err(|why| AssetError::Unreadable { name: name.into(), why })
+    }
+
+    fn is_current(&self, sources: &[Source]) -> bool {
+        sources.iter().all(|source| self.files.look(&source.name) == Ok(source.info))
+    }
+}
+
+impl fmt::Debug for Library {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Library").finish_non_exhaustive()
+    }
+}
+
+/// Drops the oldest models that no one uses, until the others are within the bound.
+fn forget_unused(kept: &mut Vec<Kept>) {
+    let mut bytes: usize = kept.iter().map(|kept| kept.model.bytes()).sum();
+    kept.retain(|kept| {
+        let is_dropped = bytes > limits::KEPT_BYTES && Arc::strong_count(&kept.model) == 1;
+        if is_dropped {
+            bytes -= kept.model.bytes();
+        }
+        !is_dropped
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    const CORNER: &[u8] = b"mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+
+    /// Counts how often a file is read.
+    struct Counted(Arc<Mutex<MemoryFiles>>, Arc<AtomicUsize>);
+
+    impl Files for Counted {
+        fn names(&self) -> Vec<String> {
+            self.0.lock().unwrap().names()
+        }
+
+        fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
+            self.0.lock().unwrap().look(name)
+        }
+
+        fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+            self.1.fetch_add(1, Ordering::Relaxed);
+            self.0.lock().unwrap().read(name)
+        }
+    }
+
+    #[test]
+    fn a_model_is_decoded_once_until_one_of_its_files_changes() {
+        let files = Arc::new(Mutex::new(MemoryFiles::from([("c.obj", CORNER.to_vec())])));
+        let reads = Arc::new(AtomicUsize::new(0));
+        let library = Library::new(Counted(files.clone(), reads.clone()));
+        let first = library.model("c.obj", Smoothing::OfFile).unwrap();
+        assert!(Arc::ptr_eq(&first, &library.model("c.obj", Smoothing::OfFile).unwrap()));
+        assert_eq!(library.model("c.obj", Smoothing::Within(30.0)).unwrap().triangle_count(), 1);
+        assert_eq!(reads.load(Ordering::Relaxed), 1);
+        assert_eq!(first.look_color(first.look(0), true), glam::DVec3::splat(0.8), "the library is absent");
+        assert_eq!(first.warnings().len(), 1);
+        files.lock().unwrap().insert("c.mtl", b"newmtl red\nKd 1 0 0\n".to_vec());
+        let second = library.model("c.obj", Smoothing::OfFile).unwrap();
+        assert_eq!(second.look_color(second.look(0), true), glam::DVec3::X);
+        assert_eq!(reads.load(Ordering::Relaxed), 3);
+        let names: Vec<_> = library.sources("c.obj").into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["c.obj", "c.mtl"]);
+    }
+
+    #[test]
+    fn a_name_in_other_letter_case_is_found_for_the_message() {
+        let library = Library::new(MemoryFiles::from([("Corner.OBJ", CORNER.to_vec())]));
+        let error = library.model("corner.obj", Smoothing::Flat).unwrap_err();
+        assert_eq!(error.help().unwrap(), "there is `Corner.OBJ`: names are compared byte for byte");
+        let error = Library::none().model("corner.obj", Smoothing::Flat).unwrap_err();
+        assert!(error.to_string().contains("`rayfold render` and `rayfold studio` alone"), "{error}");
+    }
+}

@@ -1,0 +1,339 @@
+//! Wavefront OBJ, and the colours of its MTL files.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec2, Vec3};
+
+use crate::decode::Referred;
+use crate::error::Fault;
+use crate::limits;
+use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
+
+/// A line of the text, with those that a backslash joins to it: its number and its words.
+struct Lines<'a> {
+    rest: &'a [u8],
+    number: usize,
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = (usize, std::borrow::Cow<'a, [u8]>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        let first = self.number + 1;
+        let mut whole: Option<Vec<u8>> = None;
+        loop {
+            self.number += 1;
+            let (line, rest) = match memchr::memchr(b'\n', self.rest) {
+                Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
+                None => (self.rest, &[][..]),
+            };
+            self.rest = rest;
+            let line = line.strip_suffix(b"\r").unwrap_or(line);
+            let (line, goes_on) = match line.strip_suffix(b"\\") {
+                Some(line) => (line, !rest.is_empty()),
+                None => (line, false),
+            };
+            match &mut whole {
+                None if !goes_on => return Some((first, line.into())),
+                None => whole = Some([line, b" "].concat()),
+                Some(whole) => {
+                    whole.extend_from_slice(line);
+                    whole.push(b' ');
+                }
+            }
+            if !goes_on {
+                return whole.map(|whole| (first, whole.into()));
+            }
+        }
+    }
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+    line.split(|b| matches!(b, b' ' | b'\t')).filter(|word| !word.is_empty())
+}
+
+/// Returns the text of a line after its first word, without blanks around it.
+fn rest_of(line: &[u8], word: &[u8]) -> String {
+    let at = line.windows(word.len()).position(|w| w == word).unwrap_or_default() + word.len();
+    String::from_utf8_lossy(&line[at..]).trim().to_string()
+}
+
+fn number(word: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(word).ok()?;
+    text.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// Reads numbers, at most `N`. Returns how many there are.
+fn numbers<'a, const N: usize>(
+    line: usize,
+    words: impl Iterator<Item = &'a [u8]>,
+    least: usize,
+) -> Result<([f64; N], usize), Fault> {
+    let (mut all, mut count) = ([0.0; N], 0);
+    for word in words {
+        let Some(place) = all.get_mut(count) else { break };
+        *place = number(word).ok_or_else(|| {
+            Fault::at(line, format!("`{}` is not a finite number", String::from_utf8_lossy(word)))
+        })?;
+        count += 1;
+    }
+    if count < least {
+        return Err(Fault::at(line, format!("{count} of {least} numbers")));
+    }
+    Ok((all, count))
+}
+
+/// Returns the place of an index among `count` items. Indices count from 1, negative ones from the last item back.
+fn place(line: usize, index: i64, count: usize, what: &str) -> Result<u32, Fault> {
+    let place = if index < 0 { index + count as i64 } else { index - 1 };
+    match u32::try_from(place) {
+        Ok(place) if index != 0 && (place as usize) < count => Ok(place),
+        _ => Err(Fault::at(line, format!("{what} {index} of {count}"))),
+    }
+}
+
+fn index(line: usize, text: &[u8]) -> Result<i64, Fault> {
+    let (digits, sign) = match text {
+        [b'-', digits @ ..] => (digits, -1),
+        digits => (digits, 1),
+    };
+    let is_number = (1..=9).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit);
+    if !is_number {
+        return Err(Fault::at(line, format!("`{}` is no index", String::from_utf8_lossy(text))));
+    }
+    Ok(sign * digits.iter().fold(0, |n, digit| 10 * n + i64::from(digit - b'0')))
+}
+
+#[derive(Default)]
+struct Reader {
+    parts: Parts,
+    /// The colour of each position, and whether any has one.
+    has_colors: bool,
+    names: HashMap<Vec<u8>, u32>,
+    look: u32,
+    has_looks: bool,
+    has_normals: bool,
+    has_uvs: bool,
+    lacks_uvs: bool,
+    left_out: Vec<&'static str>,
+}
+
+/// Reads an OBJ file. `refer` returns the content of files that it refers to.
+pub(crate) fn read(bytes: &[u8], refer: &mut Referred<'_>) -> Result<Parts, Fault> {
+    let mut reader =
+        Reader { parts: Parts { space: Colors::Levels, ..Parts::default() }, ..Reader::default() };
+    reader.parts.looks.push(Look::PLAIN);
+    for (number, line) in (Lines { rest: bytes, number: 0 }) {
+        reader.line(number, &line, refer)?;
+    }
+    let Reader { mut parts, has_colors, has_normals, has_uvs, lacks_uvs, has_looks, left_out, .. } = reader;
+    if !has_colors {
+        parts.colors = Vec::new();
+    }
+    if !has_normals {
+        parts.normal_of = Vec::new();
+    }
+    if !has_uvs {
+        parts.uv_of = Vec::new();
+    } else if lacks_uvs {
+        parts.warnings.push("corners without texture coordinates have (0, 0)".into());
+    }
+    if !has_looks {
+        parts.look_of = Vec::new();
+    }
+    if !left_out.is_empty() {
+        parts.warnings.push(format!("{} are left out", left_out.join(", ")));
+    }
+    Ok(parts)
+}
+
+impl Reader {
+    fn line(&mut self, line: usize, text: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
+        let mut words = words(text);
+        let parts = &mut self.parts;
+        match words.next() {
+            Some(b"v") => {
+                let ([x, y, z, r, g, b], count) = numbers::<6>(line, words, 3)?;
+                parts.positions.push(DVec3::new(x, y, z));
+                self.has_colors |= count == 6;
+                let color = if count == 6 { DVec3::new(r, g, b).as_vec3() } else { Vec3::ONE };
+                parts.colors.push(color);
+                bounded(line, parts.positions.len(), "positions")?;
+            }
+            Some(b"vn") => {
+                let ([x, y, z], _) = numbers::<3>(line, words, 3)?;
+                parts.normals.push(unit(DVec3::new(x, y, z).normalize_or_zero().as_vec3()));
+                bounded(line, parts.normals.len(), "normals")?;
+            }
+            Some(b"vt") => {
+                let ([u, v], _) = numbers::<2>(line, words, 1)?;
+                parts.uvs.push(Vec2::new(u as f32, v as f32));
+                bounded(line, parts.uvs.len(), "texture coordinates")?;
+            }
+            Some(b"f") => self.face(line, words)?,
+            Some(b"usemtl") => {
+                let name = rest_of(text, b"usemtl").into_bytes();
+                let next = self.parts.looks.len() as u32;
+                self.look = *self.names.entry(name).or_insert(next);
+                if self.look == next {
+                    // Without its file it has no colour; a file that comes later gives it one.
+                    self.parts.looks.push(Look::PLAIN);
+                    bounded_looks(line, self.parts.looks.len())?;
+                }
+                self.has_looks = true;
+            }
+            Some(b"mtllib") => self.materials(line, text, refer)?,
+            Some(b"p") => self.leave_out("points"),
+            Some(b"l") => self.leave_out("lines"),
+            Some(b"curv" | b"curv2" | b"surf") => self.leave_out("curves and free-form surfaces"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn leave_out(&mut self, what: &'static str) {
+        if !self.left_out.contains(&what) {
+            self.left_out.push(what);
+        }
+    }
+
+    /// Adds a polygon as a fan from its first corner.
+    fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]>) -> Result<(), Fault> {
+        let parts = &mut self.parts;
+        let (mut first, mut last, mut count) = (None, None, 0);
+        for word in words {
+            let mut fields = word.splitn(3, |b| *b == b'/');
+            let position = index(line, fields.next().unwrap_or_default())?;
+            let position = place(line, position, parts.positions.len(), "position")?;
+            let mut optional = |count: usize, what: &str| match fields.next() {
+                None | Some(b"") => Ok(NONE),
+                Some(field) => place(line, index(line, field)?, count, what),
+            };
+            let uv = optional(parts.uvs.len(), "texture coordinate")?;
+            let normal = optional(parts.normals.len(), "normal")?;
+            self.has_normals |= normal != NONE;
+            self.has_uvs |= uv != NONE;
+            self.lacks_uvs |= uv == NONE;
+            let corner = [position, uv, normal];
+            count += 1;
+            if let (Some(first), Some(last)) = (first, last) {
+                let of = |k: usize| [first, last, corner].map(|c: [u32; 3]| c[k]);
+                parts.triangles.push(of(0));
+                parts.uv_of.push(of(1));
+                parts.normal_of.push(of(2));
+                parts.look_of.push(self.look);
+                if parts.triangles.len() > limits::TRIANGLES {
+                    return Err(too_many_triangles());
+                }
+            }
+            if first.is_none() {
+                first = Some(corner);
+            } else {
+                last = Some(corner);
+            }
+        }
+        if count < 3 {
+            return Err(Fault::at(line, format!("a face of {count} corners")));
+        }
+        Ok(())
+    }
+
+    /// Reads a library of materials. The rest of the line is one name, unless there is no such file: then its words are.
+    fn materials(&mut self, line: usize, text: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
+        let rest = rest_of(text, b"mtllib");
+        let names: Vec<String> = match refer.exists(&rest)? {
+            true => vec![rest],
+            false => {
+                let words: Vec<String> = rest.split_whitespace().map(Into::into).collect();
+                if words.len() > 1 && words.iter().any(|word| refer.exists(word).unwrap_or(false)) {
+                    words
+                } else {
+                    vec![rest]
+                }
+            }
+        };
+        if names.len() > limits::FILES {
+            return Err(Fault::at(line, format!("{} libraries of materials", names.len())));
+        }
+        for name in names {
+            match refer.read(&name)? {
+                Some(bytes) => self.library(&name, &bytes)?,
+                None => {
+                    let warning = format!("there is no file `{name}`: what has its materials is grey");
+                    self.parts.warnings.push(warning);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn library(&mut self, file: &str, bytes: &[u8]) -> Result<(), Fault> {
+        let within = |fault: Fault| {
+            Fault::new(match fault.line {
+                Some(line) => format!("in `{file}`, line {line}: {}", fault.what),
+                None => format!("in `{file}`: {}", fault.what),
+            })
+        };
+        let mut look: Option<u32> = None;
+        for (line, text) in (Lines { rest: bytes, number: 0 }) {
+            let mut words = words(&text);
+            match words.next() {
+                Some(b"newmtl") => {
+                    let name = rest_of(&text, b"newmtl").into_bytes();
+                    let next = self.parts.looks.len() as u32;
+                    let place = *self.names.entry(name).or_insert(next);
+                    if place == next {
+                        self.parts.looks.push(Look::PLAIN);
+                        bounded_looks(line, self.parts.looks.len()).map_err(within)?;
+                    }
+                    look = Some(place);
+                }
+                Some(b"Kd") => {
+                    if words.clone().next().is_some_and(|word| matches!(word, b"spectral" | b"xyz")) {
+                        return Err(within(Fault::at(line, "`Kd` is not red, green and blue")));
+                    }
+                    // One number alone is that of all channels.
+                    let ([r, g, b], count) = numbers::<3>(line, words, 1).map_err(within)?;
+                    let color = if count == 1 { DVec3::splat(r) } else { DVec3::new(r, g, b) };
+                    if let Some(look) = look {
+                        self.parts.looks[look as usize].factor = Some(color);
+                    }
+                }
+                Some(b"map_Kd") => {
+                    if words.next().is_some_and(|word| word.len() > 1 && word[0] == b'-') {
+                        return Err(within(Fault::at(
+                            line,
+                            "an option of `map_Kd`: expected a file name alone",
+                        )));
+                    }
+                    let warning = "pictures of models are not read: what has one is grey".to_string();
+                    if !self.parts.warnings.contains(&warning) {
+                        self.parts.warnings.push(warning);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn bounded(line: usize, count: usize, what: &str) -> Result<(), Fault> {
+    if count > limits::VERTICES {
+        return Err(Fault::at(line, format!("more than {} {what}", limits::VERTICES)));
+    }
+    Ok(())
+}
+
+/// The largest number of materials of a model.
+const LOOKS: usize = 1 << 20;
+
+fn bounded_looks(line: usize, count: usize) -> Result<(), Fault> {
+    if count > LOOKS {
+        return Err(Fault::at(line, format!("more than {LOOKS} materials")));
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! Foreign bytes: cut off, changed, with huge headers and circles. Each is an error or a model, in little memory.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use proptest::prelude::*;
+use rayfold_assets::{Library, MemoryFiles, Smoothing};
+
+fn error(bytes: impl Into<Vec<u8>>) -> String {
+    let library = Library::new(MemoryFiles::from([("x", bytes.into())]));
+    library.model("x", Smoothing::OfFile).map(|model| model.triangle_count()).unwrap_err().to_string()
+}
+
+fn attempt(bytes: &[u8]) {
+    let library = Library::new(MemoryFiles::from([("x", bytes.to_vec())]));
+    for smoothing in [Smoothing::OfFile, Smoothing::Within(30.0)] {
+        if let Ok(model) = library.model("x", smoothing) {
+            for triangle in 0..model.triangle_count() {
+                assert!(model.corners(triangle).iter().all(|p| p.is_finite()));
+                assert!(model.normals(triangle).is_none_or(|n| n.iter().all(|n| n.is_finite())));
+                let color = model.color(triangle, [0.25, 0.25, 0.5], true);
+                assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{color}");
+            }
+            let _ = model.closure();
+        }
+    }
+}
+
+const PLY: &[u8] = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty \
+float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80\x3f\0\0\0\0\0\0\
+\0\0\0\0\0\0\0\0\x80\x3f\0\0\0\0\x03\0\0\0\0\x01\0\0\0\x02\0\0\0";
+
+const GLTF: &[u8] = br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0},{"children":[0],"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,5,
+6,7,1]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":0},"mode":4}]}],"accessors":[{"bufferView":0,
+"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},"values":
+{"bufferView":0}}}],"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteLength":1,"byteOffset":4}],"buffers":[{"uri":
+"data:;base64,AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/","byteLength":36}]}"#;
+
+const OBJ: &[u8] =
+    b"v 0 0 0\nv 1 0 0 1 .5 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 -1//-1\nl 1 2\n";
+
+#[test]
+fn the_samples_are_models() {
+    for bytes in [PLY, GLTF, OBJ] {
+        let library = Library::new(MemoryFiles::from([("x", bytes.to_vec())]));
+        let model = library.model("x", Smoothing::OfFile).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(model.triangle_count(), 1);
+    }
+}
+
+#[test]
+fn headers_promise_no_more_than_there_is() {
+    let ply = |vertices: &str, faces: &str| {
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty \
+             float z\nelement face {faces}\nproperty list uint int vertex_indices\nend_header\n\0"
+        )
+    };
+    assert!(error(ply("29000000", "1")).contains("only 1 bytes are left"));
+    assert!(error(ply("18446744073709551615", "1")).contains("more than"));
+    assert!(error(ply("0", "10000000")).contains("only 1 bytes are left"));
+    assert!(error("ply\nformat ascii 1.0\nelement vertex 9999999999\nend_header\n").contains("more than"));
+    assert!(error("ply\nformat ascii 1.0\nelement other 9999999999\nend_header\n").contains("promises"));
+    let list = "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uint int vertex_indices\nend_header\n";
+    assert!(
+        error([list.as_bytes(), &[0xff, 0xff, 0xff, 0x7f]].concat()).contains("a list of 2147483647 numbers")
+    );
+    let mut stl = vec![0; 80];
+    stl.extend(u32::MAX.to_le_bytes());
+    assert!(error(stl).contains("no model"));
+    let text = String::from_utf8_lossy(GLTF).into_owned();
+    assert!(error(text.replace("\"count\":3", "\"count\":4")).contains("outside of its buffer"));
+    assert!(error(text.replace("\"count\":3", "\"count\":30000001")).contains("30000001 items"));
+    assert!(error(text.replace("\"count\":1", "\"count\":2")).contains("outside of its buffer"));
+    assert!(error(text.replace("\"byteLength\":36}]", "\"byteLength\":37}]")).contains("cut off"));
+    assert!(
+        error(text.replace("\"byteOffset\":4", "\"byteOffset\":18446744073709551615")).contains("outside")
+    );
+    assert!(error(text.replace("5126", "5999")).contains("component type 5999"));
+}
+
+#[test]
+fn circles_and_missing_nodes_are_errors() {
+    let text = String::from_utf8_lossy(GLTF).into_owned();
+    let within = text.replace("{\"mesh\":0}", "{\"mesh\":0,\"children\":[1]}");
+    assert!(
+        error(within.replace("\"nodes\":", "\"scenes\":[{\"nodes\":[0]}],\"nodes\":"))
+            .contains("within itself")
+    );
+    assert!(error(text.replace("\"children\":[0]", "\"children\":[9]")).contains("no node 9"));
+    assert!(error(text.replace("\"children\":[0]", "\"children\":[0,0]")).contains("two parents"));
+    assert!(error(text.replace("\"mesh\":0", "\"mesh\":3")).contains("no mesh 3"));
+    let deep = "[".repeat(100_000);
+    assert!(error(format!("{{\"skins\":{deep}")).contains("recursion limit"));
+}
+
+#[test]
+fn numbers_that_are_none_are_errors() {
+    let mut bytes = PLY.to_vec();
+    let at = bytes.len() - 13 - 36;
+    bytes[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(error(bytes).contains("not a finite number"));
+    let mut bytes = PLY.to_vec();
+    let at = bytes.len() - 4;
+    bytes[at] = 200;
+    assert!(error(bytes).contains("index is out of range"));
+    assert!(
+        error(String::from_utf8_lossy(GLTF).replace("[1,0,0,0,0", "[1e999,0,0,0,0"))
+            .contains("number out of range")
+    );
+    assert!(
+        error(String::from_utf8_lossy(OBJ).replace("v 0 1 0", "v 0 1e999 0")).contains("not a finite number")
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(3000))]
+
+    #[test]
+    fn changed_bytes_do_no_harm(
+        sample in prop::sample::select(vec![PLY, GLTF, OBJ]),
+        cut in 0.0..1.0f64,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+    ) {
+        let mut bytes = sample.to_vec();
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        attempt(&bytes);
+        bytes.truncate((cut * bytes.len() as f64) as usize);
+        attempt(&bytes);
+    }
+
+    #[test]
+    fn any_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        attempt(&bytes);
+        attempt(&[b"ply\n", &bytes[..]].concat());
+        attempt(&[b"glTF\x02\0\0\0", &bytes[..]].concat());
+    }
+}
