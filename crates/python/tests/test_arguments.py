@@ -147,7 +147,7 @@ def test_numbers_are_kept_bit_for_bit():
 
 def test_errors_of_a_script_have_their_places():
     with pytest.raises(rf.SceneError) as caught:
-        rf.parse("Screen 4 3\nSpere 1 0 0 0 1 1 1 1 1 1\nSphere 0 0 0 0 1 1 1 1 1 1\nTrace\n", "film.txt")
+        rf.parse("Screen 4 3\nSpere 1 0 0 0 1 1 1 1 1 1\nSphere -1 0 0 0 1 1 1 1 1 1\nTrace\n", "film.txt")
     first, second = caught.value.diagnostics
     assert (first.line, first.column, first.span, first.code) == (2, 1, (11, 16), "unknown-command")
     assert first.help == "did you mean `Sphere`?" and first.severity == "error" and first.file == "film.txt"

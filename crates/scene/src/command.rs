@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn numbers_are_checked_without_a_line() {
         let ball = [-1.0, 0.0, f64::NAN, 0.0];
-        assert_eq!(Command::Sphere.check(&ball), [(InvalidValue::NotPositive(Parameter::Radius), 0..1)]);
+        assert_eq!(Command::Sphere.check(&ball), [(InvalidValue::Negative(Parameter::Radius), 0..1)]);
         assert_eq!(
             Command::Sphere.check(&[1.0, 0.0, f64::NAN, 0.0]),
             [(InvalidValue::NotFinite(Parameter::Center), 1..4)]

@@ -136,13 +136,13 @@ fn a_scene_without_light() {
     check(
         "Screen 4 3\nSphere 1 0 0 -5 .1 0 0 1 0 0\nIlite 1 1 1 0 -1 0\nTrace",
         expect![[r#"
-        error: unknown command `Ilite`
-         --> a.txt:3:1
-          |
-        3 | Ilite 1 1 1 0 -1 0
-          | ^^^^^ expected a command
-          |
-          = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
+            error: unknown command `Ilite`
+             --> a.txt:3:1
+              |
+            3 | Ilite 1 1 1 0 -1 0
+              | ^^^^^ expected a command
+              |
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 
