@@ -27,15 +27,17 @@ mod model;
 mod normals;
 mod obj;
 mod ply;
+mod referred;
 mod srgb;
 mod stl;
 
 pub use closure::Closure;
-pub use decode::{Referred, decode};
+pub use decode::decode;
 pub use error::AssetError;
 pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, same_but_for_case};
 pub use library::Library;
 pub use model::{Colors, Look, Model, Smoothing};
+pub use referred::Referred;
 
 /// The example of the README is compiled and run with the tests.
 #[cfg(doctest)]

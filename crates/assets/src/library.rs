@@ -3,11 +3,12 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::decode::{Referred, absent, content, decode};
+use crate::decode::decode;
 use crate::error::AssetError;
 use crate::files::{FileInfo, Files, NoFiles};
 use crate::limits;
 use crate::model::{Model, Smoothing};
+use crate::referred::{Referred, absent, content};
 
 /// The models of a folder. A model is decoded again only if its files have changed.
 pub struct Library {

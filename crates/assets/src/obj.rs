@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::decode::Referred;
 use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
+use crate::referred::Referred;
 
 /// A line of the text, with those that a backslash joins to it: its number and its words.
 struct Lines<'a> {

@@ -7,7 +7,7 @@
 //! let table = rayfold_scene::language();
 //! let sphere = table.commands.iter().find(|command| command.name == "Sphere").unwrap();
 //! assert_eq!(sphere.usage, "Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]");
-//! assert_eq!(sphere.parameters[0].range, "greater than 0");
+//! assert_eq!(sphere.parameters[0].range, "at least 0");
 //! ```
 
 use serde::Serialize;

@@ -9,10 +9,10 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec2};
 
 use self::accessor::Buffers;
 use self::document::{Document, Material, Node, Primitive};
-use crate::decode::Referred;
 use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
+use crate::referred::Referred;
 
 /// The extensions that a file may require.
 const KNOWN: [&str; 5] = [

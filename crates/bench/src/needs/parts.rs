@@ -56,8 +56,8 @@ pub(super) const VERSION_2: &[&str] = &[
 /// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). One of the six is
 /// here in two, since its nine parts together cost a cylinder more than one part may (0.59 %), and neither half does.
 const OF_VERSION_2: [&[&str]; 7] = [
-    &["planes", "groups", "highlights", "glass", "skies", "extents", "fogs"],
-    &["planes", "discs", "capsules", "highlights", "patterns", "lenses"],
+    &["planes", "groups", "highlights", "glass", "skies", "extents"],
+    &["planes", "discs", "capsules", "highlights", "patterns", "lenses", "fogs"],
     &["tori", "capsules", "turned-boxes", "groups", "srgb"],
     &["capsules", "turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents", "fogs"],
     &["cones", "tori", "turned-boxes", "groups", "glass", "lamps", "skies", "srgb", "shutters", "fogs"],
