@@ -260,7 +260,7 @@ impl Reader {
         }
         for name in names {
             match refer.read(&name)? {
-                Some(bytes) => self.library(&name, &bytes)?,
+                Some(bytes) => self.read_materials(&name, &bytes)?,
                 None => {
                     let warning = format!("there is no file `{name}`: what has its materials is grey");
                     self.parts.warnings.push(warning);
@@ -270,7 +270,7 @@ impl Reader {
         Ok(())
     }
 
-    fn library(&mut self, file: &str, bytes: &[u8]) -> Result<(), Fault> {
+    fn read_materials(&mut self, file: &str, bytes: &[u8]) -> Result<(), Fault> {
         let within = |fault: Fault| {
             Fault::new(match fault.line {
                 Some(line) => format!("in `{file}`, line {line}: {}", fault.what),

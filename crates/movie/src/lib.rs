@@ -190,24 +190,13 @@ impl<W: Write> Encoding<W> {
     }
 }
 
-/// Encodes frames that are all at hand into memory.
-///
-/// # Errors
-/// Fails if the frames are beyond the limits of the container.
-pub fn to_bytes(
-    container: Container,
-    movie: Movie,
-    frames: impl IntoIterator<Item = (RgbImage, Option<f64>)>,
-) -> Result<Vec<u8>, Error> {
-    let mut bytes = Vec::new();
-    let mut encoding = Encoding::begin(&mut bytes, container, movie)?;
-    for (frame, seconds) in frames {
-        encoding.push(frame, seconds)?;
+impl Finished {
+    /// Writes what belongs to the start of the file into a file in memory.
+    pub fn complete(&self, file: &mut [u8]) {
+        if let Some((at, length)) = self.length {
+            file[at as usize..][..length.len()].copy_from_slice(&length);
+        }
     }
-    if let Some((at, length)) = encoding.finish()?.length {
-        bytes[at as usize..][..length.len()].copy_from_slice(&length);
-    }
-    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -234,7 +223,12 @@ mod tests {
             exact: false,
         };
         for container in Container::ALL {
-            let bytes = to_bytes(container, movie, frames.clone()).unwrap();
+            let mut bytes = Vec::new();
+            let mut encoding = Encoding::begin(&mut bytes, container, movie).unwrap();
+            for (frame, seconds) in frames.clone() {
+                encoding.push(frame, seconds).unwrap();
+            }
+            encoding.finish().unwrap().complete(&mut bytes);
             let start: &[u8] = match container {
                 Container::Gif => b"GIF89a",
                 Container::Apng => b"\x89PNG",

@@ -95,11 +95,10 @@ impl Encoder {
         let sink = self.sink.clone();
         let (bytes, dropped) = py.detach(|| {
             guarded(|| {
-                let Finished { dropped, length } = encoding.finish().map_err(movie_error)?;
+                let finished = encoding.finish().map_err(movie_error)?;
+                let dropped = finished.dropped;
                 let mut destination = sink.lock();
-                if let Some((at, length)) = length {
-                    destination.overwrite(at, &length).map_err(io_error)?;
-                }
+                destination.complete(finished).map_err(io_error)?;
                 match std::mem::replace(&mut *destination, Destination::Closed) {
                     Destination::File(file) => file.finish(true).map(|()| (None, dropped)).map_err(os_error),
                     Destination::Memory(bytes) => Ok((Some(bytes), dropped)),
@@ -135,15 +134,14 @@ impl Write for Sink {
 }
 
 impl Destination {
-    fn overwrite(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
-        match self {
-            Self::File(file) => file.overwrite(at, bytes),
-            Self::Memory(memory) => {
-                memory[at as usize..][..bytes.len()].copy_from_slice(bytes);
-                Ok(())
-            }
-            Self::Closed => Ok(()),
+    /// Writes what belongs to the start of the file.
+    fn complete(&mut self, finished: Finished) -> io::Result<()> {
+        match (self, finished.length) {
+            (Self::File(file), Some((at, length))) => file.overwrite(at, &length)?,
+            (Self::Memory(memory), _) => finished.complete(memory),
+            _ => {}
         }
+        Ok(())
     }
 }
 

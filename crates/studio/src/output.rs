@@ -95,9 +95,7 @@ impl Job {
             report(OutputState::Running { done: done + 1, of });
         }
         let encoding = encoding.ok_or_else(|| Error::Output("there is no frame to draw".into()))?;
-        if let Some((at, length)) = encoding.finish().map_err(|error| failed(&error))?.length {
-            file.0[at as usize..][..length.len()].copy_from_slice(&length);
-        }
+        encoding.finish().map_err(|error| failed(&error))?.complete(&mut file.0);
         Ok(file.0)
     }
 }
@@ -274,10 +272,13 @@ mod tests {
             let job = Job { container, scripts: vec![Arc::clone(&script)], settings: settings.clone() };
             let file = job.run(&AtomicBool::new(false), &|_| {}).unwrap();
             // The second frame is shown twice: there, and back.
-            let frames = [(0, None), (1, Some(0.5)), (2, None), (1, Some(0.5))].map(|(frame, seconds)| {
-                (render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap(), seconds)
-            });
-            let expected = rayfold_movie::to_bytes(container, movie, frames).unwrap();
+            let mut expected = Vec::new();
+            let mut encoding = Encoding::begin(&mut expected, container, movie).unwrap();
+            for (frame, seconds) in [(0, None), (1, Some(0.5)), (2, None), (1, Some(0.5))] {
+                let image = render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap();
+                encoding.push(image, seconds).unwrap();
+            }
+            encoding.finish().unwrap().complete(&mut expected);
             assert!(file == expected, "{container:?}: {} and {} bytes", file.len(), expected.len());
         }
     }

@@ -79,7 +79,7 @@ impl Row {
         self.beyond() > MOST
     }
 
-    fn told(&self) -> String {
+    fn summary(&self) -> String {
         format!("{} without {} ({:+.2} %)", self.subject, self.without, self.beyond())
     }
 }
@@ -122,7 +122,7 @@ pub fn run(args: &Args) -> Result<()> {
         let path = args.output.join("needs.md");
         OutputFile::write(&path, &report, false)?;
     }
-    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
+    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::summary).collect();
     ensure!(beyond.is_empty(), "scenes execute over {MOST} % more than they need: {}", beyond.join("; "));
     Ok(())
 }
@@ -230,10 +230,10 @@ fn worst<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
 }
 
 fn report(rows: &[Row]) -> Result<String> {
-    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::told).collect();
+    let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::summary).collect();
     let verdict = if beyond.is_empty() {
         let most = worst(rows.iter()).context("nothing counted")?;
-        format!("All {} pairs are within the bound; the largest excess is {}.", rows.len(), most.told())
+        format!("All {} pairs are within the bound; the largest excess is {}.", rows.len(), most.summary())
     } else {
         format!("**This run failed** for {} of {} pairs: {}.", beyond.len(), rows.len(), beyond.join("; "))
     };

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use image::RgbImage;
 use rayfold_files::OutputFile;
-use rayfold_movie::{Container, Encoding, Finished, Length, MAX_FPS, Movie};
+use rayfold_movie::{Container, Encoding, Finished, MAX_FPS, Movie};
 
 use super::target::Place;
 use crate::console::Console;
@@ -102,7 +102,7 @@ pub(super) fn encode(
     let failed = |source| error_at(place, source);
     let mut out = BufWriter::with_capacity(BUFFER, Sink::open(place, container, limit)?);
     let mut frames = 0;
-    let Finished { dropped, length } = {
+    let finished = {
         let mut encoding = Encoding::begin(&mut out, container, movie).map_err(|error| at(place, error))?;
         fill(&mut |frame, seconds| {
             frames += 1;
@@ -112,9 +112,8 @@ pub(super) fn encode(
     };
     let mut sink = out.into_inner().map_err(|error| failed(error.into_error()))?;
     let bytes = sink.bytes;
-    if let Some(length) = length {
-        sink.set_length(length).map_err(failed)?;
-    }
+    sink.complete(finished).map_err(failed)?;
+    let dropped = finished.dropped;
     let written = Written { frames: frames - dropped, container, dropped, size: movie.size, bytes };
     Ok(Encoded { written, sink })
 }
@@ -190,16 +189,14 @@ impl Sink {
         Ok(Self { to, bytes: 0, limit: limit.unwrap_or(u64::MAX) })
     }
 
-    /// Writes a length to where it belongs.
-    fn set_length(&mut self, (at, length): Length) -> io::Result<()> {
-        match &mut self.to {
-            To::File(file) => file.overwrite(at, &length),
-            To::StandardOutput => Ok(()),
-            To::Memory(bytes) => {
-                bytes[at as usize..][..length.len()].copy_from_slice(&length);
-                Ok(())
-            }
+    /// Writes what belongs to the start of the file.
+    fn complete(&mut self, finished: Finished) -> io::Result<()> {
+        match (&mut self.to, finished.length) {
+            (To::File(file), Some((at, length))) => file.overwrite(at, &length)?,
+            (To::Memory(bytes), _) => finished.complete(bytes),
+            _ => {}
         }
+        Ok(())
     }
 
     fn finish(self, place: &Place) -> Result<(), MovieError> {
