@@ -8,7 +8,7 @@
 //! there are, the more likely it leaves, so that few of the finishers before the first manifest write one.
 //!
 //! Invariant: a manifest is written from a page only if the page was listed after the manifest that it replaces was
-//! read.
+//! read. The writer of a manifest leaves for a frame only if the page was listed after that manifest was put.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -98,7 +98,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if !matches!(fact, Fact::Drawn(..) | Fact::Faulty(..)) {
             return Ok(Next::Wait);
         }
-        if page.is_none() {
+        // Others leave because of this invocation's own manifest: it lists their results before it leaves itself.
+        let is_own = known.is_some_and(|known| self.is_own(&known.manifest.head));
+        if page.as_ref().is_none_or(|page| is_own && !page.is_new) {
             *page = self.page(animation, known).await?;
         }
         let Some(there) = page else { return self.survey_one(animation, fact, glimpse, is_due).await };

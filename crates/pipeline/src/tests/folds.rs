@@ -484,6 +484,30 @@ async fn a_page_is_written_down_only_over_the_manifest_that_was_read_before_it()
     assert_eq!((head.done, head.revision), (1, 3));
 }
 
+/// Another frame comes between the page and the commit. Its finisher may leave because of that commit.
+#[tokio::test]
+async fn the_writer_of_a_manifest_leaves_for_no_frame_because_of_an_older_page() {
+    let world = World::new();
+    let version = world.put(SCRIPT, "frame 1");
+    world.put("scripts/film/2.txt", "frame 2");
+    let mut commits = 0;
+    let bucket = world.store.bucket.clone();
+    let now = world.store.clock.now();
+    world.refuse(move |request| {
+        if request != "put manifests/film.json" {
+            return None;
+        }
+        commits += 1;
+        if commits == 1 {
+            let frame = format!("frames/film/1@{version}-p1.png");
+            bucket.lock().unwrap().put(now, &frame, "drawn".into(), PutOptions::always()).unwrap();
+        }
+        (commits == 2).then(|| Error::PreconditionFailed { key: MANIFEST.to_owned() })
+    });
+    assert_eq!(world.try_render("scripts/film/2.txt").await.unwrap().folded, Folded::Claimed);
+    assert_eq!(world.manifest().head.done, 2);
+}
+
 /// Of so many receipts a page does not show all.
 #[tokio::test]
 async fn a_finisher_looks_at_one_frame_where_there_is_more_than_a_page() {
