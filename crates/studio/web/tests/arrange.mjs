@@ -5,7 +5,7 @@ import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, drag, open, openStart, over, row, shot, until } from "./stage.mjs";
+import { audit, drag, open, openStart, over, clickRow, shot, until } from "./stage.mjs";
 
 const SCENE =
   "Screen 320 180\nLook 0 3 9  0 0.5 0  40\nIlight 1 1 1 1 -1 -1   # sun\nMaterial red diffuse 1 0 0\n" +
@@ -44,7 +44,7 @@ test("objects are pasted as text with what they name, and aligned", async (t) =>
   const studio = await open(t, { text: SCENE });
   const { page, context } = studio;
   await context.grantPermissions(["clipboard-read", "clipboard-write"]);
-  await (await row(page, ".item", { hasText: "left" })).click();
+  await clickRow(page, ".item", { hasText: "left" });
   await page.locator(".viewport").focus();
   await page.keyboard.press("Control+c");
   const copied = "Material red diffuse 1 0 0\nSphere 0.4  -2 0.4 0  red   # left\n";
@@ -54,8 +54,8 @@ test("objects are pasted as text with what they name, and aligned", async (t) =>
   assert.equal((await studio.saved()).match(/^Material/gm).length, 1);
   await page.keyboard.press("Control+z");
   await until(async () => (await studio.saved()) === SCENE);
-  await (await row(page, ".item", { hasText: "left" })).click();
-  await (await row(page, ".item", { hasText: "right" })).click({ modifiers: ["Control"] });
+  await clickRow(page, ".item", { hasText: "left" });
+  await clickRow(page, ".item", { hasText: "right", modifiers: ["Control"] });
   await page.getByLabel("Align").selectOption("0 middle");
   await until(async () => x(await studio.saved(), "left") === x(await studio.saved(), "right"));
   studio.check();
@@ -103,7 +103,7 @@ test("the search runs actions, adds and selects", async (t) => {
 test("a key is dragged as a point of a curve, and as a point of the motion path", async (t) => {
   const studio = await open(t, { text: ANIMATED });
   const { page } = studio;
-  await (await row(page, ".item", { hasText: "runner" })).click();
+  await clickRow(page, ".item", { hasText: "runner" });
   await page.getByRole("button", { name: "Curves" }).click();
   const key = page.locator(".curves .key").last();
   const at = await key.boundingBox();
@@ -125,7 +125,7 @@ test("a key is dragged as a point of a curve, and as a point of the motion path"
 test("the sun turns by its angles", async (t) => {
   const studio = await open(t, { text: SCENE });
   const { page } = studio;
-  await (await row(page, ".item", { hasText: "sun" })).click();
+  await clickRow(page, ".item", { hasText: "sun" });
   const height = page.getByRole("spinbutton", { name: "sun height" });
   await height.fill("90");
   await height.press("Enter");

@@ -8,7 +8,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, drag, open, over, row, shot, until } from "./stage.mjs";
+import { audit, drag, open, over, clickRow, shot, until } from "./stage.mjs";
 
 const HEAD = "Screen 320 180\nLook 0 3 9  0 0.5 0  40\nIlight 1 1 1 1 -1 -1\n";
 const FLOOR = "Plane 0 0 0  0 1 0  .1 .1 .1 .5 .5 .5   # floor\n";
@@ -196,7 +196,7 @@ test("a material and a group are renamed wherever they are named", async (t) => 
   const studio = await open(t, { text });
   const { page } = studio;
   for (const [selector, old, name] of [[".item.material", "gold", "brass"], [".item.group", "pair", "couple"]]) {
-    await (await row(page, selector, { hasText: old })).click();
+    await clickRow(page, selector, { hasText: old });
     await page.getByRole("listbox").focus();
     await page.keyboard.press("F2");
     await page.keyboard.press("Control+a");
@@ -256,7 +256,7 @@ test("an empty folder and a new one are opened, and names show what they hide", 
   const next = await open(t, { from: empty, name: "empty" });
   await next.page.locator(".item.object").first().waitFor();
   assert.ok(!existsSync(join(next.path, "scene.txt")));
-  await (await row(next.page, ".item.object")).click();
+  await clickRow(next.page, ".item.object");
   await next.page.locator(".viewport").focus();
   await next.page.keyboard.press("ArrowRight");
   await until(() => existsSync(join(next.path, "scene.txt")));
@@ -286,7 +286,7 @@ test("at three sizes and in both themes nothing is clipped, and the picture has 
       await t.test(`${width} x ${height}, ${scheme}`, async (t) => {
         const studio = await open(t, { text, size: [width, height], scheme });
         const { page } = studio;
-        await (await row(page, ".item", { hasText: "ball" })).click();
+        await clickRow(page, ".item", { hasText: "ball" });
         await studio.settled();
         await shot(page, `look-${width}-${scheme}`);
         const box = await page.locator(".viewport").boundingBox();

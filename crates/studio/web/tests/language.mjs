@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { test } from "node:test";
 
-import { audit, drag, open, over, program, row, shot, until } from "./stage.mjs";
+import { audit, drag, open, over, program, clickRow, shot, until } from "./stage.mjs";
 
 const table = () => {
   const checked = spawnSync(program, ["check", "--format", "json", "-"], { input: "Screen 4 3\nLook 0 0 9 0 0 0 40\nTrace\n" });
@@ -70,18 +70,18 @@ test("every parameter of every command is reached on the page", async (t) => {
       await page.locator(`.tile[title^="${name}:"]`).click();
     } else {
       const chip = inspector.locator(`.chips button[title^="${name}:"]`);
-      if (await chip.count()) await chip.click();
       within = inspector.locator(`section[title="${name}"]`);
-      await within.waitFor();
+      await until(async () => (await within.count()) > 0 || (await chip.click({ timeout: 2000 }).catch(() => {}), false));
     }
     await until(async () => (await line(name)) !== undefined);
     if (within === inspector) await inspector.locator(".subject .note", { hasText: name }).waitFor();
     const before = words(await line(name)).slice(subject ? 2 : 1);
     const numbers = parameters.filter(({ words }) => !words).flatMap(({ names }) => names).length;
+    if (numbers > 0) await within.getByRole("spinbutton").first().waitFor();
     await changeAll(studio, within);
     // Angles of a sun are the direction in other words.
-    const shown = await within.getByRole("spinbutton").evaluateAll((all) => all.filter(({ ariaLabel }) => !/^sun (azimuth|height)$/.test(ariaLabel)).length);
-    assert.equal(shown, numbers, `${name}: numbers on the page`);
+    const shown = () => within.getByRole("spinbutton").evaluateAll((all) => all.filter(({ ariaLabel }) => !/^sun (azimuth|height)$/.test(ariaLabel)).length);
+    await until(async () => (await shown()) === numbers).catch(async () => assert.fail(`${name}: ${await shown()} numbers on the page, not ${numbers}`));
     for (const { words: allowed } of parameters.filter(({ words }) => words)) {
       const select = within.locator("select").first();
       const now = await select.inputValue();
@@ -106,7 +106,7 @@ test("every clause of a material is switched on and off, and a sphere shows it",
   await page.getByRole("button", { name: "New material" }).click();
   const switches = page.getByRole("group", { name: "Clauses" }).getByRole("button");
   await until(async () => (await switches.count()) === clauses.length);
-  assert.equal(await page.locator(".card img").count(), 1);
+  await until(async () => (await page.locator(".card img").count()) === 1);
   const material = async () => (await studio.saved()).split("\n").find((line) => line.startsWith("Material material-1 "));
   for (const [at, { name, parameters, ends_with: other }] of clauses.entries()) {
     const has = async () => words(await material()).includes(name);
@@ -118,9 +118,9 @@ test("every clause of a material is switched on and off, and a sphere shows it",
     const from = text.indexOf(name) + 1;
     const numbers = parameters.flatMap(({ names }) => names).length;
     assert.ok(text.slice(from, from + numbers).every((word) => Number.isFinite(Number(word))), `${text}`);
-    const fields = await page.locator(".panel.inspector .field").count();
-    assert.ok(fields >= parameters.length, `${name} has fields`);
-    if (other) assert.ok(await page.getByLabel("other material").isVisible(), name);
+    const fields = page.locator(".panel.inspector .field");
+    await until(async () => (await fields.count()) >= parameters.length).catch(() => assert.fail(`${name} has no fields`));
+    if (other) await page.getByLabel("other material").waitFor();
     if (name !== "diffuse") {
       await switches.nth(at).click();
       await until(async () => !(await has()));
@@ -146,7 +146,7 @@ test("a material is dropped on an object, taken off again, and a group is used f
   await page.getByText("Starter materials").click();
   await page.locator(".sphere", { hasText: "gold" }).dragTo(page.locator(".viewport"), at);
   await until(async () => words(await ball()).at(-1) === "gold");
-  await (await row(page, ".item", { hasText: "ball" })).click();
+  await clickRow(page, ".item", { hasText: "ball" });
   await page.getByLabel("material", { exact: true }).selectOption("red");
   await until(async () => words(await ball()).at(-1) === "red");
   await page.getByLabel("material", { exact: true }).selectOption("");

@@ -9,7 +9,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, caret, drag, goLine, isDrawn, open, over, program, row, scenes, seenLines, selectLine, setLine, shot, until } from "./stage.mjs";
+import { audit, caret, drag, goLine, isDrawn, open, over, program, clickRow, scenes, seenLines, selectLine, setLine, shot, until } from "./stage.mjs";
 
 test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
@@ -31,7 +31,7 @@ test("moving one object of each example by an arrow key changes one line of one 
       const from = join(scenes, name);
       // Whatever its pictures take: it is moved while they get finer.
       const studio = await open(t, { from, name });
-      await (await row(studio.page, ".item.object")).click();
+      await clickRow(studio.page, ".item.object");
       await studio.page.locator(".viewport").focus();
       await studio.page.keyboard.press("ArrowRight");
       const changed = () =>
@@ -67,7 +67,7 @@ test("what takes long is there at once, with few pixels, and then becomes the pi
   assert.equal(first.final, "false");
   await until(async () => (await shown()).width > 300, 120_000);
   // It can be worked with meanwhile.
-  await (await row(studio.page, ".item.object")).click();
+  await clickRow(studio.page, ".item.object");
   await studio.page.locator(".viewport").focus();
   await studio.page.keyboard.press("ArrowRight");
   await until(async () => (await studio.saved()) !== text);
@@ -113,7 +113,7 @@ test("five objects from an empty page without a number, and the GIF is that of t
 test("the script and the picture follow each other, and faults are told where they are", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page } = studio;
-  await (await row(page, ".item", { hasText: "Sphere" })).click();
+  await clickRow(page, ".item", { hasText: "Sphere" });
   const ball = page.locator(".cm-line.chosen");
   await ball.waitFor();
   const text = await ball.textContent();
@@ -143,7 +143,7 @@ test("what is typed stays, whatever is told meanwhile", async (t) => {
   assert.equal((await caret(page)).text, typed);
   await until(async () => (await studio.saved()).split("\n")[1] === typed);
   // Numbers, and names, while the script changes elsewhere.
-  await (await row(page, ".item.object")).click();
+  await clickRow(page, ".item.object");
   const radius = page.getByRole("spinbutton", { name: "radius" });
   await radius.focus();
   await page.keyboard.press("Control+a");

@@ -127,16 +127,17 @@ export async function over(page, x, y) {
   return [box.x + x * box.width, box.y + y * box.height];
 }
 
-/** A row of the outliner, brought in sight: only rows in sight are made. */
-export async function row(page, selector, options) {
+/** Clicks on a row of the outliner. Only rows in sight are made, and the list may change while one is looked for. */
+export async function clickRow(page, selector, { modifiers, ...options } = {}) {
   const found = page.locator(selector, options).first();
   const list = page.getByRole("listbox");
-  for (let top = 0; (await found.count()) === 0; top += 100) {
+  let top = 0;
+  await until(async () => {
+    if ((await found.count()) > 0) return found.click({ modifiers, timeout: 2000 }).then(() => true, () => false);
     const end = await list.evaluate((list, top) => ((list.scrollTop = top), list.scrollHeight), top);
-    assert.ok(top < end, `no row is ${selector}`);
-    await page.waitForTimeout(50);
-  }
-  return found;
+    top = top < end ? top + 100 : 0;
+    return false;
+  });
 }
 
 /** Opens the menu of outputs and returns one of its links. */
