@@ -121,6 +121,7 @@ class Scene:
         look: Any = ...,
         lens: Any = ...,
         background: Any = ...,
+        fog: Any = ...,
         samples: Any = ...,
         shutter: Any = ...,
         tone: Any = ...,
@@ -238,6 +239,24 @@ class Scene:
         top : Color, optional
             the background (`R G B`): colour in display values, clamped to 0..1; by default the first colour.
         """
+    def fog(
+        self,
+        color: Color | Literal["none"],
+        distance: Number | None = None,
+    ) -> None:
+        """The colour that rays take on over their length.
+
+        In a script: `Fog r g b d or none`.
+
+        Parameters
+        ----------
+        color : Color
+            the fog (`r g b`): colour in display values.
+        distance : Number
+            the fog's distance d (`d`): length in world units, greater than 0.
+
+        `fog("none")` in place of all arguments.
+        """
     def samples(
         self,
         n: int,
@@ -316,7 +335,7 @@ class Scene:
         Parameters
         ----------
         radius : Number
-            the radius (`R`): length in world units, greater than 0.
+            the radius (`R`): length in world units, at least 0.
         center : Vector
             the centre (`cx cy cz`): position in world units.
         material : Material | str, optional
@@ -444,7 +463,7 @@ class Scene:
         Parameters
         ----------
         radius : Number
-            the radius (`R`): length in world units, greater than 0.
+            the radius (`R`): length in world units, at least 0.
         center : Vector
             the centre (`cx cy cz`): position in world units.
         normal : Vector
@@ -478,7 +497,7 @@ class Scene:
         Parameters
         ----------
         radius : Number
-            the radius (`R`): length in world units, greater than 0.
+            the radius (`R`): length in world units, at least 0.
         a : Vector
             the axis's end (`ax ay az`): position in world units.
         b : Vector
@@ -527,7 +546,7 @@ class Scene:
         ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
             the clauses of a material, as those of `Material`.
 
-        In the names of the script, `Ra` and `Rb` are not both 0; `ax ay az` and `bx by bz` differ.
+        In the names of the script, `ax ay az` and `bx by bz` differ.
         """
     def torus(
         self,
@@ -567,6 +586,40 @@ class Scene:
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `R` is greater than `r`.
+        """
+    def capsule(
+        self,
+        radius: Number,
+        a: Vector,
+        b: Vector,
+        material: Material | str | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+    ) -> None:
+        """A cylinder with round ends.
+
+        In a script: `Capsule R ax ay az bx by bz ar ag ab rr rg rb [sr sg sb]`.
+
+        Parameters
+        ----------
+        radius : Number
+            the radius (`R`): length in world units, at least 0.
+        a : Vector
+            the axis's end (`ax ay az`): position in world units.
+        b : Vector
+            the axis's end (`bx by bz`): position in world units.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+            the clauses of a material, as those of `Material`.
         """
     def material(
         self,
