@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::line::Line;
 use crate::rotate_handles;
+use crate::snap_to_boxes::{Neighbours, Snap};
 use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed};
 use crate::view::Projection;
@@ -34,8 +35,11 @@ const CLEAR: f64 = 24.0;
 /// The length in pixels below which an arrow points at the viewer and is left out.
 const POINTED: f64 = 8.0;
 
-/// The smallest width of the snapping grid in pixels.
+/// The smallest width of the snapping grid in pixels, and the distance at which objects are aligned.
 const SNAP: f64 = 12.0;
+
+/// The step of a drag that is aligned with another object, in steps of a free one.
+const ALIGNED: f64 = 1e-4;
 
 /// The kind of a handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -256,8 +260,19 @@ pub(crate) struct Drag {
     /// The grabbed point in the world.
     grabbed: DVec3,
     keying: Keying,
+    /// The objects that the lines can be aligned with.
+    neighbours: Option<Neighbours>,
     /// The degrees turned so far, so that a drag can make several turns.
     turned: Cell<f64>,
+}
+
+/// The lines after a drag.
+#[derive(Debug, Default)]
+pub(crate) struct Dragged {
+    /// The lines with their indices.
+    pub(crate) lines: Vec<(usize, Line)>,
+    /// The ends of a line in the world for each axis on which the drag aligned the lines with another object.
+    pub(crate) guides: Vec<[DVec3; 2]>,
 }
 
 /// The modifiers of a drag.
@@ -267,7 +282,7 @@ pub(crate) struct DragOptions {
     /// Move up and down instead of along the ground.
     #[serde(default)]
     pub(crate) upright: bool,
-    /// Move in steps of a grid.
+    /// Align with other objects, else move in steps of a grid.
     #[serde(default)]
     pub(crate) snap: bool,
     /// Move curves as a whole, in all frames.
@@ -276,13 +291,15 @@ pub(crate) struct DragOptions {
 }
 
 impl Drag {
-    /// Starts a drag of some lines. `grabbed` is the point of an object that was hit, if there is one.
+    /// Starts a drag of some lines. `grabbed` is the point of an object that was hit, if there is one. `neighbours` are
+    /// the objects that the lines can be aligned with.
     pub(crate) fn new(
         grip: HandleKind,
         lines: Vec<(usize, Line)>,
         grabbed: Option<DVec3>,
         around: DVec3,
         keying: Keying,
+        neighbours: Option<Neighbours>,
     ) -> Option<Self> {
         let lines: Vec<_> = lines
             .into_iter()
@@ -305,7 +322,7 @@ impl Drag {
             | HandleKind::Turn { .. }
             | HandleKind::Scale { .. } => anchor,
         };
-        Some(Self { grip, lines, grabbed, keying, turned: Cell::new(0.0) })
+        Some(Self { grip, lines, grabbed, keying, neighbours, turned: Cell::new(0.0) })
     }
 
     /// Returns the lines after the pointer has moved from one point of the picture to another.
@@ -315,24 +332,33 @@ impl Drag {
         from: DVec2,
         to: DVec2,
         options: DragOptions,
-    ) -> Vec<(usize, Line)> {
-        let step = step(projection.pixel_at(self.grabbed), options.snap);
+    ) -> Dragged {
+        let pixel = projection.pixel_at(self.grabbed);
+        let step = step(pixel, options.snap);
         let keying = Keying { whole: options.whole, ..self.keying };
-        let moved = |axes: [bool; 3], by: DVec3| {
-            self.lines.iter().filter_map(move |(number, line, values)| {
+        let mut guides = Vec::new();
+        // Everything follows the pointer on a plane, along these axes.
+        let mut along = |normal: DVec3, axes: [bool; 3]| {
+            let Some(free) = between(projection, self.grabbed, normal, from, to) else { return self.start() };
+            let mut by = free;
+            let mut steps = [step; 3];
+            let neighbours = self.neighbours.as_ref().filter(|_| options.snap && from != to);
+            for Snap { axis, way, guide } in
+                neighbours.into_iter().flat_map(|all| all.snap(free, axes, SNAP * pixel))
+            {
+                (by[axis], steps[axis]) = (way, (self::step(pixel, false) * ALIGNED).max(1e-12));
+                guides.push(guide);
+            }
+            let moved = |(number, line, values): &(usize, Line, Values)| {
                 let mut line = line.clone();
                 for (first, position) in values.positions() {
-                    line = changed(&line, first, &shifted(position, by, axes, step), keying)?;
+                    line = changed(&line, first, &shifted(position, by, axes, steps), keying)?;
                 }
                 Some((*number, line))
-            })
+            };
+            self.lines.iter().filter_map(moved).collect()
         };
-        // Everything follows the pointer on a plane, along these axes.
-        let along = |normal: DVec3, axes| match between(projection, self.grabbed, normal, from, to) {
-            Some(by) => moved(axes, by).collect(),
-            None => self.start(),
-        };
-        match self.grip {
+        let lines = match self.grip {
             HandleKind::Body | HandleKind::Key { .. } => {
                 let (normal, axes) = self.plane(projection, options);
                 along(normal, axes)
@@ -342,26 +368,26 @@ impl Drag {
                 let (_, _, w) = projection.axes();
                 // The plane through the axis that faces the eye.
                 let normal = axis_way.cross(w).cross(axis_way);
-                let Some(normal) = normal.try_normalize() else { return self.start() };
+                let Some(normal) = normal.try_normalize() else { return self.unmoved() };
                 along(normal, [0, 1, 2].map(|other| other == axis))
             }
             HandleKind::Plane { axis } => along(DVec3::AXES[axis], [0, 1, 2].map(|other| other != axis)),
             HandleKind::Point { first } => {
                 let (normal, axes) = self.plane(projection, options);
                 let Some(by) = between(projection, self.grabbed, normal, from, to) else {
-                    return self.start();
+                    return self.unmoved();
                 };
                 self.first(|line, values| {
                     let position = values.vector(first)?;
-                    changed(line, first, &shifted(position, by, axes, step), keying)
+                    changed(line, first, &shifted(position, by, axes, [step; 3]), keying)
                 })
             }
             HandleKind::Length { first } => {
                 let (_, _, w) = projection.axes();
                 let at = |seen| meet(projection.ray(seen), self.grabbed, w).map(|p| p.distance(self.grabbed));
-                let (Some(before), Some(now)) = (at(from), at(to)) else { return self.start() };
+                let (Some(before), Some(now)) = (at(from), at(to)) else { return self.unmoved() };
                 if from == to {
-                    return self.start();
+                    return self.unmoved();
                 }
                 self.first(|line, values| {
                     let length = values.number(first)?;
@@ -371,7 +397,7 @@ impl Drag {
             HandleKind::Direction { first } => {
                 let radius = ARROW * projection.pixel_at(self.grabbed);
                 if from == to {
-                    return self.start();
+                    return self.unmoved();
                 }
                 self.first(|line, values| {
                     let old = values.vector(first)?;
@@ -396,10 +422,10 @@ impl Drag {
                 changed(line, first + axis, &[exactly(degrees[axis], by, rotate_handles::STEP)], keying)
             }),
             HandleKind::Scale { first } => {
-                let Some(center) = projection.point(self.grabbed) else { return self.start() };
+                let Some(center) = projection.point(self.grabbed) else { return self.unmoved() };
                 let factor = to.distance(center) / from.distance(center);
                 if from == to || !factor.is_finite() {
-                    return self.start();
+                    return self.unmoved();
                 }
                 self.first(|line, values| {
                     let scale = values.number(first)?;
@@ -407,7 +433,12 @@ impl Drag {
                     changed(line, first, &[rounded((scale * factor).max(step), step)], keying)
                 })
             }
-        }
+        };
+        Dragged { lines, guides }
+    }
+
+    fn unmoved(&self) -> Dragged {
+        Dragged { lines: self.start(), guides: Vec::new() }
     }
 
     fn start(&self) -> Vec<(usize, Line)> {
@@ -471,13 +502,13 @@ fn rounded(x: f64, step: f64) -> f64 {
     if decimals > 0.0 { format!("{x:.*}", decimals as usize).parse().unwrap_or(x) } else { x.round() }
 }
 
-/// Moves a position along some of the axes. The other coordinates keep their numbers.
-fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], step: f64) -> [f64; 3] {
+/// Moves a position along some of the axes, on each by a multiple of its step. The other coordinates keep their numbers.
+fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], steps: [f64; 3]) -> [f64; 3] {
     let mut to = position.to_array();
     for axis in (0..3).filter(|&axis| axes[axis]) {
-        let way = rounded(by[axis], step);
+        let way = rounded(by[axis], steps[axis]);
         if way != 0.0 {
-            to[axis] = exactly(to[axis], way, step);
+            to[axis] = exactly(to[axis], way, steps[axis]);
         }
     }
     to
@@ -513,8 +544,8 @@ mod tests {
 
     fn drag(grip: HandleKind, text: &str, from: DVec2, by: DVec2, options: DragOptions) -> String {
         let scene = scene();
-        let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO, STILL).unwrap();
-        drag.to(&Projection::new(&scene), from, from + by, options)[0].1.text()
+        let drag = Drag::new(grip, vec![(0, Line::new(text))], None, DVec3::ZERO, STILL, None).unwrap();
+        drag.to(&Projection::new(&scene), from, from + by, options).lines[0].1.text()
     }
 
     const BALL: &str = "Sphere 1  0 1 0  .1 .1 .1  1 1 1 # ball";
@@ -661,15 +692,16 @@ mod tests {
         let projection = Projection::new(&scene);
         let line = vec![(0, Line::new("Use table"))];
         let grip = HandleKind::Turn { first: 3, axis: 1 };
-        let drag = Drag::new(grip, line, None, DVec3::ZERO, STILL).unwrap();
+        let drag = Drag::new(grip, line, None, DVec3::ZERO, STILL, None).unwrap();
         let at = |degrees: f64| {
             let (sin, cos) = degrees.to_radians().sin_cos();
             projection.point(0.5 * DVec3::new(sin, 0.0, cos)).unwrap()
         };
         let mut text = String::new();
         for step in 0..=45 {
-            text =
-                drag.to(&projection, at(0.0), at(10.0 * f64::from(step)), DragOptions::default())[0].1.text();
+            text = drag.to(&projection, at(0.0), at(10.0 * f64::from(step)), DragOptions::default()).lines[0]
+                .1
+                .text();
         }
         assert_eq!(text, "Use table 0 0 0 0 450 0");
     }
@@ -679,10 +711,10 @@ mod tests {
         let keying = Keying { time: 25.0, auto: true, ..STILL };
         let scene = scene();
         let line = vec![(0, Line::new(BALL))];
-        let drag = Drag::new(HandleKind::Axis { axis: 1 }, line, None, DVec3::ZERO, keying).unwrap();
+        let drag = Drag::new(HandleKind::Axis { axis: 1 }, line, None, DVec3::ZERO, keying, None).unwrap();
         let to = |by: f64, options| {
             let from = DVec2::new(150.0, 80.0);
-            drag.to(&Projection::new(&scene), from, from + DVec2::new(0.0, by), options)[0].1.text()
+            drag.to(&Projection::new(&scene), from, from + DVec2::new(0.0, by), options).lines[0].1.text()
         };
         let text = to(-30.0, DragOptions::default());
         assert!(

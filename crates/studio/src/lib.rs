@@ -38,6 +38,7 @@ mod server;
 mod session;
 mod settings;
 mod silhouette;
+mod snap_to_boxes;
 mod snap_to_ground;
 mod source_map;
 mod start;

@@ -298,6 +298,14 @@ pub(crate) struct ServerMessage {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]
     pub(crate) hover_outline: Option<String>,
+    /// A text for the clipboard.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) clipboard: Option<String>,
+    /// The lines to the objects that a drag is aligned with, as an SVG path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(test, ts(optional))]
+    pub(crate) guides: Option<String>,
     /// The outlines of the selection at other frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(test, ts(optional))]

@@ -31,7 +31,7 @@ use crate::project::{Place, Project};
 use crate::protocol::{ClientMessage, FileState, MovieFormat, ServerMessage};
 use crate::snap_to_ground;
 use crate::tables::{Role, commands, role};
-use crate::tracks::{Copied, Tracks};
+use crate::tracks::{self, Copied, Tracks};
 use crate::values::changed;
 use crate::view::Orbit;
 use hold::Held;
@@ -66,6 +66,8 @@ pub(crate) struct Session {
     /// The selection is outlined at other frames.
     onion: bool,
     copied: Vec<Copied>,
+    /// The text of the copied keys.
+    copied_text: String,
     /// The state that was sent to the page last.
     tracks: Option<Tracks>,
     files: Vec<FileState>,
@@ -128,6 +130,7 @@ impl Session {
             path: true,
             onion: false,
             copied: Vec::new(),
+            copied_text: String::new(),
             tracks: None,
             files: Vec::new(),
             shown_file: 0,
@@ -230,7 +233,7 @@ impl Session {
             }
             ClientMessage::Drag { x, y, options } => self.drag(project, DVec2::new(x, y), options, tell),
             ClientMessage::Release => {
-                self.release(project);
+                self.release(project, tell);
                 self.outline(project, tell);
                 Change::Still
             }
@@ -326,6 +329,9 @@ impl Session {
                 Change::Nothing
             }
             ClientMessage::Paste { text } => {
+                if let Some(keys) = tracks::keys_of_text(&text) {
+                    return Some(self.paste_keys(project, &text, keys, tell));
+                }
                 let shown = self.shown(project);
                 let (splices, places) = arrange::paste(self.file_lines(project), &shown.source_map, &text);
                 self.edit(project, splices, None, tell);

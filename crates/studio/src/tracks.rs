@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use rayfold_scene::{Clause, Command, Curve, Field, Key, Kind, Mode};
+use rayfold_scene::{Clause, Command, Curve, Field, Key, Kind, Mode, parse_curve};
 use serde::{Deserialize, Serialize};
 
 use crate::line::{Line, written};
@@ -65,6 +65,8 @@ pub(crate) struct KeyPlace {
 /// A key that was copied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Copied {
+    /// The command of the original line.
+    pub(crate) command: Command,
     /// The position of the original key.
     pub(crate) place: KeyPlace,
     /// The value of the key.
@@ -265,13 +267,53 @@ pub(crate) fn copied(lines: &[Line], keys: &[KeyPlace]) -> Vec<Copied> {
         let line = lines.get(place.line)?;
         let curve = curve(line, &line.words()?, place.number)?;
         let key = curve.keys().iter().find(|key| key.frame == place.frame)?;
-        Some(Copied { place: *place, value: key.value, mode: curve.mode() })
+        Some(Copied { command: line.command()?, place: *place, value: key.value, mode: curve.mode() })
     };
     keys.iter().filter_map(one).collect()
 }
 
+/// Returns copied keys as text: for each number a line such as `Sphere cx (smooth 1:0 9:3)   # number 2 of line 5`.
+pub(crate) fn text_of_keys(lines: &[Line], copied: &[Copied]) -> String {
+    let mut by_track: BTreeMap<(usize, usize), Vec<&Copied>> = BTreeMap::new();
+    for copied in copied {
+        by_track.entry((copied.place.line, copied.place.number)).or_default().push(copied);
+    }
+    let text = |((at, number), keys): ((usize, usize), Vec<&Copied>)| {
+        let name = slots(lines.get(at)?).into_iter().find(|slot| slot.number == number)?.name;
+        let (command, mode) = keys.first().map(|copied| (copied.command, copied.mode))?;
+        let mut keys: Vec<_> =
+            keys.iter().map(|copied| Key { frame: copied.place.frame, value: copied.value }).collect();
+        keys.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+        let curve = Curve::through(mode, false, keys)?;
+        Some(format!("{} {name} {curve}   # number {} of line {}\n", command.name(), number + 1, at + 1))
+    };
+    by_track.into_iter().filter_map(text).collect()
+}
+
+/// Returns the keys of a text that [`text_of_keys`] returned, or `None` for another text.
+pub(crate) fn keys_of_text(text: &str) -> Option<Vec<Copied>> {
+    let mut keys = Vec::new();
+    for line in text.lines().filter(|line| !line.trim().is_empty()) {
+        let (track, place) = line.split_once('#')?;
+        let ["number", number, "of", "line", line] = place.split_whitespace().collect::<Vec<_>>()[..] else {
+            return None;
+        };
+        let from_1 = |word: &str| word.parse::<usize>().ok()?.checked_sub(1);
+        let (number, line) = (from_1(number)?, from_1(line)?);
+        let command = Line::new(track).command()?;
+        let curve = parse_curve(track.get(track.find('(')?..)?.trim())?;
+        let mode = curve.mode();
+        keys.extend(curve.keys().iter().map(|key| {
+            let place = KeyPlace { line, number, frame: key.frame };
+            Copied { command, place, value: key.value, mode }
+        }));
+    }
+    (!keys.is_empty()).then_some(keys)
+}
+
 /// Returns the lines that change if copied keys are pasted, the first of them at a frame. They go to their original
-/// tracks, or to those of another line of the same command, `onto`.
+/// tracks, or to those of another line of the same command, `onto`. A key whose line has another command now is left
+/// out.
 pub(crate) fn pasted(
     lines: &[Line],
     copied: &[Copied],
@@ -279,17 +321,21 @@ pub(crate) fn pasted(
     onto: Option<usize>,
 ) -> Vec<(usize, Line)> {
     let first = copied.iter().map(|copied| copied.place.frame).fold(f64::INFINITY, f64::min);
-    let source = copied.first().map(|copied| copied.place.line);
-    let is_one = copied.iter().all(|copied| Some(copied.place.line) == source);
+    let source = copied.first().map(|copied| (copied.place.line, copied.command));
+    let is_one = copied.iter().all(|copied| source.is_some_and(|(line, _)| copied.place.line == line));
     let command = |at: usize| lines.get(at).and_then(Line::command);
-    let onto = onto.filter(|&onto| is_one && source.is_some_and(|from| command(from) == command(onto)));
+    let onto = onto.filter(|&onto| is_one && source.is_some_and(|(_, of)| Some(of) == command(onto)));
     let mut by_track: BTreeMap<(usize, usize), Vec<Copied>> = BTreeMap::new();
     for copied in copied {
         let line = onto.unwrap_or(copied.place.line);
+        if command(line) != Some(copied.command) {
+            continue;
+        }
         by_track.entry((line, copied.place.number)).or_default().push(*copied);
     }
     let mut changed: BTreeMap<usize, Line> = BTreeMap::new();
-    for ((at, number), keys) in by_track {
+    for ((at, number), mut keys) in by_track {
+        keys.sort_by(|a, b| a.place.frame.total_cmp(&b.place.frame));
         let Some(line) = changed.get(&at).or(lines.get(at)).cloned() else { continue };
         let Some(words) = line.words() else { continue };
         let to =
@@ -433,8 +479,29 @@ mod tests {
             "in a cycle 20 is 4"
         );
         assert_eq!(one(pasted(&lines, &held, 2.0, Some(2))), "Sphere 1  (6:2) 0 (smooth 2:1)  red");
+        let backwards = copied(&lines, &[key(0, 1, 9.0), key(0, 1, 1.0)]);
+        assert_eq!(one(pasted(&lines, &backwards, 2.0, Some(2))), "Sphere 1  (2:0 10:2) 0 0  red");
         let elsewhere = pasted(&lines, &held, 20.0, Some(1));
         assert_eq!(elsewhere[0].0, 0, "another command has other numbers");
+    }
+
+    #[test]
+    fn copied_keys_are_text_and_the_text_is_the_keys() {
+        let lines = lines(TEXT);
+        let held = copied(&lines, &[key(0, 1, 9.0), key(0, 1, 1.0), key(0, 3, 5.0)]);
+        let text = text_of_keys(&lines, &held);
+        assert_eq!(
+            text,
+            "Sphere cx (1:0 9:2)   # number 2 of line 1\nSphere cz (smooth 5:1)   # number 4 of line 1\n"
+        );
+        let read = keys_of_text(&text).unwrap();
+        assert_eq!(pasted(&lines, &read, 2.0, Some(2)), pasted(&lines, &held, 2.0, Some(2)));
+        assert_eq!(pasted(&lines[1..], &read, 2.0, None), [], "that line is no sphere in another script");
+        for other in
+            ["", "Sphere 1 0 0 0 red # ball", "Sphere cx (1:0) # number 0 of line 1", "# number 1 of line 1"]
+        {
+            assert_eq!(keys_of_text(other), None, "{other}");
+        }
     }
 
     #[test]

@@ -3,13 +3,16 @@
 use glam::DVec2;
 
 use super::held_keys::HeldKeys;
+use super::viewport::lines_path;
 use super::{Change, Session};
 use crate::edits;
-use crate::handles::{Drag, DragOptions, HandleKind};
+use crate::handles::{Drag, DragOptions, Dragged, HandleKind};
+use crate::line::Line;
 use crate::project::Project;
 use crate::protocol::{Navigation, ServerMessage};
+use crate::snap_to_boxes::Neighbours;
 use crate::values::Keying;
-use crate::view::Projection;
+use crate::view::{Bounds, Projection};
 
 /// The pixels by which the pointer moves in a click.
 const CLICK: f64 = 4.0;
@@ -70,15 +73,28 @@ impl Session {
         let shown = self.shown(project);
         let lines =
             lines.filter(|&line| !shown.source_map.is_in_group(line) && !self.is_locked(project, line));
-        let lines = lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
+        let lines: Vec<_> =
+            lines.filter_map(|line| Some((line, self.line(project, line)?.clone()))).collect();
+        let neighbours = all.then(|| self.neighbours(project, &lines)).flatten();
         let keying = match (grip, self.keying(project)) {
             (HandleKind::Key { frame }, keying) => Keying { time: frame.into(), auto: true, ..keying },
             (_, keying) => keying,
         };
-        self.held = Drag::new(grip, lines, grabbed, around, keying).map(|drag| Held::Drag(drag, at));
+        self.held =
+            Drag::new(grip, lines, grabbed, around, keying, neighbours).map(|drag| Held::Drag(drag, at));
     }
 
-    pub(super) fn release(&mut self, project: &Project) {
+    /// Returns the boxes of some lines and of what they can be aligned with.
+    fn neighbours(&self, project: &Project, lines: &[(usize, Line)]) -> Option<Neighbours> {
+        let chosen = self.chosen();
+        let own = self.boxes(project, |line| lines.iter().any(|&(own, _)| own == line));
+        let own = own.into_iter().map(|(_, bounds)| bounds).reduce(Bounds::with)?;
+        let others = self.boxes(project, |line| !chosen.contains(&line));
+        Some(Neighbours { own, others: others.into_iter().map(|(_, bounds)| bounds).collect() })
+    }
+
+    pub(super) fn release(&mut self, project: &Project, tell: &mut ServerMessage) {
+        tell.guides = Some(String::new());
         if let Some(Held::Turn(_, Some(clicked))) = self.held.take() {
             self.select(project, clicked);
         }
@@ -106,9 +122,11 @@ impl Session {
                 Change::Moving
             }
             Some(Held::Drag(drag, start)) => {
-                let changed = drag.to(&Projection::new(&scene), *start, at, options);
+                let projection = Projection::new(&scene);
+                let Dragged { lines, guides } = drag.to(&projection, *start, at, options);
+                tell.guides = Some(lines_path(&projection, &guides));
                 let gesture = self.gestures << 1;
-                let splices = changed
+                let splices = lines
                     .into_iter()
                     .filter(|(line, text)| self.line(project, *line).is_some_and(|old| old != text))
                     .map(|(line, text)| edits::set(line, text))

@@ -125,6 +125,29 @@ fn what_is_pressed_without_moving_changes_nothing() {
 }
 
 #[test]
+fn a_drag_with_snap_aligns_with_another_object_and_shows_it() {
+    let text = "Screen 160 90\nLook 0 4 9  0 1 0  40\nIlight 1 1 1  -1 -1 -1\n\
+                Sphere 0.5  -1.37 0.5 0  .1 .1 .1  1 1 1\nSphere 0.25  1.03 0.25 1.5  .1 .1 .1  1 1 1\nTrace\n";
+    let mut desk = Desk::new(text);
+    let at = desk.seen(4);
+    let options = DragOptions { snap: true, ..DragOptions::default() };
+    desk.ask(ClientMessage::Press { x: at.x, y: at.y, extend: false, grip: None, line: None });
+    let free = desk.ask(ClientMessage::Drag { x: at.x + 20.0, y: at.y, options }).tell.guides.unwrap();
+    assert_eq!(free, "", "nothing is near");
+    let scene = desk.session.scene(&desk.project).unwrap();
+    let projection = Projection::new(&scene);
+    let start = projection.point(glam::DVec3::new(1.03, 0.25, 1.5)).unwrap();
+    let end = projection.point(glam::DVec3::new(-1.3, 0.25, 1.5)).unwrap();
+    let to = at + end - start;
+    let guides = desk.ask(ClientMessage::Drag { x: to.x, y: to.y, options }).tell.guides.unwrap();
+    assert!(guides.starts_with('M') && guides.matches('L').count() == 1, "{guides}");
+    assert!(desk.text().contains("Sphere 0.25  -1.37 0.25 1.5 "), "{}", desk.text());
+    assert_eq!(desk.ask(ClientMessage::Release).tell.guides.as_deref(), Some(""));
+    desk.ask(ClientMessage::Undo);
+    assert_eq!(desk.text(), text);
+}
+
+#[test]
 fn a_drag_beside_all_objects_turns_a_free_camera_and_leaves_the_script() {
     let mut desk = Desk::new(TEXT);
     desk.drag(DVec2::new(2.0, 2.0), DVec2::new(60.0, 20.0));

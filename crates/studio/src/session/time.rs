@@ -19,7 +19,7 @@ use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, Timeli
 use crate::silhouette::View;
 use crate::source_map::SourceMap;
 use crate::tables::FieldTable;
-use crate::tracks::{self, Tracks};
+use crate::tracks::{self, Copied, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
 
@@ -103,7 +103,10 @@ impl Session {
             }
             TimelineEdit::Remove { keys } => set(tracks::removed(lines, &keys)),
             TimelineEdit::Copy { keys } => {
-                self.copied = tracks::copied(lines, &keys);
+                let copied = tracks::copied(lines, &keys);
+                self.copied_text = tracks::text_of_keys(lines, &copied);
+                tell.clipboard = Some(self.copied_text.clone());
+                self.copied = copied;
                 return Change::Nothing;
             }
             TimelineEdit::Paste => {
@@ -127,6 +130,30 @@ impl Session {
         self.edit(project, splices, None, tell);
         // There may be fewer frames now.
         self.show(project, self.frame, tell);
+        self.outline(project, tell);
+        Change::Still
+    }
+
+    /// Pastes the keys of a text, the first at the shown frame. The text of the keys that were copied last stands for
+    /// those, whose lines may have moved since.
+    pub(super) fn paste_keys(
+        &mut self,
+        project: &mut Project,
+        text: &str,
+        keys: Vec<Copied>,
+        tell: &mut ServerMessage,
+    ) -> Change {
+        let time = self.time(project);
+        let lines = self.file_lines(project);
+        let keys = if text == self.copied_text { &self.copied } else { &keys };
+        let changed = tracks::pasted(lines, keys, time, self.selection.last().copied());
+        if changed.is_empty() {
+            let name = keys.first().map_or("", |key| key.command.name());
+            tell.notice = Some(format!("No line takes these keys: select a {name} first."));
+            return Change::Nothing;
+        }
+        let splices = changed.into_iter().map(|(at, line)| edits::set(at, line)).collect();
+        self.edit(project, splices, None, tell);
         self.outline(project, tell);
         Change::Still
     }

@@ -345,7 +345,7 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
                 let (from, to) = (step * f64::from(piece), step * f64::from(piece + 1));
                 let ends = if flip { (at(off, from), at(off, to)) } else { (at(from, off), at(to, off)) };
                 if let ((Some(a), Some(b)), true) = (ends, reach.is_finite()) {
-                    path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
+                    path.push_str(&segment_path(a, b));
                 }
             }
         }
@@ -356,10 +356,22 @@ pub(super) fn grid_path(projection: &Projection, bounds: Bounds) -> String {
             at(FAR * reach * cos, FAR * reach * sin).filter(|seen| seen.abs().max_element() < BEYOND)
         };
         if let (Some(a), Some(b)) = (far(turn), far(turn + 1)) {
-            path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
+            path.push_str(&segment_path(a, b));
         }
     }
     path
+}
+
+/// Returns a straight line between two points of the picture as an SVG path.
+fn segment_path(from: DVec2, to: DVec2) -> String {
+    format!("M{:.1} {:.1}L{:.1} {:.1}", from.x, from.y, to.x, to.y)
+}
+
+/// Returns the lines between pairs of points in the world, as an SVG path.
+pub(super) fn lines_path(projection: &Projection, guides: &[[DVec3; 2]]) -> String {
+    let segment =
+        |[from, to]: &[DVec3; 2]| Some(segment_path(projection.point(*from)?, projection.point(*to)?));
+    guides.iter().filter_map(segment).collect()
 }
 
 /// Returns the edges of what a scene's camera sees, from its eye.
@@ -373,11 +385,7 @@ pub(super) fn frustum_path(projection: &Projection, scene: &Scene, bounds: Bound
         (eye, eye + way * (reach / way.dot(-back)))
     });
     let mut path = String::new();
-    let mut line = |from: DVec3, to: DVec3| {
-        if let (Some(a), Some(b)) = (projection.point(from), projection.point(to)) {
-            path.push_str(&format!("M{:.1} {:.1}L{:.1} {:.1}", a.x, a.y, b.x, b.y));
-        }
-    };
+    let mut line = |from: DVec3, to: DVec3| path.push_str(&lines_path(projection, &[[from, to]]));
     for (at, (eye, corner)) in corners.into_iter().enumerate() {
         line(eye, corner);
         line(corner, corners[(at + 1) % corners.len()].1);

@@ -86,7 +86,8 @@ export const actions = {
   },
   animate: { title: "Make an animation of 50 frames", keys: ["Shift+F"], icon: Film, run: animate, enabled: () => (state.value?.frames ?? 1) < 2 },
   copyKeys: { title: "Copy the selected keys", keys: ["Ctrl+c"], icon: Copy, run: copyKeys, enabled: hasKeys },
-  pasteKeys: { title: "Paste keys at this frame", keys: ["Ctrl+v"], icon: ClipboardPaste, run: pasteKeys, enabled: () => (state.value?.time.copied ?? 0) > 0 },
+  // Ctrl+V is an event of the clipboard, whose text says if it is keys.
+  pasteKeys: { title: "Paste keys at this frame", keys: [], icon: ClipboardPaste, run: pasteKeys, enabled: () => (state.value?.time.copied ?? 0) > 0 },
   path: {
     title: "Show the motion path of the selection",
     keys: ["p"], icon: Spline,

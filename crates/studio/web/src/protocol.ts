@@ -7,7 +7,7 @@
 export type ClientMessage = { "ask": "size", width: number, height: number, } | { "ask": "shown" } | { "ask": "frame", frame: number, moving: boolean, } | { "ask": "select", lines: ReadonlyArray<number>, } | { "ask": "hover", x: number, y: number, } | { "ask": "press", x: number, y: number, extend: boolean, grip: HandleKind | null, line: number | null, } | { "ask": "drag", x: number, y: number, 
 /** Move up and down instead of along the ground. */
 upright: boolean, 
-/** Move in steps of a grid. */
+/** Align with other objects, else move in steps of a grid. */
 snap: boolean, 
 /** Move curves as a whole, in all frames. */
 whole: boolean, } | { "ask": "release" } | { "ask": "navigate", how: Navigation, x: number, y: number, } | { "ask": "look", at: ViewPreset, } | { "ask": "keep-camera" } | { "ask": "set", line: number, first: number, values: ReadonlyArray<number>, gesture: number | null, } | { "ask": "edit", file: number, version: number, changes: ReadonlyArray<TextChange>, } | { "ask": "remove", lines: ReadonlyArray<number>, } | { "ask": "duplicate", lines: ReadonlyArray<number>, } | { "ask": "reorder", line: number, down: boolean, } | { "ask": "rename", line: number, name: string, } | { "ask": "hide", lines: ReadonlyArray<number>, } | { "ask": "drop", lines: ReadonlyArray<number>, } | { "ask": "ground", lines: ReadonlyArray<number>, } | { "ask": "lock", lines: ReadonlyArray<number>, } | { "ask": "paste", text: string, } | { "ask": "align", lines: ReadonlyArray<number>, axis: number, how: Alignment, } | { "ask": "box", from: readonly [number, number], to: readonly [number, number], extend: boolean, } | { "ask": "group", lines: ReadonlyArray<number>, } | { "ask": "ungroup", line: number, } | { "ask": "surface", lines: ReadonlyArray<number>, material: string, } | { "ask": "preset", lines: ReadonlyArray<number>, preset: string, } | { "ask": "paint", at: readonly [number, number], material: string, preset: boolean, } | { "ask": "clause", line: number, clause: string, } | { "ask": "word", line: number, number: number, word: string, } | { "ask": "camera", command: string, } | { "ask": "time", wish: TimelineEdit, } | { "ask": "nudge", lines: ReadonlyArray<number>, by: readonly [number, number, number], } | { "ask": "add", command: string, at: readonly [number, number] | null, } | { "ask": "undo" } | { "ask": "redo" } | { "ask": "resolve", "keep-mine": boolean, } | { "ask": "load", from: Source, new: string | null, } | { "ask": "render", format: MovieFormat, } | { "ask": "cancel" };
@@ -31,7 +31,7 @@ export type ViewPreset = "script" | "free" | "front" | "side" | "top" | "selecti
 export type DragOptions = { 
 /** Move up and down instead of along the ground. */
 upright: boolean, 
-/** Move in steps of a grid. */
+/** Align with other objects, else move in steps of a grid. */
 snap: boolean, 
 /** Move curves as a whole, in all frames. */
 whole: boolean, };
@@ -84,6 +84,10 @@ hovered?: number | null,
 outline?: string, 
 /** The outline of the object under the pointer. */
 hoverOutline?: string, 
+/** A text for the clipboard. */
+clipboard?: string, 
+/** The lines to the objects that a drag is aligned with, as an SVG path. */
+guides?: string, 
 /** The outlines of the selection at other frames. */
 ghosts?: ReadonlyArray<Ghost>, 
 /** The numbers that change. */

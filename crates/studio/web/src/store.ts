@@ -21,6 +21,7 @@ export const lines = signal<readonly LineState[]>([]);
 export const state = signal<State | null>(null);
 export const hovered = signal<number | null>(null);
 export const outline = signal("");
+export const guides = signal("");
 export const hoverOutline = signal("");
 export const ghosts = signal<readonly Ghost[]>([]);
 export const tracks = signal<Tracks>({ tracks: [], more: false });
@@ -146,10 +147,13 @@ function hear(tell: ServerMessage): void {
       }
     }
     if (tell.outline !== undefined) outline.value = tell.outline;
+    if (tell.guides !== undefined) guides.value = tell.guides;
     if (tell.hoverOutline !== undefined) hoverOutline.value = tell.hoverOutline;
     if (tell.ghosts) ghosts.value = tell.ghosts;
     if (tell.tracks) tracks.value = tell.tracks;
     if (tell.output) output.value = tell.output;
+    // Without a clipboard, *Paste* of the timeline still has the keys.
+    if (tell.clipboard) void navigator.clipboard.writeText(tell.clipboard).catch(() => undefined);
     if (tell.notice) notice.value = tell.notice;
   });
 }

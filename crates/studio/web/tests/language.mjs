@@ -77,7 +77,7 @@ test("every parameter of every command is reached on the page", async (t) => {
     if (within === inspector) await inspector.locator(".subject .note", { hasText: name }).waitFor();
     const before = words(await line(name)).slice(subject ? 2 : 1);
     const numbers = parameters.filter(({ words }) => !words).flatMap(({ names }) => names).length;
-    if (numbers > 0) await within.getByRole("spinbutton").first().waitFor();
+    if (numbers > 0) await within.getByRole("spinbutton").or(within.locator("[aria-expanded=false]")).first().waitFor();
     await changeAll(studio, within);
     // Angles of a sun are the direction in other words.
     const shown = () => within.getByRole("spinbutton").evaluateAll((all) => all.filter(({ ariaLabel }) => !/^sun (azimuth|height)$/.test(ariaLabel)).length);

@@ -100,7 +100,8 @@ test("five objects from an empty page, two of them animated, without a number; t
 
 test("keys are dragged, by touch too, copied, eased, repeated and deleted, and all else in the script stays", async (t) => {
   const studio = await open(t, { text: TEXT });
-  const { page } = studio;
+  const { page, context } = studio;
+  await context.grantPermissions(["clipboard-read", "clipboard-write"]);
   await page.locator(".item", { hasText: "red" }).click();
   await page.locator(".way").waitFor({ state: "attached" });
   const lane = await page.locator(".track .lane").nth(1).boundingBox();
@@ -119,6 +120,25 @@ test("keys are dragged, by touch too, copied, eased, repeated and deleted, and a
   await scrub(page, 35);
   await page.getByRole("button", { name: "Copy keys" }).click();
   await page.getByRole("button", { name: "Paste 1" }).click();
+  await red("(1:-2.5 20:2 35:2 50:-2.5)");
+  // The clipboard has them as text, which is pasted in another window as well.
+  await page.keyboard.press("Control+z");
+  await red("(1:-2.5 20:2 50:-2.5)");
+  const copied = await page.evaluate(() => navigator.clipboard.readText());
+  assert.match(copied, /^Sphere cx \(20:2\) {3}# number 2 of line \d+\n$/);
+  const other = await open(t, { text: TEXT.replace(/^Sphere/m, "# one line more\nSphere") });
+  await scrub(other.page, 35);
+  await other.page.locator(".item", { hasText: "red" }).click();
+  await other.page.locator(".viewport").focus();
+  await other.page.evaluate((text) => {
+    const data = new DataTransfer();
+    data.setData("text/plain", text);
+    document.activeElement.dispatchEvent(new ClipboardEvent("paste", { clipboardData: data, bubbles: true }));
+  }, copied);
+  await until(async () => (await other.saved()).includes("(1:-2.5 26:2 35:2 50:-2.5)"));
+  other.check();
+  await page.locator(".viewport").focus();
+  await page.keyboard.press("Control+v");
   await red("(1:-2.5 20:2 35:2 50:-2.5)");
   await page.getByRole("combobox", { name: "Easing" }).selectOption("smooth");
   await red("(smooth 1:-2.5 20:2 35:2 50:-2.5)");

@@ -10,7 +10,7 @@ import { actions } from "../actions";
 import { visible } from "../parts/visible";
 import type { Handle } from "../protocol";
 import { PICTURE_HEADER } from "../protocol";
-import { ask, ghosts, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
+import { ask, ghosts, guides, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
 
 type Point = readonly [number, number];
 
@@ -223,6 +223,7 @@ export function Viewport(): JSX.Element {
           ))}
           {under && !held.current && <path class="outline under-pointer" d={hoverOutline.value} />}
           <path class="outline" d={outline.value} />
+          <path class="guides" d={guides.value} />
           {now?.frustum && (
             <path
               class={now.camera !== null && selected.value.has(now.camera) ? "frustum chosen" : "frustum"}
