@@ -22,7 +22,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),
     ("rayfold-simulation", &["rayfold-scene", "rayfold-pipeline"]),
-    ("rayfold-client", &["rayfold-scene", "rayfold-pipeline"]),
+    ("rayfold-client", &["rayfold-scene", "rayfold-files", "rayfold-pipeline"]),
     ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     (
@@ -50,7 +50,17 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-studio",
         ],
     ),
-    ("rayfold-python", &["rayfold-scene", "rayfold-files", "rayfold-tracer", "rayfold-movie"]),
+    (
+        "rayfold-python",
+        &[
+            "rayfold-scene",
+            "rayfold-files",
+            "rayfold-tracer",
+            "rayfold-movie",
+            "rayfold-pipeline",
+            "rayfold-client",
+        ],
+    ),
     ("rayfold-xtask", &["rayfold-scene"]),
     (
         "rayfold-bench",

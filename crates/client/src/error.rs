@@ -56,6 +56,9 @@ pub enum Error {
     /// The caller failed to process the bytes.
     #[error(transparent)]
     Output(io::Error),
+    /// The file of a download cannot be written.
+    #[error(transparent)]
+    Write(rayfold_files::Error),
     /// The animation's settings cannot hold this number of frames.
     #[error("animation.json cannot be written")]
     Settings(#[source] rayfold_pipeline::Cause),

@@ -1,6 +1,6 @@
 //! A client for animations in a bucket: uploads scripts, reports progress, downloads frames and GIFs.
 //!
-//! The command line and the web page are both built on this crate. Like the functions, the client reads all state
+//! The command line, the web page and the Python package are built on this crate. Like the functions, the client reads all state
 //! from the bucket and keeps none, so an interrupted operation resumes from the bucket's contents. It knows no
 //! terminal, no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store) and time a
 //! [`Clock`](rayfold_pipeline::Clock). It reports progress as values ([`Sending`], [`Waiting`], [`RemoveProgress`])
@@ -21,7 +21,9 @@
 
 mod client;
 pub mod cost;
+mod download;
 mod error;
+mod explain;
 mod fetch;
 mod file;
 mod remove;
@@ -35,6 +37,7 @@ mod world;
 
 pub use client::Client;
 pub use error::{Error, Result};
+pub use explain::address;
 pub use fetch::{FetchedFrame, FrameKey, Frames, Output, frames};
 pub use file::{Content, File};
 pub use remove::{Contents, RemoveProgress};

@@ -7,6 +7,7 @@ use rayfold_scene::{Curve as SceneCurve, Key, Mode};
 
 use crate::describe::modes;
 use crate::place::{Place, color_of, shown};
+use crate::value::items_of;
 
 /// A number that changes from frame to frame, made by `keys`.
 #[pyclass(frozen, module = "rayfold")]
@@ -17,8 +18,14 @@ pub(crate) struct Curve {
 #[pymethods]
 impl Curve {
     /// Returns the value at a frame, which may be fractional.
-    fn at(&self, frame: f64) -> f64 {
-        self.curve.at(frame)
+    fn at(&self, frame: &Bound<'_, PyAny>) -> PyResult<f64> {
+        let number = frame.extract::<f64>();
+        let number = number
+            .map_err(|_| PyTypeError::new_err(format!("at(): frame is a number, not {}", shown(frame))))?;
+        if number.is_finite() {
+            return Ok(self.curve.at(number));
+        }
+        Err(PyValueError::new_err(format!("at(): frame must be finite, not {number}")))
     }
 
     fn __str__(&self) -> String {
@@ -57,7 +64,7 @@ pub(crate) fn keys<'py>(
                     shown(&value)
                 ))
             };
-            let items = value.try_iter().map_err(|_| wrong())?;
+            let items = items_of(&value).ok_or_else(wrong)?;
             items.map(|item| item?.extract::<f64>().map_err(|_| wrong())).collect::<PyResult<_>>()?
         };
         rows.push((frame.extract::<f64>().map_err(|_| wrong())?, values));

@@ -4,14 +4,14 @@ use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rayfold_files::OutputFile;
 use rayfold_movie::{Container, Encoding, Finished, Movie, Plays};
 
 use crate::drawing::{Image, Pixels};
-use crate::error::guarded;
+use crate::error::{guarded, os_error};
 
 /// Bytes that are collected before they are written.
 const BUFFER: usize = 1 << 20;
@@ -157,12 +157,6 @@ fn movie_error(error: rayfold_movie::Error) -> PyErr {
         rayfold_movie::Error::Write(source) => io_error(source),
         other => PyValueError::new_err(other.to_string()),
     }
-}
-
-fn os_error(error: rayfold_files::Error) -> PyErr {
-    use std::error::Error;
-    let source = error.source().map(|source| format!(": {source}")).unwrap_or_default();
-    PyOSError::new_err(format!("{error}{source}"))
 }
 
 /// An error of the format is one of the value; all others are the system's.

@@ -1,8 +1,9 @@
 //! Errors: diagnostics as `SceneError`, and bugs as an ordinary exception.
 
+use std::error::Error as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use rayfold_scene::{Code, Diagnostic as SceneDiagnostic, Severity};
 
@@ -103,6 +104,12 @@ pub(crate) fn scene_error(py: Python<'_>, diagnostics: Vec<SceneDiagnostic>) -> 
         Ok(diagnostics) => SceneError::new_err((diagnostics,)),
         Err(error) => error,
     }
+}
+
+/// Makes the exception of a file that cannot be written.
+pub(crate) fn os_error(error: rayfold_files::Error) -> PyErr {
+    let source = error.source().map(|source| format!(": {source}")).unwrap_or_default();
+    PyOSError::new_err(format!("{error}{source}"))
 }
 
 /// Does `work`, and makes an exception of a panic, which is a bug of this package.

@@ -11,6 +11,7 @@
 //! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. No panic leaves the module as one. The
 //! library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
 
+mod bucket;
 mod curve;
 mod describe;
 mod drawing;
@@ -82,6 +83,7 @@ fn _rayfold(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(clauses, module)?)?;
     module.add_function(wrap_pyfunction!(settings, module)?)?;
     module.add_function(wrap_pyfunction!(stub, module)?)?;
+    module.add_function(wrap_pyfunction!(bucket::submit, module)?)?;
     module.add_function(wrap_pyfunction!(curve::keys, module)?)?;
     module.add_function(wrap_pyfunction!(encoder::write_file, module)?)?;
     module.add_function(wrap_pyfunction!(folder::read_folder, module)?)?;

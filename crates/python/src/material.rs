@@ -6,9 +6,9 @@ use std::sync::Arc;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use rayfold_scene::is_name;
+use rayfold_scene::{Clause, is_name};
 
-use crate::place::{Place, shown};
+use crate::place::{Place, color_text, quoted, shown};
 use crate::signature::{CLAUSES, Keyword};
 use crate::value::{Numbers, check_alone, refused};
 
@@ -20,33 +20,46 @@ pub(crate) struct Material(pub(crate) Arc<Surface>);
 #[derive(Debug)]
 pub(crate) struct Surface {
     name: Option<String>,
-    clauses: Vec<ClauseText>,
+    clauses: Clauses,
 }
 
-#[derive(Debug)]
-struct ClauseText {
-    /// The clause as in a script, without another material's name.
+/// The clauses of a material, as in a script.
+#[derive(Debug, Default)]
+struct Clauses {
+    /// All words, without the name of another material.
     text: String,
-    other: Option<Other>,
+    /// The other material of a pattern, and the place of its name in the text.
+    other: Option<(usize, Other)>,
+    /// Whether the material may be the other one of a pattern.
+    is_plain: bool,
 }
 
 /// The other material of a pattern.
 #[derive(Debug)]
 enum Other {
-    Named(String),
+    /// The name, and the keyword that gives it.
+    Named(String, &'static str),
     Surface(Arc<Surface>),
 }
+
+/// A keyword of a call, by its index in [`CLAUSES`], and its value.
+pub(crate) type Given<'py> = (usize, Bound<'py, PyAny>);
 
 #[pymethods]
 impl Material {
     #[new]
     #[pyo3(signature = (*, name = None, **clauses))]
-    fn new(name: Option<String>, clauses: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        if let Some(name) = &name {
-            check_name("Material", name)?;
+    fn new(name: Option<&Bound<'_, PyAny>>, clauses: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let place = Place { method: "Material", parameter: "name" };
+        let name = name.map(|name| name_from(name, place)).transpose()?;
+        let mut given = Vec::with_capacity(clauses.map_or(0, |clauses| clauses.len()));
+        for (keyword, value) in clauses.into_iter().flatten() {
+            let index = clause_of("Material", keyword.cast::<PyString>()?)?;
+            if !value.is_none() {
+                given.push((index, value));
+            }
         }
-        let clauses = clauses.map_or(Ok(Vec::new()), |clauses| read_clauses("Material", clauses))?;
-        Ok(Self(Arc::new(Surface { name, clauses })))
+        surface_of("Material", name, given).map(Self)
     }
 
     /// The name in scripts, if the material has one of its own.
@@ -56,232 +69,314 @@ impl Material {
     }
 
     fn __repr__(&self) -> String {
-        let clauses: Vec<&str> = self.0.clauses.iter().map(|clause| clause.text.as_str()).collect();
-        format!("<rayfold.Material {}{}>", self.0.name.as_deref().unwrap_or_default(), clauses.concat())
+        let words: Vec<&str> =
+            self.name().into_iter().chain(self.0.clauses.text.split_whitespace()).collect();
+        format!("<rayfold.Material {}>", words.join(" "))
     }
 }
 
 /// The materials that a script defines.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Materials {
-    /// The names of all, and the clauses of each, if they are known.
-    defined: HashMap<String, Option<String>>,
+    defined: HashMap<Arc<str>, Defined>,
     /// The names of those without one of their own, by their clauses.
-    unnamed: HashMap<String, String>,
+    unnamed: HashMap<Arc<str>, Arc<str>>,
     /// The last one that was used, and its name.
-    last: Option<(Arc<Surface>, String)>,
+    last: Option<(Arc<Surface>, Arc<str>)>,
     count: usize,
+}
+
+/// A material that a script defines.
+#[derive(Clone, Debug)]
+struct Defined {
+    /// The clauses, if they are known.
+    text: Option<Arc<str>>,
+    /// Whether it may be the other material of a pattern, as far as is known.
+    is_plain: bool,
 }
 
 impl Materials {
     /// Notes the name of a material whose clauses are not known.
     pub(crate) fn note(&mut self, name: &str) {
-        self.defined.insert(name.to_owned(), None);
+        self.defined.insert(name.into(), Defined { text: None, is_plain: true });
     }
 
     pub(crate) fn has(&self, name: &str) -> bool {
         self.defined.contains_key(name)
     }
 
-    /// Returns the name of a material. Adds the lines that define it, and the materials of its patterns, to `lines`, if
-    /// they are not there yet.
+    /// Adds the name of a material to `line`. Adds the lines that define it, and the material of its pattern, to
+    /// `definitions`, if they are not there yet.
     ///
     /// # Errors
-    /// Fails if its name is that of another material.
-    pub(crate) fn define(&mut self, surface: &Arc<Surface>, lines: &mut String) -> PyResult<String> {
+    /// Fails if its name is that of another material, or its pattern names one that is not there or not fit.
+    pub(crate) fn define(
+        &mut self,
+        method: &str,
+        surface: &Arc<Surface>,
+        line: &mut String,
+        definitions: &mut String,
+    ) -> PyResult<()> {
         if let Some((last, name)) = &self.last
             && Arc::ptr_eq(last, surface)
         {
-            return Ok(name.clone());
+            *line += name;
+            return Ok(());
         }
-        let mut text = String::new();
-        for clause in &surface.clauses {
-            text += &clause.text;
-            if let Some(other) = &clause.other {
-                let name = match other {
-                    Other::Named(name) => self.known("Material", name)?.to_owned(),
-                    Other::Surface(other) => self.define(other, lines)?,
-                };
-                text.push(' ');
-                text += &name;
+        let Clauses { text, other, is_plain } = &surface.clauses;
+        let whole;
+        let text = match other {
+            None if text.is_empty() => " diffuse 0 0 0",
+            None => text.as_str(),
+            Some((place, other)) => {
+                let (before, after) = text.split_at(*place);
+                let mut written = format!("{before} ");
+                self.define_other(method, other, &mut written, definitions)?;
+                written += after;
+                whole = written;
+                whole.as_str()
             }
-        }
-        if text.is_empty() {
-            text += " diffuse 0 0 0";
-        }
+        };
         let name = match &surface.name {
-            Some(name) => match self.defined.get(name) {
-                Some(Some(clauses)) if *clauses == text => name.clone(),
-                Some(_) => {
-                    return Err(PyValueError::new_err(format!(
-                        "the scene has another material with the name {name:?}"
-                    )));
+            Some(name) => {
+                let name: Arc<str> = name.as_str().into();
+                match self.defined.get(&name) {
+                    Some(Defined { text: Some(clauses), .. }) if **clauses == *text => {}
+                    Some(_) => {
+                        return Err(PyValueError::new_err(format!(
+                            "{method}(): material: the scene has another material with the name {name:?}"
+                        )));
+                    }
+                    None => self.add(name.clone(), text.into(), *is_plain, definitions),
                 }
-                None => self.add(name.clone(), text, lines),
-            },
-            None => match self.unnamed.get(&text) {
+                name
+            }
+            None => match self.unnamed.get(text) {
                 Some(name) => name.clone(),
                 None => {
                     let name = self.free_name();
+                    let text: Arc<str> = text.into();
                     self.unnamed.insert(text.clone(), name.clone());
-                    self.add(name, text, lines)
+                    self.add(name.clone(), text, *is_plain, definitions);
+                    name
                 }
             },
         };
-        self.last = Some((surface.clone(), name.clone()));
-        Ok(name)
+        *line += &name;
+        self.last = Some((surface.clone(), name));
+        Ok(())
+    }
+
+    fn define_other(
+        &mut self,
+        method: &str,
+        other: &Other,
+        line: &mut String,
+        definitions: &mut String,
+    ) -> PyResult<()> {
+        match other {
+            Other::Surface(surface) => self.define(method, surface, line, definitions),
+            Other::Named(name, parameter) => {
+                let place = Place { method, parameter };
+                let name = self.known(place, name)?;
+                if !self.defined.get(name).is_none_or(|defined| defined.is_plain) {
+                    return Err(unfit(place, name));
+                }
+                *line += name;
+                Ok(())
+            }
+        }
     }
 
     /// Returns the name of a material that is defined.
     ///
     /// # Errors
     /// Fails if there is none.
-    pub(crate) fn known<'n>(&self, method: &str, name: &'n str) -> PyResult<&'n str> {
+    pub(crate) fn known<'n>(&self, place: Place<'_>, name: &'n str) -> PyResult<&'n str> {
         if self.has(name) {
             return Ok(name);
         }
         Err(PyValueError::new_err(format!(
-            "{method}(): no material has the name {name:?} yet: define it by material({name:?}, diffuse=...) before"
+            "{place}: no material has the name {} yet: define it by material(\"...\", diffuse=...) before",
+            quoted(name)
         )))
     }
 
-    fn add(&mut self, name: String, text: String, lines: &mut String) -> String {
-        *lines += "Material ";
-        *lines += &name;
-        *lines += &text;
-        lines.push('\n');
-        self.defined.insert(name.clone(), Some(text));
-        name
+    fn add(&mut self, name: Arc<str>, text: Arc<str>, is_plain: bool, definitions: &mut String) {
+        *definitions += "Material ";
+        *definitions += &name;
+        *definitions += &text;
+        definitions.push('\n');
+        self.defined.insert(name, Defined { text: Some(text), is_plain });
     }
 
-    fn free_name(&mut self) -> String {
+    fn free_name(&mut self) -> Arc<str> {
         loop {
             self.count += 1;
             let name = format!("m{}", self.count);
             if !self.has(&name) {
-                return name;
+                return name.into();
             }
         }
     }
 }
 
-/// Makes a surface without a name from the clauses of a call.
+/// Makes a surface of the clauses of a call.
 ///
 /// # Errors
-/// Fails for an unknown clause, and for a value that it does not take.
+/// Fails for a value that its clause does not take.
 pub(crate) fn surface_of(
     method: &str,
     name: Option<String>,
-    clauses: &Bound<'_, PyDict>,
+    given: Vec<Given<'_>>,
 ) -> PyResult<Arc<Surface>> {
-    Ok(Arc::new(Surface { name, clauses: read_clauses(method, clauses)? }))
+    Ok(Arc::new(Surface { name, clauses: read_clauses(method, given)? }))
 }
 
-/// Makes a surface of one diffuse colour.
+/// Makes a surface of one diffuse colour, that of a `parameter`.
 ///
 /// # Errors
 /// Fails if `color` is none.
-pub(crate) fn surface_of_color(method: &str, color: &Bound<'_, PyString>) -> PyResult<Arc<Surface>> {
-    let clauses = PyDict::new(color.py());
-    clauses.set_item("diffuse", color)?;
-    surface_of(method, None, &clauses)
+pub(crate) fn surface_of_color(color: &Bound<'_, PyString>, place: Place<'_>) -> PyResult<Arc<Surface>> {
+    let color = color_text(color, place)?;
+    let clauses = Clauses { text: format!(" diffuse {color}"), other: None, is_plain: true };
+    Ok(Arc::new(Surface { name: None, clauses }))
 }
 
-/// Checks the name of a material or a group.
+/// Returns the index of the clause that a keyword gives.
+///
+/// # Errors
+/// Fails if there is no such clause.
+pub(crate) fn clause_of(method: &str, keyword: &Bound<'_, PyString>) -> PyResult<usize> {
+    let keyword = keyword.to_string_lossy();
+    CLAUSES.iter().position(|clause| clause.name == keyword).ok_or_else(|| {
+        let names: Vec<&str> = CLAUSES.iter().map(|clause| clause.name.as_str()).collect();
+        PyTypeError::new_err(format!(
+            "{method}() has no parameter {keyword:?}; the clauses of a material are {}",
+            names.join(", ")
+        ))
+    })
+}
+
+/// Returns the name of a material or a group.
 ///
 /// # Errors
 /// Fails for a name that no script can hold.
-pub(crate) fn check_name(method: &str, name: &str) -> PyResult<()> {
-    if is_name(name) {
-        return Ok(());
+pub(crate) fn name_from(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
+    let name = value
+        .cast::<PyString>()
+        .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
+    let name = name.to_string_lossy();
+    if is_name(&name) {
+        return Ok(name.into_owned());
     }
     Err(PyValueError::new_err(format!(
-        "{method}(): a name is made of letters, digits, _ and -, and begins with a letter or _, not {name:?}"
+        "{place}: a name is made of letters, digits, _ and -, and begins with a letter or _, not {}",
+        shown(value)
     )))
 }
 
-fn read_clauses(method: &str, clauses: &Bound<'_, PyDict>) -> PyResult<Vec<ClauseText>> {
-    let mut read: Vec<(usize, ClauseText)> = Vec::with_capacity(clauses.len());
-    for (name, value) in clauses.iter() {
-        let name = name.cast_into::<PyString>()?;
-        let name = name.to_str()?;
-        let Some(index) = CLAUSES.iter().position(|keyword| keyword.name == name) else {
-            let names: Vec<&str> = CLAUSES.iter().map(|keyword| keyword.name.as_str()).collect();
+fn read_clauses(method: &str, mut given: Vec<Given<'_>>) -> PyResult<Clauses> {
+    given.sort_unstable_by_key(|(index, _)| *index);
+    let mut clauses = Clauses { text: String::with_capacity(64), other: None, is_plain: true };
+    let mut pattern: Option<&Keyword> = None;
+    for (index, value) in &given {
+        let keyword = &CLAUSES[*index];
+        let is_pattern = keyword.clause.form().ends_with.is_some();
+        if let (Some(first), true) = (pattern, is_pattern) {
             return Err(PyTypeError::new_err(format!(
-                "{method}() has no parameter {name:?}; the clauses of a material are {}",
-                names.join(", ")
+                "{method}(): a material has one pattern, not {} and {}",
+                first.name, keyword.name
             )));
-        };
-        if !value.is_none() {
-            read.push((index, read_clause(method, &CLAUSES[index], &value)?));
+        }
+        if is_pattern {
+            pattern = Some(keyword);
+        }
+        clauses.is_plain &= matches!(keyword.clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror);
+        if let Some(other) = read_clause(method, keyword, value, &mut clauses.text)? {
+            clauses.other = Some((clauses.text.len(), other));
         }
     }
-    read.sort_unstable_by_key(|(index, _)| *index);
-    let patterns = read.iter().map(|(index, _)| &CLAUSES[*index]);
-    let patterns: Vec<&str> = patterns
-        .filter(|keyword| keyword.clause.form().ends_with.is_some())
-        .map(|keyword| keyword.name.as_str())
-        .collect();
-    if let [first, second, ..] = patterns[..] {
-        return Err(PyTypeError::new_err(format!(
-            "{method}(): a material has one pattern, not {first} and {second}"
-        )));
-    }
-    Ok(read.into_iter().map(|(_, clause)| clause).collect())
+    Ok(clauses)
 }
 
-fn read_clause(method: &str, keyword: &Keyword, value: &Bound<'_, PyAny>) -> PyResult<ClauseText> {
+/// Adds a clause to `text`. Returns the other material of a pattern.
+fn read_clause(
+    method: &str,
+    keyword: &'static Keyword,
+    value: &Bound<'_, PyAny>,
+    text: &mut String,
+) -> PyResult<Option<Other>> {
     let form = keyword.clause.form();
     let place = Place { method, parameter: &keyword.name };
-    let mut text = format!(" {}", form.name);
+    text.push(' ');
+    *text += form.name;
     let mut numbers = Numbers::new();
     let mut other = None;
-    let wrong = || {
-        let entries = keyword.entries.join(", ");
-        PyTypeError::new_err(format!("{place} takes a tuple ({entries}), not {}", shown(value)))
+    let mut entry = |i: usize, value: &Bound<'_, PyAny>| match form.fields.get(i) {
+        Some(field) => numbers.field(text, value, form, field, place),
+        None => read_other(value, place, &keyword.name).map(|found| other = Some(found)),
     };
-    let values: Vec<Bound<'_, PyAny>> = match keyword.entries.len() {
-        0 if value.is_truthy()? => Vec::new(),
-        0 => return Err(PyTypeError::new_err(format!("{place} is True or left out, not {}", shown(value)))),
-        1 => vec![value.clone()],
+    match keyword.entries.len() {
+        0 if is_true(value, place)? => {}
+        0 => return Ok(None),
+        1 => entry(0, value)?,
         count => {
-            let tuple = value.cast::<PyTuple>().map_err(|_| wrong())?;
-            let values: Vec<_> = tuple.iter().collect();
-            if values.len() != count {
-                return Err(wrong());
+            let tuple = value.cast::<PyTuple>().ok().filter(|tuple| tuple.len() == count);
+            let tuple = tuple.ok_or_else(|| {
+                let entries = keyword.entries.join(", ");
+                PyTypeError::new_err(format!("{place} takes a tuple ({entries}), not {}", shown(value)))
+            })?;
+            for (i, value) in tuple.iter_borrowed().enumerate() {
+                entry(i, &value)?;
             }
-            values
-        }
-    };
-    let names: Vec<&str> = keyword.entries.iter().map(String::as_str).collect();
-    for (i, value) in values.iter().enumerate() {
-        match form.fields.get(i) {
-            Some(field) => numbers.field(&mut text, value, form, field, place)?,
-            None => other = Some(read_other(value, place)?),
         }
     }
-    let whole = format!("{method}({}=...)", keyword.name);
+    let names = || keyword.entries.iter().map(String::as_str).collect::<Vec<_>>();
+    let whole = || format!("{method}({}=...)", keyword.name);
     if numbers.moves {
-        check_alone(&whole, form, &names, numbers.values())?;
+        check_alone(&whole(), form, &names(), numbers.values())?;
     } else if let Some(fault) = keyword.clause.check(numbers.values()).into_iter().next() {
-        return Err(refused(&whole, form, &names, numbers.values(), fault));
+        return Err(refused(&whole(), form, &names(), numbers.values(), fault));
     }
-    Ok(ClauseText { text, other })
+    Ok(other)
 }
 
-fn read_other(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<Other> {
+/// Takes the value of a clause without numbers.
+///
+/// # Errors
+/// Fails for anything but True: leaving it out is how it is switched off.
+fn is_true(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<bool> {
+    if value.extract::<bool>().is_ok_and(|value| value) {
+        return Ok(true);
+    }
+    Err(PyTypeError::new_err(format!("{place} is True or left out, not {}", shown(value))))
+}
+
+fn read_other(value: &Bound<'_, PyAny>, place: Place<'_>, keyword: &'static str) -> PyResult<Other> {
     if let Ok(material) = value.cast::<Material>() {
-        return Ok(Other::Surface(material.get().0.clone()));
+        let surface = &material.get().0;
+        if !surface.clauses.is_plain {
+            return Err(unfit(place, surface.name.as_deref().unwrap_or("the other material")));
+        }
+        return Ok(Other::Surface(surface.clone()));
     }
     match value.cast::<PyString>() {
         Ok(name) if name.to_string_lossy().starts_with('#') => {
-            Ok(Other::Surface(surface_of_color(place.method, name)?))
+            Ok(Other::Surface(surface_of_color(name, place)?))
         }
-        Ok(name) => Ok(Other::Named(name.to_string_lossy().into_owned())),
+        Ok(name) => Ok(Other::Named(name.to_string_lossy().into_owned(), keyword)),
         Err(_) => {
             let message =
                 format!("{place}: the other material is a Material or a name, not {}", shown(value));
             Err(PyTypeError::new_err(message))
         }
     }
+}
+
+/// Returns the error of a material that no pattern can hold.
+fn unfit(place: Place<'_>, name: &str) -> PyErr {
+    PyValueError::new_err(format!(
+        "{place}: {name} cannot be part of a pattern: expected a material of ambient, diffuse and mirror only"
+    ))
 }

@@ -16,8 +16,10 @@ use rayfold_scene::{
 };
 
 use crate::error::{Diagnostic, guarded, scene_error};
-use crate::material::{Material, Materials, check_name, surface_of, surface_of_color};
-use crate::place::{Place, shown};
+use crate::material::{
+    Given as Clause, Material, Materials, clause_of, name_from, surface_of, surface_of_color,
+};
+use crate::place::{Place, quoted, shown};
 use crate::signature::{METHODS, Role, Signature};
 use crate::value::{Numbers, check_alone, refused};
 
@@ -192,9 +194,8 @@ impl Script {
             return Err(refused(&method.method, form, &names().collect::<Vec<_>>(), numbers.values(), fault));
         }
         if let Some(value) = surface {
-            let name = self.material_of(method, value.as_ref(), given.clauses.as_ref())?;
             line.push(' ');
-            line += &name;
+            self.material_of(method, value.as_ref(), given.clauses, &mut line)?;
         }
         self.line = line;
         Ok(subject)
@@ -205,10 +206,7 @@ impl Script {
     /// # Errors
     /// Fails for a name that is not valid, is there already, or is not there yet.
     fn name_of(&self, kind: Subject, value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
-        let name = value
-            .extract::<String>()
-            .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
-        check_name(place.method, &name)?;
+        let name = name_from(value, place)?;
         let (is_known, noun) = match kind {
             Subject::Defines(names) | Subject::Refers(names) => match names {
                 Names::Materials => (self.materials.has(&name), names.noun()),
@@ -217,16 +215,17 @@ impl Script {
         };
         match (kind, is_known) {
             (Subject::Defines(_), true) => Err(PyValueError::new_err(format!(
-                "{place}: there is a {noun} with the name {name:?} already"
+                "{place}: there is a {noun} with the name {} already",
+                quoted(&name)
             ))),
             (Subject::Refers(_), false) => {
-                Err(PyValueError::new_err(format!("{place}: no {noun} has the name {name:?} yet")))
+                Err(PyValueError::new_err(format!("{place}: no {noun} has the name {} yet", quoted(&name))))
             }
             _ => Ok(name),
         }
     }
 
-    /// Returns the name of an object's material, which is defined if it is new.
+    /// Adds the name of an object's material to `line`. The material is defined if it is new.
     ///
     /// # Errors
     /// Fails if the value is none.
@@ -234,23 +233,28 @@ impl Script {
         &mut self,
         method: &Signature,
         value: Option<&Bound<'_, PyAny>>,
-        clauses: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<String> {
+        clauses: Vec<Clause<'_>>,
+        line: &mut String,
+    ) -> PyResult<()> {
         let method = &method.method;
-        let surface = match (value, clauses) {
-            (Some(_), Some(_)) => {
+        let surface;
+        let surface = match (value, clauses.is_empty()) {
+            (Some(_), false) => {
                 let message = format!("{method}() takes either `material` or the clauses of one");
                 return Err(PyTypeError::new_err(message));
             }
-            (None, Some(clauses)) => surface_of(method, None, clauses)?,
-            (None, None) => {
+            (None, true) => {
                 let message =
                     format!("{method}() lacks a material, or a clause of one such as diffuse=\"#c04020\"");
                 return Err(PyTypeError::new_err(message));
             }
-            (Some(value), None) => {
+            (None, false) => {
+                surface = surface_of(method, None, clauses)?;
+                &surface
+            }
+            (Some(value), true) => {
                 if let Ok(material) = value.cast::<Material>() {
-                    material.get().0.clone()
+                    &material.get().0
                 } else {
                     let Ok(name) = value.cast::<PyString>() else {
                         return Err(PyTypeError::new_err(format!(
@@ -260,20 +264,22 @@ impl Script {
                     };
                     let text = name.to_string_lossy();
                     if !text.starts_with('#') {
-                        return self.materials.known(method, &text).map(str::to_owned);
+                        *line += self.materials.known(Place { method, parameter: "material" }, &text)?;
+                        return Ok(());
                     }
-                    surface_of_color(method, name)?
+                    surface = surface_of_color(name, Place { method, parameter: "material" })?;
+                    &surface
                 }
             }
         };
-        self.materials.define(&surface, &mut self.definitions)
+        self.materials.define(method, surface, line, &mut self.definitions)
     }
 }
 
 /// The arguments of a call, by parameter.
 struct Given<'py> {
     values: Vec<Option<Bound<'py, PyAny>>>,
-    clauses: Option<Bound<'py, PyDict>>,
+    clauses: Vec<Clause<'py>>,
 }
 
 impl<'py> Given<'py> {
@@ -295,19 +301,19 @@ impl<'py> Given<'py> {
         let mut values: Vec<Option<Bound<'py, PyAny>>> = Vec::with_capacity(parameters.len());
         values.extend(args.iter().map(present));
         values.resize(parameters.len(), None);
-        let mut clauses: Option<Bound<'py, PyDict>> = None;
+        let mut clauses = Vec::new();
         for (key, value) in kwargs.into_iter().flatten() {
             let key = key.cast_into::<PyString>()?;
-            let text = key.to_str()?;
+            let text = key.to_string_lossy();
             if let Some(i) = parameters.iter().position(|parameter| parameter.name == text) {
                 if i < args.len() {
                     return Err(PyTypeError::new_err(format!("{name}() got two values for {text}")));
                 }
                 values[i] = present(value);
             } else if method.has_clauses() {
-                // Unknown ones are refused when they are read.
+                let index = clause_of(name, &key)?;
                 if !value.is_none() {
-                    clauses.get_or_insert_with(|| PyDict::new(key.py())).set_item(&key, value)?;
+                    clauses.push((index, value));
                 }
             } else {
                 return Err(PyTypeError::new_err(format!(
@@ -438,6 +444,15 @@ impl Script {
         )))
     }
 
+    /// Returns the columns and rows of the frames, without those that are as the one before.
+    fn _sizes(&mut self, py: Python<'_>) -> PyResult<Vec<(u32, u32)>> {
+        let script = self.parsed(py)?;
+        let mut sizes: Vec<_> =
+            script.shots().map(|shot| (shot.screen.width(), shot.screen.height())).collect();
+        sizes.dedup();
+        Ok(sizes)
+    }
+
     /// Returns all errors and warnings about the script, without drawing it.
     fn check(&self, py: Python<'_>) -> PyResult<Vec<Diagnostic>> {
         let text = self.whole();
@@ -458,12 +473,12 @@ impl Script {
         let Some(name) = &given.values[0] else { return Err(PyTypeError::new_err("material() lacks name")) };
         let place = Place { method: "material", parameter: "name" };
         let name = self.name_of(Subject::Defines(Names::Materials), name, place)?;
-        let clauses = given.clauses.unwrap_or_else(|| PyDict::new(args.py()));
-        let surface = surface_of("material", Some(name), &clauses)?;
-        let defined = self.materials.define(&surface, &mut self.definitions);
+        let surface = surface_of("material", Some(name), given.clauses)?;
+        let mut name = String::new();
+        let defined = self.materials.define("material", &surface, &mut name, &mut self.definitions);
         self.commit_definitions();
         self.is_open = true;
-        defined.map(|_| Material(surface))
+        defined.map(|()| Material(surface))
     }
 }
 

@@ -155,6 +155,36 @@ class Animation:
         frame; a folder (`film/`, or one that is there) for scripts, which `rayfold render` draws.
         """
 
+    def submit(
+        self,
+        address: str,
+        path: str | PathLike[str] | None = None,
+        *,
+        delete: bool = False,
+        wait: bool = True,
+        progress: bool = True,
+    ) -> bytes | None:
+        """Renders the animation in a bucket, as `rayfold submit` does.
+
+        Checks the scripts, uploads those that the bucket does not have, waits, and returns the GIF as bytes, or writes it
+        to `path`. Region, credentials and endpoint come from the standard AWS environment. Ctrl-C loses nothing: the same
+        call goes on.
+
+        Parameters
+        ----------
+        address : str
+            the bucket and the animation's name in it: `"s3://films/wave"`.
+        path : str or path, optional
+            the GIF's file.
+        delete : bool
+            whether scripts of that name in the bucket that the animation does not have are deleted. Otherwise they are an
+            error, and nothing is uploaded.
+        wait : bool
+            whether to wait for the GIF. Otherwise nothing is returned.
+        progress : bool
+            whether a bar of `tqdm` is shown, if it is installed.
+        """
+
 def animation(
     scenes: Callable[[float], Scene] | Iterable[Scene] | Scene,
     frames: int | None = None,

@@ -8,7 +8,9 @@ use std::ops::Range;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyFloat, PyList, PyString, PyTuple};
+use pyo3::types::{
+    PyByteArray, PyBytes, PyDict, PyFloat, PyFrozenSet, PyInt, PyIterator, PyList, PySet, PyString, PyTuple,
+};
 use rayfold_scene::{Curve as SceneCurve, Field, Form, InvalidValue, Presence, Values};
 
 use crate::curve::Curve;
@@ -23,11 +25,13 @@ pub(crate) struct Numbers {
     values: [f64; MOST],
     count: usize,
     pub(crate) moves: bool,
+    /// Whether the last number is of a colour that is written as `#rrggbb`.
+    is_behind_color: bool,
 }
 
 impl Numbers {
     pub(crate) fn new() -> Self {
-        Self { values: [0.0; MOST], count: 0, moves: false }
+        Self { values: [0.0; MOST], count: 0, moves: false, is_behind_color: false }
     }
 
     /// Returns the numbers so far; that of a curve is its first value.
@@ -121,14 +125,17 @@ impl Numbers {
         let wrong = || wrong_kind(value, field, form, place);
         if is_color(field) {
             if let Ok(name) = value.cast::<PyString>() {
-                for channel in color_of(name, place)? {
-                    self.number(text, Number::Constant(channel), form, place)?;
-                }
-                return Ok(());
+                return self.color(text, name, form, place);
             }
-            if let Some(number) = number_of(value) {
-                for _ in 0..length {
-                    self.number(text, number.clone(), form, place)?;
+            // A sequence is asked first: Python makes an exception of each value that is no number.
+            let is_sequence = value.is_instance_of::<PyTuple>() || value.is_instance_of::<PyList>();
+            if let Some(number) = Some(value).filter(|_| !is_sequence).and_then(number_of) {
+                let start = text.len();
+                self.number(text, number, form, place)?;
+                let (end, channel) = (text.len(), self.values[self.count - 1]);
+                for _ in 1..length {
+                    text.extend_from_within(start..end);
+                    self.push(channel);
                 }
                 return Ok(());
             }
@@ -147,19 +154,44 @@ impl Numbers {
                 add(&item)?;
             }
         } else {
-            if value.is_instance_of::<PyString>() {
-                return Err(wrong());
-            }
-            for item in value.try_iter().map_err(|_| wrong())? {
+            for item in items_of(value).ok_or_else(wrong)? {
                 add(&item?)?;
             }
         }
         if self.count == before + length { Ok(()) } else { Err(wrong()) }
     }
 
+    /// Adds a colour as it is written: what it means may depend on the tone of the picture.
+    fn color(
+        &mut self,
+        text: &mut String,
+        name: &Bound<'_, PyString>,
+        form: &Form,
+        place: Place<'_>,
+    ) -> PyResult<()> {
+        if !form.takes_color(self.count, self.is_behind_color) {
+            return Err(PyValueError::new_err(format!(
+                "{place} may be a text such as {} only behind another colour that is: give both as texts, or both as numbers",
+                shown(name)
+            )));
+        }
+        let channels = color_of(name, place)?;
+        text.push(' ');
+        *text += &name.to_string_lossy();
+        for channel in channels {
+            self.push(channel);
+        }
+        self.is_behind_color = true;
+        Ok(())
+    }
+
     fn number(&mut self, text: &mut String, number: Number, form: &Form, place: Place<'_>) -> PyResult<()> {
         text.push(' ');
+        self.is_behind_color = false;
         match number {
+            Number::Constant(value) if !value.is_finite() => {
+                return Err(PyValueError::new_err(format!("{place} must be finite, not {value}")));
+            }
             Number::Constant(value) => {
                 write_number(text, value);
                 self.push(value);
@@ -198,18 +230,72 @@ fn number_of(value: &Bound<'_, PyAny>) -> Option<Number> {
     value.cast::<Curve>().ok().map(|curve| Number::Moving(curve.get().curve.clone()))
 }
 
+/// Returns the items of an array or an iterator; nothing for what holds no numbers in order, although Python iterates over
+/// it.
+pub(crate) fn items_of<'py>(value: &Bound<'py, PyAny>) -> Option<Bound<'py, PyIterator>> {
+    let has_no_numbers = value.is_instance_of::<PyString>()
+        || value.is_instance_of::<PyBytes>()
+        || value.is_instance_of::<PyByteArray>()
+        || value.is_instance_of::<PyDict>()
+        || value.is_instance_of::<PySet>()
+        || value.is_instance_of::<PyFrozenSet>();
+    if has_no_numbers { None } else { value.try_iter().ok() }
+}
+
 /// Adds the shortest decimal that reads back as `x`, as scripts are written.
 pub(crate) fn write_number(text: &mut String, x: f64) {
-    let _ = if x == 0.0 || (1e-5..1e16).contains(&x.abs()) {
-        // Whole numbers are written faster as such. A negative zero keeps its sign.
-        if x.trunc() == x && x.abs() < 1e9 && (x != 0.0 || x.is_sign_positive()) {
-            write!(text, "{}", x as i64)
-        } else {
-            write!(text, "{x}")
-        }
+    if write_short(text, x) {
+        return;
+    }
+    let _ =
+        if x == 0.0 || (1e-5..1e16).contains(&x.abs()) { write!(text, "{x}") } else { write!(text, "{x:e}") };
+}
+
+/// Adds a number with few decimals, such as people write: faster, with the same digits. Returns false for others.
+fn write_short(text: &mut String, x: f64) -> bool {
+    const PLACES: usize = 6;
+    const SCALE: f64 = 1e6;
+    let size = x.abs();
+    // A negative zero keeps its sign. Below 1e-5 scripts have exponents; below 1e9 all digits are known exactly.
+    if !(x == 0.0 && x.is_sign_positive() || (1e-5..1e9).contains(&size)) {
+        return false;
+    }
+    let scaled = (size * SCALE).round();
+    // The quotient is the number nearest to that decimal, which has at most 15 digits: no other such decimal reads so.
+    if scaled / SCALE != size {
+        return false;
+    }
+    let (whole, mut part) = (scaled as u64 / SCALE as u64, scaled as u64 % SCALE as u64);
+    let mut digits = [b'0'; 24];
+    let (mut start, mut end) = (digits.len() - PLACES, digits.len());
+    for digit in digits[start..].iter_mut().rev() {
+        *digit += (part % 10) as u8;
+        part /= 10;
+    }
+    while end > start && digits[end - 1] == b'0' {
+        end -= 1;
+    }
+    if end > start {
+        start -= 1;
+        digits[start] = b'.';
     } else {
-        write!(text, "{x:e}")
-    };
+        // No point follows.
+        end = start;
+    }
+    let mut left = whole;
+    loop {
+        start -= 1;
+        digits[start] = b'0' + (left % 10) as u8;
+        left /= 10;
+        if left == 0 {
+            break;
+        }
+    }
+    if x < 0.0 {
+        text.push('-');
+    }
+    text.extend(digits[start..end].iter().map(|digit| char::from(*digit)));
+    true
 }
 
 /// Returns the error of numbers that a command or clause refuses. `names` are those of the fields, in Python.
@@ -274,6 +360,10 @@ fn wrong_kind(value: &Bound<'_, PyAny>, field: &Field, form: &Form, place: Place
         Values::Any | Values::Clamped | Values::NotZero => String::new(),
         values => format!(", {values}"),
     };
+    if value.is_instance_of::<PyInt>() && (field.names.len() == 1 || is_color(field)) {
+        let message = format!("{place} is a number of at most {:e}, not {}", f64::MAX, shown(value));
+        return PyValueError::new_err(message);
+    }
     let optional = if field.presence == Presence::Required { "" } else { " or None" };
     PyTypeError::new_err(format!("{place} takes {expected}{range}{optional}, not {}", shown(value)))
 }

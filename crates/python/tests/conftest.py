@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import rayfold as rf
 
 ROOT = Path(__file__).resolve().parents[3]
+sys.path.append(str(ROOT / "crates" / "python" / "bench"))
 
 
 @pytest.fixture(scope="session")

@@ -1,114 +1,26 @@
 """What Python draws is what `rayfold render` draws of the same text, bit for bit."""
 
 import io
-import random
 import warnings
 
 import numpy as np
 import pytest
 from PIL import Image
 
+import random_scenes
 import rayfold as rf
-
-SEED = 4242
-
 
 def pixels(file):
     return np.asarray(Image.open(io.BytesIO(file)).convert("RGB"))
 
 
-def number(dice, low=-3.0, high=3.0):
-    kind = dice.randrange(6)
-    value = dice.uniform(low, high)
-    return [value, round(value, 1), float(int(value)), value * 1e-7, value * 1e9 % high, value][kind]
-
-
-def positive(dice):
-    return abs(number(dice, 0.1, 2.0)) + dice.choice([0.05, 1e-6])
-
-
-def vector(dice):
-    return tuple(number(dice) for _ in range(3))
-
-
-def color(dice):
-    return tuple(dice.random() for _ in range(3))
-
-
-def text(*values):
-    flat = []
-    for value in values:
-        flat.extend(value if isinstance(value, tuple) else [value])
-    return " ".join(v if isinstance(v, str) else repr(v) for v in flat)
-
-
-def random_scene(dice):
-    """A scene by methods, and its script by formatted strings."""
-    scene, lines = rf.Scene(24, 16), ["Screen 24 16"]
-
-    def both(name, *values):
-        getattr(scene, name.lower())(*values)
-        lines.append(f"{name} {text(*values)}")
-
-    both("Background", color(dice), color(dice))
-    eye, up = (0.3, 1.5, 9.0), (0.0, 1.0, 0.1)
-    both("Look", eye, (number(dice, -1, 1), number(dice, -1, 1), 0.0), dice.uniform(20, 60), up)
-    if dice.random() < 0.3:
-        both("Samples", dice.randrange(2, 5), round(dice.random(), 2))
-        both("Tone", dice.choice(["plain", "srgb"]))
-    both("Depth", dice.randrange(0, 9))
-    both("Ilight", color(dice), (1.0, -1.0 - dice.random(), -0.5))
-    both("Plight", color(dice), vector(dice), 0.0, positive(dice))
-    for i in range(dice.randrange(1, 8)):
-        ambient, diffuse, mirror = color(dice), color(dice), color(dice)
-        exponent = 1.0 + positive(dice)
-        scene.material(f"a{i}", ambient=ambient, diffuse=diffuse, mirror=mirror, shine=(color(random.Random(i)), exponent))
-        shine = text(color(random.Random(i)), exponent)
-        lines.append(
-            f"Material a{i} ambient {text(ambient)} diffuse {text(diffuse)} mirror {text(mirror)} shine {shine}"
-        )
-        kind = dice.randrange(6)
-        at = f"a{i}"
-        if kind == 0:
-            both("Sphere", positive(dice), vector(dice), at)
-        elif kind == 1:
-            both("Box", vector(dice), vector(dice), at)
-        elif kind == 2:
-            both("Cylinder", positive(dice), (0.0, -1.0, number(dice)), (0.5, 1.0, number(dice)), at)
-        elif kind == 3:
-            both("Torus", 1.0 + positive(dice), 0.3, vector(dice), (0.1, 1.0, 0.0), at)
-        elif kind == 4:
-            both("Triangle", vector(dice), vector(dice), vector(dice), at)
-        else:
-            both("Disc", positive(dice), vector(dice), (0.2, 1.0, 0.5), at)
-    return scene, "\n".join([*lines, "Trace\n"])
-
-
-def test_a_thousand_random_scenes_are_those_of_their_texts(tmp_path, rayfold):
-    dice = random.Random(SEED)
-    scripts, drawn = [], []
+def test_random_scenes_are_those_of_their_texts(rayfold):
+    # `python crates/python/bench random` compares any number of them.
+    seed = random_scenes.seed()
+    print(f"RAYFOLD_SEED={seed}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rf.SceneWarning)
-        for k in range(1000):
-            scene, script = random_scene(dice)
-            assert str(scene) == str(rf.parse(str(scene)))
-            picture = scene.render()
-            assert np.array_equal(picture, rf.parse(script).render()), f"seed {SEED}, scene {k}:\n{script}"
-            scripts.append(str(scene))
-            drawn.append(picture)
-    # The command draws all of them at once, as the frames of a folder.
-    folder = tmp_path / "scenes"
-    folder.mkdir()
-    for k, script in enumerate(scripts):
-        (folder / f"{k}.txt").write_text(script)
-    import subprocess
-
-    subprocess.run(
-        [rayfold, "render", str(folder), "-o", str(tmp_path / "out" / "%d.png"), "--quiet"], check=True
-    )
-    for k, picture in enumerate(drawn):
-        file = (tmp_path / "out" / f"{k + 1}.png").read_bytes()
-        assert np.array_equal(pixels(file), picture), f"seed {SEED}, scene {k}:\n{scripts[k]}"
+        assert random_scenes.compare(1000, seed, rayfold) >= 1000
 
 
 def test_a_file_is_that_of_the_command(stage, render, tmp_path):

@@ -28,7 +28,7 @@ def test_a_material_is_defined_where_it_is_used_first():
     scene.sphere(1, (11, 0, 0), "#ff0000")
     assert str(scene).splitlines() == [
         "Screen 8 6",
-        "Material m1 diffuse 1 0 0",
+        "Material m1 diffuse #ff0000",
         "Sphere 1 0 0 0 m1",
         "Sphere 1 1 0 0 m1",
         "Sphere 1 2 0 0 m1",
@@ -89,7 +89,7 @@ def test_a_text_is_kept_as_it_is_and_continued():
     assert str(scene) == TEXT
     before = scene.render()
     scene.sphere(3, (3, 3, -5), ambient="#00ff00")
-    assert str(scene) == TEXT.replace("Trace\n", "Material m2 ambient 0 1 0\nSphere 3 3 3 -5 m2\nTrace\n")
+    assert str(scene) == TEXT.replace("Trace\n", "Material m2 ambient #00ff00\nSphere 3 3 3 -5 m2\nTrace\n")
     assert not np.array_equal(scene.render(), before)
     scene.sphere(1, (20, 3, -5), "m1")
     assert scene.frame_count == 1
@@ -116,7 +116,7 @@ def test_a_word_may_stand_in_place_of_all_arguments():
     scene = rf.Scene(8, 6)
     scene.fog("#ffffff", 10)
     scene.fog("none")
-    assert str(scene) == "Screen 8 6\nFog 1 1 1 10\nFog none\nTrace\n"
+    assert str(scene) == "Screen 8 6\nFog #ffffff 10\nFog none\nTrace\n"
 
 
 def test_curves_are_written_and_evaluated():

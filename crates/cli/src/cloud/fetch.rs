@@ -1,10 +1,10 @@
 //! `rayfold fetch`: what the bucket has of an animation, to this machine.
 
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use rayfold_client::{FetchedFrame, Frames, Output, frame_name, frames};
+use rayfold_client::{FetchedFrame, Frames, frame_name, frames};
 use rayfold_files::{OutputFile, probe};
 use rayfold_movie::Container;
 use rayfold_pipeline::keys::Animation;
@@ -128,23 +128,6 @@ fn not_there(watch: &Watch<'_>, manifest: &Manifest, console: &Console) -> anyho
     anyhow::anyhow!("there is no GIF of {} as it is now: {why} ({count}){last}", head.animation)
 }
 
-/// A file that appears once all of it is there.
-struct Download<'a> {
-    path: &'a Path,
-    file: Option<BufWriter<OutputFile>>,
-}
-
-impl Output for Download<'_> {
-    fn begin(&mut self, _: u64) -> io::Result<()> {
-        self.file = Some(BufWriter::new(OutputFile::create(self.path).map_err(io::Error::other)?));
-        Ok(())
-    }
-
-    fn write(&mut self, piece: &[u8]) -> io::Result<()> {
-        self.file.as_mut().map_or(Ok(()), |file| file.write_all(piece))
-    }
-}
-
 /// Downloads the GIF as it is now.
 ///
 /// # Errors
@@ -157,12 +140,7 @@ pub(crate) async fn gif(
     console: &Console,
 ) -> anyhow::Result<()> {
     let shown = path.display();
-    let mut download = Download { path, file: None };
-    let info = client.fetch_gif(animation, &mut download).await?;
-    if let Some(file) = download.file {
-        let file = file.into_inner().map_err(io::IntoInnerError::into_error);
-        file.with_context(|| format!("cannot write {shown}"))?.finish(true)?;
-    }
+    let info = client.download_gif(animation, path).await?;
     let from = address(&bucket.bucket, &animation.gif());
     console.note(format_args!("{shown}: {}, from {from}", Size(info.size)));
     Ok(())

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use rayfold_client as client;
+pub(crate) use rayfold_client::address;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::store::S3Store;
 use rayfold_pipeline::{Error, SystemClock};
@@ -65,31 +66,14 @@ pub(crate) fn with_bucket<T>(
     })
 }
 
-/// The store's own words seldom name the bucket, and never say where credentials come from.
+/// Puts an error of the client into the words for users.
 fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
-    let source = match error.downcast_ref() {
-        Some(client::Error::Store(Error::Refused { source, .. } | Error::Ambiguous { source, .. })) => source,
-        Some(client::Error::NoAnimation(animation)) => {
-            return anyhow!("there is no animation {animation} in {bucket}");
-        }
-        Some(client::Error::ChangedMeanwhile { key }) => {
-            return anyhow!("somebody else has changed {} meanwhile", address(bucket, key));
-        }
-        Some(client::Error::Restless { key }) => {
-            return anyhow!("{} is replaced faster than it can be read", address(bucket, key));
-        }
-        _ => return error,
-    };
-    let words = source.to_string();
-    let lacks_credentials = ["credentials", "IMDS"].iter().any(|word| words.contains(word));
-    error.context(if lacks_credentials {
-        format!(
-            "bucket {bucket}: found no AWS credentials: set AWS_PROFILE, or AWS_ACCESS_KEY_ID and \
-             AWS_SECRET_ACCESS_KEY"
-        )
-    } else {
-        format!("bucket {bucket}")
-    })
+    let Some(source) = error.downcast_ref::<client::Error>() else { return error };
+    match source.explain(bucket) {
+        Some(words) if source.is_of_store() => error.context(words),
+        Some(words) => anyhow!(words),
+        None => error,
+    }
 }
 
 /// Shows `names`, or as many as people read, and what else there is to say; then asks whether to go on. `None` when there
@@ -154,11 +138,6 @@ pub(crate) fn parse_animation(name: &str) -> Result<Animation, String> {
         Error::Key { problem, .. } => problem.to_owned(),
         other => other.to_string(),
     })
-}
-
-/// Where an object lies, for people.
-pub(crate) fn address(bucket: &str, key: &str) -> String {
-    format!("s3://{bucket}/{key}")
 }
 
 #[cfg(test)]

@@ -10,7 +10,9 @@
     scene.render()
 """
 
-from . import _rayfold
+from collections.abc import Mapping
+
+from . import _arguments, _rayfold
 from ._animation import Animation, animation, gif, load
 from ._errors import SceneError, SceneWarning
 from ._picture import Picture
@@ -40,7 +42,9 @@ Material.__doc__ = _rayfold.material_doc
 
 
 def keys(keys, mode="linear", cycle=False):
-    return _rayfold.keys(keys, mode, cycle)
+    if not isinstance(keys, Mapping):
+        raise TypeError(f"keys(): keys is a dict of values by the numbers of frames, not {_arguments.shown(keys)}")
+    return _rayfold.keys(dict(keys), mode, _arguments.flag("keys", "cycle", cycle))
 
 
 keys.__doc__ = _rayfold.keys_doc
@@ -48,8 +52,9 @@ keys.__doc__ = _rayfold.keys_doc
 
 def linear(color):
     """Returns the channels of a colour such as `"#c04020"` as linear light, for scenes with `tone("srgb")`."""
+    color = _arguments.text("linear", "color", color, "'#c04020'")
     digits = color[1:]
-    if not (isinstance(color, str) and color.startswith("#") and len(digits) == 6 and digits.isalnum()):
-        raise ValueError(f"linear(): expected a colour such as '#c04020', not {color!r}")
+    if not (color.startswith("#") and len(digits) == 6 and set(digits) <= set("0123456789abcdefABCDEF")):
+        raise ValueError(f"linear(): color is a text such as '#c04020', not {_arguments.shown(color)}")
     channels = (int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4))
     return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)

@@ -6,9 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 
-import numpy as np
-
-from . import _rayfold
+from . import _arguments, _rayfold
 from ._picture import image_of, picture_of
 from ._scene import Scene, parse
 
@@ -28,10 +26,7 @@ class Animation:
         self.loop = loop
         self.bounce = bounce
         self.durations = dict(durations or {})
-        # The bounds are the language's: said now, and not when it is saved.
-        _rayfold.settings_text(None, fps, max(loop, 0), bounce, self.durations)
-        if loop < -1:
-            raise ValueError(f"loop is the number of repetitions, 0 for endless or -1 for once, not {loop}")
+        _arguments.playback("animation", fps, loop, bounce, self.durations)
 
     def __len__(self):
         if self._length() is None:
@@ -54,12 +49,13 @@ class Animation:
 
     def frames(self, *, progress=True, linear=False):
         """Draws the frames, ahead within a bound on memory, and yields them in order."""
-        for image in self._drawn(progress, linear):
-            yield picture_of(image, linear)
+        progress = _arguments.flag("frames", "progress", progress)
+        linear = _arguments.flag("frames", "linear", linear)
+        return (picture_of(image, linear) for image in self._drawn(progress, linear))
 
     def gif(self, *, progress=True, exact=False):
         """Returns the animation as a GIF file."""
-        return self._encode(None, "gif", progress, exact)
+        return self._encode("gif", None, "gif", progress, exact)
 
     def save(self, path, *, progress=True, exact=False):
         """Writes the animation.
@@ -67,24 +63,62 @@ class Animation:
         The ending of `path` decides: `.gif`, `.apng` or `.webp`; `.png` with a number such as `%04d` for a file for each
         frame; a folder (`film/`, or one that is there) for scripts, which `rayfold render` draws.
         """
-        path = os.fspath(path)
+        path = _arguments.path("save", "path", path)
+        progress = _arguments.flag("save", "progress", progress)
         ending = path.rpartition(".")[2].lower()
         if os.path.isdir(path) or path.endswith(("/", os.sep)):
             self._save_scripts(path)
         elif ending in FORMATS:
-            self._encode(path, ending, progress, exact)
+            self._encode("save", path, ending, progress, exact)
         elif ending == "png" and len(PATTERN.findall(os.path.basename(path))) == 1:
             self._save_pictures(path, progress)
         elif ending == "png":
-            raise ValueError(f"{path!r} is one file: expected a number in its name, such as frames/%04d.png")
+            raise ValueError(f"save(): path {_arguments.shown(path)} is one file: expected a number in its name, such as frames/%04d.png")
         else:
             raise ValueError(
-                f"cannot tell what {path!r} should be: expected .gif, .apng or .webp, frames/%04d.png, or a folder such as film/"
+                f"save(): path {_arguments.shown(path)} does not say what it is: expected .gif, .apng or .webp, frames/%04d.png, or a folder such"
+                " as film/"
             )
+
+    def submit(self, address, path=None, *, delete=False, wait=True, progress=True):
+        """Renders the animation in a bucket, as `rayfold submit` does.
+
+        Checks the scripts, uploads those that the bucket does not have, waits, and returns the GIF as bytes, or writes it to
+        `path`. Region, credentials and endpoint come from the standard AWS environment. Ctrl-C loses nothing: the same call
+        goes on.
+
+        Parameters
+        ----------
+        address : str
+            the bucket and the animation's name in it: `"s3://films/wave"`.
+        path : str or path, optional
+            the GIF's file.
+        delete : bool
+            whether scripts of that name in the bucket that the animation does not have are deleted. Otherwise they are an
+            error, and nothing is uploaded.
+        wait : bool
+            whether to wait for the GIF. Otherwise nothing is returned.
+        progress : bool
+            whether a bar of `tqdm` is shown, if it is installed.
+        """
+        address = _arguments.text("submit", "address", address, "'s3://films/wave'")
+        delete = _arguments.flag("submit", "delete", delete)
+        wait = _arguments.flag("submit", "wait", wait)
+        progress = _arguments.flag("submit", "progress", progress)
+        if path is not None:
+            path = _arguments.path("submit", "path", path)
+            if not path.lower().endswith(".gif"):
+                raise ValueError(f"submit(): path is that of a GIF, which ends in .gif, not {_arguments.shown(path)}")
+            if not wait:
+                raise ValueError("submit(): there is no file without waiting: expected either path or wait=False")
+        scripts, settings = self._folder(has_one_size=True)
+        with _Progress(progress) as bar:
+            report = bar.at if progress else None
+            return _rayfold.submit(address, scripts, settings, path, delete, wait, report)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         if self._shown is None:
-            self._shown = self._encode(None, "gif", True, False)
+            self._shown = self._encode("gif", None, "gif", True, False)
         data = base64.b64encode(self._shown).decode()
         return {"text/html": f'<img src="data:image/gif;base64,{data}">', "text/plain": repr(self)}
 
@@ -161,7 +195,9 @@ class Animation:
             finally:
                 ahead.stop()
 
-    def _encode(self, path, format, progress, exact):
+    def _encode(self, call, path, format, progress, exact):
+        progress = _arguments.flag(call, "progress", progress)
+        exact = _arguments.flag(call, "exact", exact)
         times = self._times()
         if self._shown_length() is None and format == "apng":
             raise ValueError("an .apng begins with the number of its frames, which an iterator does not say: give frames=")
@@ -212,30 +248,34 @@ class Animation:
             file = name[: digits.start()] + shown + name[digits.end() :]
             _rayfold.write_file(os.path.join(folder, file), image.png())
 
-    def _scripts(self):
-        """The name of each script, without `.txt`, and its text."""
-        last = None
-        number = 0
-        for scene, _ in self._jobs():
-            if scene is not last:
-                last = scene
-                number += 1
-                yield f"{number:04d}", str(scene)
-
-    def _settings(self, scripts):
-        frames = sum(parse(text).frame_count for _, text in scripts)
+    def _folder(self, has_one_size=False):
+        """The names of the scripts, without `.txt`, and their texts; and the text of `animation.json`."""
+        if self.loop == -1:
+            raise ValueError("animation.json cannot say that an animation is shown once: expected a loop from 0")
+        scripts, frames, size = [], 0, None
+        for scene in self._ordered():
+            if self._count is not None and frames >= self._count:
+                break
+            for own in scene._sizes() if has_one_size else ():
+                size = size or own
+                if own != size:
+                    raise ValueError(
+                        f"an animation has one size, but frame 1 is {size[0]} x {size[1]} and the scene of frame {frames + 1}"
+                        f" has {own[0]} x {own[1]}"
+                    )
+            scripts.append((f"{len(scripts) + 1:04d}", str(scene)))
+            frames += scene.frame_count
+        if not scripts:
+            raise ValueError("an animation needs at least one frame")
         length = self._length()
         if length is not None and frames != length:
             raise ValueError(
                 f"the scripts have {frames} frames, not {length}: a script is saved whole, so that `frames` cannot cut it"
             )
-        if self.loop == -1:
-            raise ValueError("animation.json cannot say that an animation is shown once: expected a loop from 0")
-        return _rayfold.settings_text(frames, self.fps, self.loop, self.bounce, self.durations)
+        return scripts, _rayfold.settings_text(frames, self.fps, self.loop, self.bounce, self.durations)
 
     def _save_scripts(self, folder):
-        scripts = list(self._scripts())
-        settings = self._settings(scripts)
+        scripts, settings = self._folder()
         os.makedirs(folder, exist_ok=True)
         names = {f"{name}.txt" for name, _ in scripts}
         others = [file for file in os.listdir(folder) if file.endswith(".txt") and file not in names]
@@ -306,19 +346,19 @@ def animation(scenes, frames=None, fps=10, *, loop=0, bounce=False, durations=No
     durations : dict, optional
         times of frames in seconds, by the number of the frame from 1.
     """
+    frames = None if frames is None else _arguments.whole("animation", "frames", frames, 1)
+    fps = _arguments.number("animation", "fps", fps)
+    loop = _arguments.whole("animation", "loop", loop, -1, 65535)
+    bounce = _arguments.flag("animation", "bounce", bounce)
+    durations = _arguments.durations("animation", "durations", durations)
     if isinstance(scenes, Scene):
         scenes = [scenes]
     elif callable(scenes):
         if frames is None:
             raise TypeError("animation() of a function needs frames, the number of times that it is called")
-    elif isinstance(scenes, (str, bytes)) or not hasattr(scenes, "__iter__"):
-        raise TypeError(f"animation() takes a function, scenes or a Scene, not {scenes!r}")
-    elif isinstance(scenes, Sequence):
-        scenes = [_checked(scene) for scene in scenes]
     else:
-        scenes = iter(scenes)
-    if frames is not None and (not isinstance(frames, (int, np.integer)) or frames < 1):
-        raise ValueError(f"frames is a whole number from 1, not {frames!r}")
+        items = _arguments.iterable("animation", "scenes", scenes, "a function, scenes in order or a Scene")
+        scenes = [_checked(scene) for scene in items] if isinstance(scenes, Sequence) else items
     return Animation(scenes, frames, fps, loop, bounce, durations)
 
 
@@ -327,21 +367,26 @@ def gif(images, fps=10, path=None, *, loop=0, exact=False):
 
     Arrays of height x width are greys. Frames are taken one by one: memory does not grow with their number.
     """
+    images = _arguments.iterable("gif", "images", images, "a list or an iterator of arrays")
+    fps = _arguments.number("gif", "fps", fps)
+    path = None if path is None else _arguments.path("gif", "path", path)
+    loop = _arguments.whole("gif", "loop", loop, -1, 65535)
+    exact = _arguments.flag("gif", "exact", exact)
+    _arguments.playback("gif", fps, loop, False, {})
     encoder = None
     for number, array in enumerate(images, 1):
-        image = image_of(array, f"frame {number}")
+        image = image_of(array, f"gif(): images: frame {number}")
         if encoder is None:
-            path = None if path is None else os.fspath(path)
             encoder = _rayfold.Encoder(path, "gif", image.size, None, fps, loop, None, exact)
         encoder.push(image, None)
     if encoder is None:
-        raise ValueError("a GIF needs at least one frame")
+        raise ValueError("gif(): images is empty: a GIF needs at least one frame")
     return encoder.finish()[0]
 
 
 def load(path):
     """Reads a folder of scripts with its `animation.json`, or one script, as an animation."""
-    path = os.fspath(path)
+    path = _arguments.path("load", "path", path)
     scripts, (_, fps, loop, bounce, durations), not_read = _rayfold.read_folder(path)
     if not_read:
         import warnings
@@ -358,7 +403,7 @@ def _called(function, index, fps):
     return _checked(function(index / fps), f"the function returned for frame {index + 1}")
 
 
-def _checked(scene, what="an animation is made of"):
+def _checked(scene, what="scenes holds"):
     if not isinstance(scene, Scene):
-        raise TypeError(f"expected a Scene, but {what} {scene!r}")
+        raise TypeError(f"animation(): expected a Scene, but {what} {_arguments.shown(scene)}")
     return scene

@@ -1,10 +1,8 @@
 """Arrays of pixels that a notebook shows as pictures."""
 
-import os
-
 import numpy as np
 
-from . import _rayfold
+from . import _arguments, _rayfold
 
 
 class Picture(np.ndarray):
@@ -16,7 +14,7 @@ class Picture(np.ndarray):
 
     def save(self, path):
         """Writes the picture as a PNG file, which appears whole or not at all."""
-        _rayfold.write_file(os.fspath(path), self.png())
+        _rayfold.write_file(_arguments.path("save", "path", path), self.png())
 
     def _repr_png_(self):
         # A part of a picture, such as a row of it or a sum, may be none.
@@ -32,7 +30,10 @@ def picture_of(image, linear=False):
 
 def image_of(array, name="the picture"):
     """Returns an array as an image of the extension."""
-    array = np.asarray(array)
+    try:
+        array = np.asarray(array)
+    except Exception as error:
+        raise TypeError(f"{name} is no array: {error}") from None
     if array.ndim == 2:
         array = np.repeat(array[:, :, None], 3, axis=2)
     if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:

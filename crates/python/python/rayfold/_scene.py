@@ -1,9 +1,8 @@
 """Scenes: a method for each command of the language, made from its table."""
 
 import inspect
-import os
 
-from . import _rayfold
+from . import _arguments, _rayfold
 from ._picture import picture_of
 
 METHODS = _rayfold.methods()
@@ -27,6 +26,8 @@ class Scene(_rayfold.Script):
                 continue
             method = getattr(self, name)
             if isinstance(value, dict):
+                if not all(isinstance(key, str) for key in value):
+                    raise TypeError(f"Scene(): {name} as a dict has the parameters of {name}() by name, not {value!r}")
                 method(**value)
             elif isinstance(value, tuple) and not _is_first_argument(name, value):
                 method(*value)
@@ -54,27 +55,29 @@ class Scene(_rayfold.Script):
         Returns an array of height x width x 3: levels from 0 to 255 as `uint8`, or with `linear` the light before `tone` and
         rounding, from 0 to 1, as `float32`.
         """
-        return picture_of(self._draw(frame, linear), linear)
+        linear = _arguments.flag("render", "linear", linear)
+        return picture_of(self._draw("render", frame, linear), linear)
 
     def save(self, path, frame=1):
         """Draws a frame and writes it as PNG; or writes the script, for a path that ends in `.txt`."""
-        path = os.fspath(path)
+        path = _arguments.path("save", "path", path)
         if path.lower().endswith(".txt"):
             _rayfold.write_file(path, str(self).encode())
         elif path.lower().endswith(".png"):
-            _rayfold.write_file(path, self._draw(frame).png())
+            _rayfold.write_file(path, self._draw("save", frame).png())
         else:
-            raise ValueError(f"cannot tell what {path!r} should be: expected .png, or .txt for the script")
+            raise ValueError(f"save(): path {_arguments.shown(path)} does not say what it is: expected .png, or .txt for the script")
 
-    def _draw(self, frame, linear=False):
+    def _draw(self, call, frame, linear=False):
+        frame = _arguments.whole(call, "frame", frame, 1)
+        if frame > self.frame_count:
+            raise IndexError(f"{call}(): frame is from 1 to {self.frame_count}, the last one, not {frame}")
         ahead = _rayfold.Ahead()
-        if frame < 1:
-            raise ValueError(f"frames are counted from 1, not {frame}")
         ahead.start(self, frame - 1, linear)
         return ahead.take()
 
     def _repr_png_(self):
-        return self._draw(1).png()
+        return self._draw("render", 1).png()
 
 
 class Group:
@@ -100,6 +103,8 @@ def _read(text, name):
 
 def parse(text, name="scene"):
     """Makes a scene of a script's text. Commands that are added belong to its last frame."""
+    text = _arguments.text("parse", "text", text, "that of a script")
+    name = _arguments.text("parse", "name", name, "'scene'")
     return _read(text, name)
 
 
