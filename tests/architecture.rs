@@ -14,7 +14,7 @@ use serde_json::Value;
 /// The crates of the project that each one may use. A new crate needs an entry here and a section in ARCHITECTURE.md.
 const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-assets", &[]),
-    ("rayfold-scene", &[]),
+    ("rayfold-scene", &["rayfold-assets"]),
     ("rayfold-files", &["rayfold-scene"]),
     ("rayfold-gif", &[]),
     ("rayfold-movie", &["rayfold-gif"]),

@@ -15,6 +15,7 @@ mod encode_formats;
 mod files;
 mod images;
 mod interrupted;
+mod models;
 mod movies;
 mod newcomer;
 mod pages;

@@ -96,3 +96,16 @@ fn what_never_changes_cannot_be_watched() {
         folder.rayfold(args).stdin("").assert().code(2);
     }
 }
+
+#[test]
+fn a_file_that_a_script_names_is_watched() {
+    let script = "Screen 8 6\nLook 2 2 3 .3 .3 0 40\nMesh \"corner.obj\"\nTrace\n";
+    let folder = Folder::with("scene.txt", script);
+    folder.write("corner.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let watching = Watching::start(&folder, &["render", "--watch", "scene.txt", "-o", "out.gif"]);
+    watching.until_it_waits();
+    let before = folder.read("out.gif");
+    folder.write("corner.obj", "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 3 4\n");
+    watching.until_it_waits();
+    assert_ne!(folder.read("out.gif"), before);
+}

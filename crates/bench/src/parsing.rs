@@ -81,7 +81,7 @@ fn row(kind: &Kind, args: &Args) -> Result<String> {
         seconds.push(time);
         parsed = Some(result);
     }
-    let Parsed { script, diagnostics } = parsed.context("at least one round")?;
+    let Parsed { script, diagnostics, .. } = parsed.context("at least one round")?;
     let parse_seconds = cpu_time::median(seconds);
     let (show, shown) = cpu_time::of(|| diagnostics.iter().map(|d| d.render(true).len()).sum::<usize>())?;
     ensure!((shown == 0) == diagnostics.is_empty(), "a diagnostic that shows nothing");

@@ -1,7 +1,8 @@
 //! `rayfold check`: what is wrong with scripts and settings, for people and for editors.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use rayfold_files::named_by_scripts;
 use rayfold_scene::{Diagnostic, Language, Limits, SETTINGS_FILE, Severity};
 use serde::Serialize;
 
@@ -31,7 +32,7 @@ Examples:
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
 column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the
 files that could not be read; `conflicts`, why scripts that are fine by themselves are no animation together, and
-files that are not read because of their names, each with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
+files that are not read because of their names, models that no script names, each with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
 materials and the modes of curves, each number with its name, kind, unit, range and default.")]
 pub(crate) struct Args {
     /// Folders, script files, animation.json, or - for standard input
@@ -89,6 +90,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             Some(Err(error)) => faults.conflict(path, Severity::Error, &error),
             Some(Ok(plan)) => {
                 frames += plan.len();
+                for file in unused_files(path) {
+                    faults.conflict(&file, Severity::Warning, &"no script names this model");
+                }
                 if let Some(warning) = plan.light_cut_off()? {
                     faults.conflict(path, Severity::Warning, &warning);
                 }
@@ -119,6 +123,23 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         }
     }
     Ok(if faults.errors() > 0 { Outcome::Failed } else { Outcome::Done })
+}
+
+/// The endings of models and of the files that they refer to.
+const MODELS: [&str; 6] = ["obj", "mtl", "ply", "stl", "gltf", "glb"];
+
+/// Returns the models in a folder that no script names, in order.
+fn unused_files(folder: &Path) -> Vec<PathBuf> {
+    let named = named_by_scripts();
+    let is_model = |path: &Path| {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        MODELS.contains(&ending.as_str()) && path.is_file()
+    };
+    let entries = folder.read_dir().into_iter().flatten();
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut unused: Vec<PathBuf> = paths.filter(|path| is_model(path) && !named.contains(path)).collect();
+    unused.sort();
+    unused
 }
 
 fn tell(faults: &Faults, frames: u64, console: &Console) {

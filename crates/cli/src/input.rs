@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use rayfold_files::{Folder, NotRead};
-use rayfold_scene::{Limits, Name, Parsed};
+use rayfold_files::{Folder, NotRead, library_beside};
+use rayfold_scene::{Limits, Name, Parsed, parse_with_files};
 
 use crate::interrupt;
 use crate::outcome::Usage;
@@ -136,7 +136,9 @@ impl ScriptFile {
     /// # Errors
     /// When the file cannot be read.
     pub(crate) fn parse(&self, limits: &Limits) -> anyhow::Result<Parsed> {
-        Ok(rayfold_scene::parse(&self.name, &self.read(limits)?, limits))
+        // The script on standard input has its files in the working directory.
+        let library = library_beside(self.path().unwrap_or(Path::new("")));
+        Ok(parse_with_files(&self.name, &self.read(limits)?, limits, &library))
     }
 }
 

@@ -17,7 +17,8 @@ use crate::wording::number;
 
 /// Split a script with many Traces into one script a frame
 ///
-/// Each script holds all that its frame needs, so that frames can be rendered apart from each other.
+/// Each script holds all that its frame needs, so that frames can be rendered apart from each other. The files that the
+/// script names are copied into the folder.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,7 +43,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let input = Input::animation(std::slice::from_ref(&args.script), &limits)?;
     let mut faults = Faults::default();
-    let script = faults.script(input.scripts[0].parse(&limits));
+    let parsed = input.scripts[0].parse(&limits);
+    let named = parsed.as_ref().map(|parsed| parsed.files.clone()).unwrap_or_default();
+    let script = faults.script(parsed);
     faults.show(console);
     let Some(script) = script else { anyhow::bail!("nothing was written: {}", faults.count()) };
 
@@ -59,6 +62,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     for number in 1..=script.frame_count() {
         must_not_replace(&folder.join(name(number)), input.files())?;
     }
+    copy_files(&named, input.scripts[0].path(), folder)?;
     for number in 1..=script.frame_count() {
         anyhow::ensure!(!interrupt::stopping(), "interrupted");
         let frame = script.only(number - 1).context("a frame of the script is missing")?;
@@ -71,6 +75,28 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         first.display()
     ));
     Ok(Outcome::Done)
+}
+
+/// Copies the files that a script names into the folder, as far as they are there.
+fn copy_files(names: &[String], script: Option<&Path>, folder: &Path) -> anyhow::Result<()> {
+    let beside = script.and_then(Path::parent).filter(|beside| *beside != Path::new(""));
+    let beside = beside.unwrap_or(Path::new("."));
+    if beside.canonicalize().ok() == folder.canonicalize().ok() {
+        return Ok(());
+    }
+    for name in names {
+        let (from, to) = (beside.join(name), folder.join(name));
+        if !from.is_file() {
+            continue;
+        }
+        let bytes = std::fs::read(&from).with_context(|| format!("cannot read {}", from.display()))?;
+        match std::fs::read(&to) {
+            Ok(there) if there == bytes => {}
+            Ok(_) => anyhow::bail!("{} holds another file already: expected a new folder", to.display()),
+            Err(_) => OutputFile::write(to, &bytes, false)?,
+        }
+    }
+    Ok(())
 }
 
 /// Other scripts in the folder would become frames of the same animation.

@@ -4,9 +4,10 @@
 //! ends the run before that (an error, a full disk, Ctrl-C), the old file stays. A run that is killed leaves its
 //! temporary file behind. A later run that writes into the same folder removes it (`leftover`).
 //!
-//! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files.
+//! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files. [`library_beside`] gives the
+//! models in the folder of a script.
 //!
-//! This crate knows neither pictures nor signals, and of scenes only the names. A program that exits
+//! This crate knows neither pictures nor signals, and of scenes only the names of files. A program that exits
 //! without unwinding calls [`remove_unfinished`].
 //!
 //! ```
@@ -20,11 +21,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod beside;
 mod folder;
 mod input;
 mod leftover;
 mod output;
 
+pub use beside::{library_beside, named_by_scripts};
 pub use folder::{Folder, NotRead};
 pub use input::{NotAFile, open};
 pub use output::{Error, OutputFile, probe, remove_unfinished};

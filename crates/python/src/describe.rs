@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use rayfold_scene::{Clause, Curve, Field, Form, Kind, Mode, Names, Subject, Unit, Values};
+use rayfold_scene::{Clause, Curve, Field, Form, Kind, Mode, Names, Quotes, Subject, Unit, Values};
 
 use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, is_color};
 
@@ -56,7 +56,17 @@ pub(crate) fn method_doc(method: &Signature) -> String {
         let about = match parameter.role {
             Role::Name(Subject::Defines(names)) => format!("the name of the new {}", names.noun()),
             Role::Name(Subject::Refers(names)) => format!("the name of a {}", names.noun()),
+            Role::Name(Subject::Quotes(Quotes::File)) => {
+                "the name of a file in the script's folder; of a scene that has none, in the current folder".to_owned()
+            }
+            Role::Smooth => "faces that meet at less than this angle in degrees, 0 to 180, look smooth".to_owned(),
+            Role::Flat => "whether the normals of the file are left out".to_owned(),
             Role::Field(i) => field_doc(&form.fields[i]),
+            Role::Material(_) if form.takes(0) => {
+                "the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By \
+                 default that of the file"
+                    .to_owned()
+            }
             Role::Material(_) => {
                 "the surface: a `Material`, the name of one, or a colour for `diffuse`; in its \
                                   place the clauses below. Black by default"
@@ -179,6 +189,8 @@ fn parameter_type(form: &Form, parameter: &Parameter) -> String {
         Role::Name(_) => "str".to_owned(),
         Role::Field(i) => field_type(form, &form.fields[i]),
         Role::Material(_) => "Material | str".to_owned(),
+        Role::Smooth => "FixedNumber".to_owned(),
+        Role::Flat => "bool".to_owned(),
     }
 }
 

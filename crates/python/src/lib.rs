@@ -38,7 +38,8 @@ fn methods() -> Vec<Method> {
     let parameter = |method: &signature::Signature, parameter: &signature::Parameter| {
         let numbers = match parameter.role {
             signature::Role::Field(i) => method.command.form().fields[i].names.len(),
-            signature::Role::Name(_) | signature::Role::Material(_) => 0,
+            signature::Role::Smooth => 1,
+            signature::Role::Name(_) | signature::Role::Material(_) | signature::Role::Flat => 0,
         };
         (parameter.name.clone(), parameter.is_required, numbers)
     };

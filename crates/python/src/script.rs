@@ -6,13 +6,17 @@
 //! Invariants: a call that fails adds nothing but, perhaps, a material that nothing uses. A material is defined outside of
 //! groups and before its use.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
+use rayfold_files::library_beside;
+use rayfold_scene::assets::file_name;
 use rayfold_scene::{
-    Command, Diagnostic as SceneDiagnostic, Limits, Names, Script as Parsed, Subject, parse,
+    Command, Diagnostic as SceneDiagnostic, Limits, Names, Quotes, Script as Parsed, Subject,
+    parse_with_files, quoted_word,
 };
 
 use crate::error::{Diagnostic, guarded, scene_error};
@@ -71,8 +75,7 @@ impl Script {
             return Ok(parsed.clone());
         }
         let text = self.whole();
-        let name = &self.name;
-        let result = py.detach(|| guarded(|| parse(name, text.as_bytes(), &Limits::default())))?;
+        let result = self.parse(py, &text)?;
         let warnings = |d: &SceneDiagnostic| !d.is_error();
         match result.script {
             Some(script) => {
@@ -85,6 +88,13 @@ impl Script {
             }
             None => Err(scene_error(py, result.diagnostics)),
         }
+    }
+
+    /// Parses a text, with the models of the script's folder.
+    fn parse(&self, py: Python<'_>, text: &str) -> PyResult<rayfold_scene::Parsed> {
+        let name = &self.name;
+        let library = library_beside(Path::new(name));
+        py.detach(|| guarded(|| parse_with_files(name, text.as_bytes(), &Limits::default(), &library)))
     }
 
     /// Returns the text with its last `Trace`.
@@ -161,6 +171,7 @@ impl Script {
         let mut numbers = Numbers::new();
         let mut subject = None;
         let mut surface = None;
+        let mut options = String::new();
         for (i, parameter) in method.parameters.iter().enumerate() {
             let place = Place { method: &method.method, parameter: &parameter.name };
             match (parameter.role, &given.values[i]) {
@@ -183,7 +194,12 @@ impl Script {
                     }
                 }
                 (Role::Material(_), value) => surface = Some(value.clone()),
-                (Role::Name(_), None) => {}
+                (Role::Smooth, Some(value)) => options = smooth(value, place)?,
+                (Role::Flat, Some(value)) if value.is_truthy()? && !options.is_empty() => {
+                    return Err(PyTypeError::new_err(format!("{place}: a mesh is either smooth or flat")));
+                }
+                (Role::Flat, Some(value)) if value.is_truthy()? => options.push_str(" flat"),
+                (Role::Name(_) | Role::Smooth | Role::Flat, _) => {}
             }
         }
         let names =
@@ -193,10 +209,12 @@ impl Script {
         } else if let Some(fault) = method.command.check(numbers.values()).into_iter().next() {
             return Err(refused(&method.method, form, &names().collect::<Vec<_>>(), numbers.values(), fault));
         }
-        if let Some(value) = surface {
+        let is_bare = form.takes(0) && given.clauses.is_empty();
+        if let Some(value) = surface.filter(|value| !is_bare || value.is_some()) {
             line.push(' ');
             self.material_of(method, value.as_ref(), given.clauses, &mut line)?;
         }
+        line += &options;
         self.line = line;
         Ok(subject)
     }
@@ -206,12 +224,20 @@ impl Script {
     /// # Errors
     /// Fails for a name that is not valid, is there already, or is not there yet.
     fn name_of(&self, kind: Subject, value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
+        if matches!(kind, Subject::Quotes(Quotes::File)) {
+            let name = value
+                .extract::<String>()
+                .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
+            file_name(&name).map_err(|fault| PyValueError::new_err(format!("{place}: {fault}")))?;
+            return Ok(quoted_word(&name));
+        }
         let name = name_from(value, place)?;
         let (is_known, noun) = match kind {
             Subject::Defines(names) | Subject::Refers(names) => match names {
                 Names::Materials => (self.materials.has(&name), names.noun()),
                 Names::Groups => (self.groups.contains(&name), names.noun()),
             },
+            Subject::Quotes(_) => return Ok(quoted_word(&name)),
         };
         match (kind, is_known) {
             (Subject::Defines(_), true) => Err(PyValueError::new_err(format!(
@@ -399,6 +425,13 @@ impl Script {
         Ok(())
     }
 
+    /// Returns the folder of the script, and the names of the files in it that the script names.
+    fn _files(&self, py: Python<'_>) -> PyResult<(String, Vec<String>)> {
+        let folder = Path::new(&self.name).parent().unwrap_or(Path::new("")).display().to_string();
+        let files = if self.text.contains('"') { self.parse(py, &self.whole())?.files } else { Vec::new() };
+        Ok((folder, files))
+    }
+
     fn _assign(&mut self, other: &Self) {
         *self = other.clone();
     }
@@ -456,8 +489,7 @@ impl Script {
     /// Returns all errors and warnings about the script, without drawing it.
     fn check(&self, py: Python<'_>) -> PyResult<Vec<Diagnostic>> {
         let text = self.whole();
-        let name = &self.name;
-        let result = py.detach(|| guarded(|| parse(name, text.as_bytes(), &Limits::default())))?;
+        let result = self.parse(py, &text)?;
         Ok(result.diagnostics.into_iter().map(Diagnostic).collect())
     }
 }
@@ -480,6 +512,20 @@ impl Script {
         self.is_open = true;
         defined.map(|()| Material(surface))
     }
+}
+
+/// Returns the words that make a mesh smooth.
+///
+/// # Errors
+/// Fails for an angle that is none.
+fn smooth(angle: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
+    let degrees: f64 = angle.extract().map_err(|_| {
+        PyTypeError::new_err(format!("{place} takes a number of degrees, not {}", shown(angle)))
+    })?;
+    if !(0.0..=180.0).contains(&degrees) {
+        return Err(PyValueError::new_err(format!("{place}={degrees}: the angle must be from 0 to 180")));
+    }
+    Ok(format!(" smooth {degrees}"))
 }
 
 /// Returns whether a word is the only argument.

@@ -7,7 +7,9 @@
 
 use std::sync::LazyLock;
 
-use rayfold_scene::{Clause, Command, Field, Form, Kind, Names, Parameter as Meaning, Presence, Subject};
+use rayfold_scene::{
+    Clause, Command, Field, Form, Kind, Names, Parameter as Meaning, Presence, Quotes, Subject,
+};
 
 /// A method of `Scene`.
 #[derive(Debug)]
@@ -44,6 +46,10 @@ pub(crate) enum Role {
     Field(usize),
     /// The material of an object, in place of all fields from this index on.
     Material(usize),
+    /// The angle up to which the faces of a mesh are smooth.
+    Smooth,
+    /// Whether a mesh is flat.
+    Flat,
 }
 
 /// All methods, in the order of the documentation.
@@ -60,7 +66,11 @@ impl Signature {
         let mut parameters = Vec::new();
         if let Some(subject) = form.subject {
             let is_required = true;
-            parameters.push(Parameter { name: "name".to_owned(), role: Role::Name(subject), is_required });
+            let name = match subject {
+                Subject::Quotes(Quotes::File) => "file",
+                Subject::Defines(_) | Subject::Refers(_) => "name",
+            };
+            parameters.push(Parameter { name: name.to_owned(), role: Role::Name(subject), is_required });
         }
         let own = own_fields(form);
         for (name, i) in field_names(form).into_iter().zip(0..own) {
@@ -70,6 +80,10 @@ impl Signature {
         if form.surface().is_some() {
             let (name, role) = ("material".to_owned(), Role::Material(own));
             parameters.push(Parameter { name, role, is_required: false });
+        }
+        if command == Command::Mesh {
+            let option = |name: &str, role| Parameter { name: name.to_owned(), role, is_required: false };
+            parameters.extend([option("smooth", Role::Smooth), option("flat", Role::Flat)]);
         }
         let mut signature = Self { command, method: identifier(command.name()), parameters };
         signature.make_unique();

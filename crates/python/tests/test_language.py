@@ -15,7 +15,8 @@ CLAUSES = dict(_rayfold.clauses())
 
 def usage(doc):
     """The names of the numbers in the syntax that a docstring shows."""
-    return re.search(r"In a script: `(.*?)( or \w+)?`", doc)[1].replace("[", "").replace("]", "").split()
+    syntax = re.search(r"In a script: `(.*?)( or \w+)?`", doc)[1].replace(" or flat]", "]")
+    return syntax.replace("[", "").replace("]", "").split()
 
 
 def numbers(step, first):
@@ -34,6 +35,8 @@ def arguments(parameters, doc, next_number):
             values[name] = words[-1]
         elif kind == "str":
             values[name] = "thing"
+        elif kind == "bool":
+            values[name] = False
         elif kind == "int":
             values[name] = max(int(next_number()), 1)
         else:
@@ -59,7 +62,9 @@ def surroundings(name):
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_every_command_is_reached_with_all_its_parameters(name):
+def test_every_command_is_reached_with_all_its_parameters(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "thing").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     doc, parameters, _ = METHODS[name]
     refused = []
     for values in attempts(parameters, doc):

@@ -9,8 +9,8 @@ use std::ops::Range;
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
     Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, InvalidValue, Lamp, Lens,
-    Light, Look, MATERIAL, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples, Screen, Shutter, Tone,
-    USE, shapes, with_shapes,
+    Light, Look, MATERIAL, MESH, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples, Screen, Shutter,
+    Tone, USE, mesh_surface, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -39,6 +39,8 @@ pub(crate) enum Effect {
     End,
     Use,
     Object(Reader<Object>),
+    /// Draws a model of a file.
+    Mesh,
     Light(Reader<Light>),
     /// Removes objects and lights.
     Clear,
@@ -119,6 +121,7 @@ with_shapes! { commands! {
         Depth: Depth::FORM, Effect::Depth, "The largest number of reflections and refractions of a ray.";
     }
     after {
+        Mesh: MESH, Effect::Mesh, "The triangles of a model in a file.";
         Material: MATERIAL, Effect::Material, "A surface material with a name.";
         Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
         End: Form::new("End", &[]), Effect::End, "Ends a group.";
@@ -229,6 +232,9 @@ impl Command {
             Effect::Object(read) => read(numbers).err(),
             Effect::Light(read) => read(numbers).err(),
             Effect::Use => Placement::read(numbers).err(),
+            // Without numbers it has the surface of its file.
+            Effect::Mesh if numbers.is_word() => None,
+            Effect::Mesh => mesh_surface(numbers).err(),
             Effect::Material | Effect::Group | Effect::End | Effect::Clear | Effect::Trace => None,
         }
     }

@@ -89,6 +89,14 @@ pub enum Code {
     UnclosedGroup,
     /// A picture with pixels that are not square.
     SquashedImage,
+    /// A word in quotes that is malformed, or is no name of a file.
+    MalformedQuote,
+    /// A file that a script names and that is absent or cannot be used.
+    UnusableFile,
+    /// A part of a file that is not drawn as its author may expect.
+    UnusedPart,
+    /// A clause without effect on an object.
+    NoEffect,
     /// A file that is no text.
     NotText,
     /// A lens, a shutter or the size of a light, with one ray per pixel.

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::command::Command;
 use crate::curve::{CYCLE, Mode};
-use crate::form::{Field, Form, Names, Presence, Subject, Values};
+use crate::form::{Field, Form, Names, Presence, Quotes, Subject, Values};
 use crate::model::Clause;
 
 /// The version of the language.
@@ -42,7 +42,8 @@ pub struct CommandEntry {
     pub usage: String,
     /// A one-line summary.
     pub about: &'static str,
-    /// The name before the numbers: its role (`defines` or `refers`) and its kind (`material` or `group`).
+    /// The name before the numbers: its role (`defines`, `refers` or `quotes`) and its kind (`material`, `group` or
+    /// `file`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<SubjectEntry>,
     /// The numbers, parameter by parameter.
@@ -66,9 +67,9 @@ pub struct CommandEntry {
 /// A name before the numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectEntry {
-    /// The role, `defines` or `refers`.
+    /// The role, `defines`, `refers` or `quotes`: a word in quotes.
     pub role: &'static str,
-    /// The kind, `material` or `group`.
+    /// The kind, `material`, `group` or `file`.
     pub of: &'static str,
 }
 
@@ -138,13 +139,14 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     let subject = form.subject.map(|subject| match subject {
         Subject::Defines(names) => SubjectEntry { role: "defines", of: names.noun() },
         Subject::Refers(names) => SubjectEntry { role: "refers", of: names.noun() },
+        Subject::Quotes(Quotes::File) => SubjectEntry { role: "quotes", of: "file" },
     });
     CommandEntry {
         name: form.name,
         usage: form.to_string(),
         about,
         subject,
-        parameters: form.fields.iter().map(parameter).collect(),
+        parameters: form.fields.iter().map(|field| parameter(form, field)).collect(),
         together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
@@ -153,8 +155,10 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     }
 }
 
-fn parameter(field: &'static Field) -> ParameterEntry {
+fn parameter(form: &Form, field: &'static Field) -> ParameterEntry {
     let presence = match field.presence {
+        // Ambient and diffuse stand or are omitted together.
+        Presence::Required if form.takes(0) => "optional",
         Presence::Required => "required",
         Presence::Optional(_) => "optional",
         Presence::FromTheEnd(_) => "from the end",
@@ -185,6 +189,6 @@ fn parameter(field: &'static Field) -> ParameterEntry {
             _ => &[],
         },
         presence,
-        default: field.presence.default(),
+        default: field.presence.default().or(form.takes(0).then_some("that of the file")),
     }
 }

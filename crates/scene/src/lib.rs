@@ -1,6 +1,7 @@
 //! Parser and writer of scene scripts: text to typed scenes and back, with all diagnostics.
 //!
-//! Knows no other crate of the project and does no I/O: text comes in, scenes and diagnostics go out.
+//! Does no I/O: text comes in, scenes and diagnostics go out. Of the other crates it knows `rayfold-assets` alone, which
+//! decodes the files that scripts name; their bytes come from the caller ([`parse_with_files`]).
 //!
 //! ```
 //! use rayfold_scene::{Limits, parse};
@@ -33,11 +34,13 @@ mod shown;
 pub use command::Command;
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use form::{Constraint, Field, Form, Kind, Names, Presence, Subject, Unit, Values, color_levels};
+pub use form::{
+    Constraint, Field, Form, Kind, Names, Presence, Quotes, Subject, Unit, Values, color_levels, quoted_word,
+};
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::shapes::{
-    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Motion, Object, Placement, Plane, Sphere, Torus,
+    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Mesh, Motion, Object, Placement, Plane, Sphere, Torus,
     Triangle,
 };
 pub use model::{
@@ -47,7 +50,8 @@ pub use model::{
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;
-pub use parse::{Parsed, is_name, parse, parse_curve};
+pub use parse::{Parsed, is_name, parse, parse_curve, parse_with_files};
+pub use rayfold_assets as assets;
 pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};
 pub use shared_slice::SharedSlice;

@@ -1,6 +1,7 @@
 //! Checks the table of commands: the parser accepts and refuses what the table says.
 
-use rayfold_scene::{Code, Command, Diagnostic, Field, Limits, Presence, Values, parse};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Code, Command, Diagnostic, Field, Limits, Presence, Values, parse_with_files};
 
 /// Returns a valid line of the command with all of its numbers.
 fn sample(command: Command) -> &'static str {
@@ -25,6 +26,7 @@ fn sample(command: Command) -> &'static str {
         Command::Cone => "Cone 1 2 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Torus => "Torus 3e300 5e-324 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Capsule => "Capsule 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Mesh => "Mesh \"corner.obj\" .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Material => "Material red diffuse 1 0 0",
         Command::Group => "Group ball",
         Command::End => "End",
@@ -46,7 +48,10 @@ fn errors(line: &str) -> Vec<Diagnostic> {
         _ => ("", ""),
     };
     let script = format!("Screen 4 3\n{before}{line}\n{behind}Trace\n");
-    let mut errors = parse("a.txt", script.as_bytes(), &Limits::default()).diagnostics;
+    let corner = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let files = Library::new(MemoryFiles::from([("corner.obj", corner.to_vec())]));
+    let parsed = parse_with_files("a.txt", script.as_bytes(), &Limits::default(), &files);
+    let mut errors = parsed.diagnostics;
     errors.retain(|d| d.is_error() && d.code != Code::LimitExceeded);
     errors
 }
@@ -162,7 +167,8 @@ fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
             let mut end = 0;
             let is_taken = count >= least
                 && (count == 0
-                    || form.fields.iter().any(|field| {
+                    // Ambient and diffuse stand or are omitted together.
+                    || (!form.takes(0) || form.required() <= count) && form.fields.iter().any(|field| {
                         let start = end;
                         end += field.names.len();
                         count == end
@@ -172,7 +178,8 @@ fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
             let expect: &[Code] = if is_taken { &[] } else { &[Code::TooFewParameters] };
             assert_eq!(faults, expect, "{count} numbers of {}", command.name());
         }
-        let is_required = |field: &&Field| field.presence == Presence::Required;
+        // The surface of a mesh is omitted as a whole.
+        let is_required = |field: &&Field| field.presence == Presence::Required && !form.takes(0);
         let required: usize = form.fields.iter().filter(is_required).map(|field| field.names.len()).sum();
         assert_eq!(least, required, "{}", command.name());
     }

@@ -5,10 +5,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
 
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
-use rayfold_scene::{Clause, Command, Diagnostic, Form, Limits, Script, Values, parse};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Clause, Command, Diagnostic, Form, Limits, Script, Values, parse_with_files};
 
 /// A constant number or a curve.
 #[derive(Clone, Debug)]
@@ -126,6 +129,16 @@ fn numbers(form: &Form, draft: &Draft) -> String {
     text
 }
 
+/// Returns the file that a command names, if it names one.
+fn file(command: Command) -> &'static str {
+    if command == Command::Mesh { " \"corner.obj\"" } else { "" }
+}
+
+/// Returns the words behind the surface of a mesh.
+fn options(command: Command, draft: &Draft) -> &'static str {
+    if command == Command::Mesh { ["", " flat", " smooth 40.5"][draft.left_out % 3] } else { "" }
+}
+
 /// Makes a script of these lines. Lines that are not allowed in their place are left out.
 fn script(drafts: &[Draft]) -> String {
     // Two plain materials, so that objects and patterns always have one to name.
@@ -184,10 +197,11 @@ fn script(drafts: &[Draft]) -> String {
                     }
                 }
                 words.truncate(form.surface().unwrap());
-                format!("{command} {} {}", words.join(" "), materials[draft.name % materials.len()])
+                let name = &materials[draft.name % materials.len()];
+                format!("{command}{} {} {name}{}", file(command), words.join(" "), options(command, draft))
             }
             _ if is_open && !is_object => continue,
-            _ => format!("{command}{}", numbers(form, draft)),
+            _ => format!("{command}{}{}{}", file(command), numbers(form, draft), options(command, draft)),
         };
         text += &line;
         text += "\n";
@@ -196,7 +210,11 @@ fn script(drafts: &[Draft]) -> String {
 }
 
 fn read(text: &str) -> Result<Script, Vec<Diagnostic>> {
-    let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+    static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
+        let corner = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        Library::new(MemoryFiles::from([("corner.obj", corner.to_vec())]))
+    });
+    let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &LIBRARY);
     parsed.script.ok_or(parsed.diagnostics)
 }
 

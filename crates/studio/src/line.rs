@@ -21,6 +21,8 @@ pub struct Words {
     pub subject: Option<Range<usize>>,
     /// The parameters. A curve in brackets is one, and a colour such as `#ff8000` three with the same span.
     pub parameters: Vec<Range<usize>>,
+    /// The words behind the surface of a mesh, such as `smooth 40`.
+    pub options: Option<Range<usize>>,
     /// The comment, from its sign to the end of the text.
     pub comment: Option<Range<usize>>,
 }
@@ -86,6 +88,7 @@ impl Line {
         let mut comment = None;
         let mut words = Vec::new();
         let mut at = start;
+        // A `#` in quotes begins no comment.
         while at < body.len() {
             if is_separator(body[at]) {
                 at += 1;
@@ -105,7 +108,7 @@ impl Line {
                 at = body[at..code].iter().position(|&byte| byte == b')').map_or(code, |end| at + end + 1);
             } else {
                 while at < body.len() && !is_separator(body[at]) && !matches!(body[at], b'(' | b'#') {
-                    at += 1;
+                    at = if body[at] == b'"' { behind_quotes(body, at) } else { at + 1 };
                 }
             }
             words.push(from..at);
@@ -115,7 +118,19 @@ impl Line {
         let has_subject = self.command().is_some_and(|command| command.form().subject.is_some());
         let subject = if has_subject { words.next() } else { None };
         let comment = comment.map(|at| at..body.len());
-        Some(Words { command, subject, parameters: words.collect(), comment })
+        let mut parameters: Vec<_> = words.collect();
+        let is_option = |word: &Range<usize>| {
+            let word = self.word(word);
+            word.eq_ignore_ascii_case("smooth") || word.eq_ignore_ascii_case("flat")
+        };
+        let mut options = None;
+        if self.command() == Some(Command::Mesh)
+            && let Some(first) = parameters.iter().position(is_option)
+        {
+            options = parameters.last().map(|last| parameters[first].start..last.end);
+            parameters.truncate(first);
+        }
+        Some(Words { command, subject, parameters, options, comment })
     }
 
     /// Returns whether a colour such as `#ff8000` may follow these words, the first of which is the command.
@@ -175,7 +190,7 @@ impl Line {
         let words = self.words()?;
         let name: String = name.chars().filter(|c| !c.is_control()).collect();
         let name = name.trim().trim_start_matches('#').trim();
-        let last = words.last().end;
+        let last = words.options.as_ref().unwrap_or(words.last()).end;
         let body = self.body().len();
         Some(match (&words.comment, name) {
             (Some(_), "") => self.with(&[(last..body, String::new())]),
@@ -264,7 +279,7 @@ impl Words {
         self.parameters[..at].iter().rev().take_while(|before| **before == self.parameters[at]).count()
     }
 
-    /// Returns the last word before the comment.
+    /// Returns the last word before the options and the comment.
     fn last(&self) -> &Range<usize> {
         self.parameters.last().or(self.subject.as_ref()).unwrap_or(&self.command)
     }
@@ -287,6 +302,19 @@ pub(crate) fn written(number: f64) -> String {
     } else {
         format!("{number:e}")
     }
+}
+
+/// Returns the end of quotes that begin at `at`; that of the line if they are not closed.
+fn behind_quotes(body: &[u8], at: usize) -> usize {
+    let mut next = at + 1;
+    while next < body.len() {
+        match body[next] {
+            b'"' => return next + 1,
+            b'\\' => next += 2,
+            _ => next += 1,
+        }
+    }
+    body.len()
 }
 
 fn is_separator(byte: u8) -> bool {

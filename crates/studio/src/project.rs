@@ -8,10 +8,13 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
-use rayfold_files::{Folder, NotRead, OutputFile};
-use rayfold_scene::{AnimationSettings, Diagnostic, Limits, Script, natural_cmp, parse, script_name};
+use rayfold_files::{Folder, NotRead, OutputFile, library_beside};
+use rayfold_scene::assets::{Library, file_name};
+use rayfold_scene::{
+    AnimationSettings, Diagnostic, Limits, Script, natural_cmp, parse_with_files, script_name,
+};
 use serde::Serialize;
 
 use crate::document::{Document, Splice};
@@ -22,6 +25,9 @@ use crate::line::Line;
 use crate::settings::Settings;
 use crate::text_edit::{self, TextChange};
 use crate::tracks::{Tracks, tracks};
+
+/// The endings of models.
+const MODELS: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];
 
 /// The longest name of a new script in bytes. File systems allow 255, and a receipt in a bucket adds to it.
 const NAME: usize = 200;
@@ -75,6 +81,11 @@ pub struct Opened {
     /// and the numbers that change.
     frame: RefCell<Option<(usize, Arc<Frame>)>>,
     tracks: OnceCell<Tracks>,
+    /// The folder of the script, and the models in it.
+    folder: PathBuf,
+    library: Arc<Library>,
+    /// The files that the script names, each with its state when it was parsed.
+    named: Vec<(Option<(u64, SystemTime)>, String)>,
 }
 
 /// The open scripts of an animation.
@@ -273,6 +284,8 @@ impl Project {
 impl Opened {
     fn open(name: String, path: PathBuf) -> Result<Self, Error> {
         // So a link keeps pointing to the file that is written.
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let library = library_beside(&path);
         let path = path.canonicalize().unwrap_or(path);
         let on_disk = read(&path)?;
         let text = on_disk.clone().unwrap_or_else(|| STARTER.into());
@@ -288,6 +301,9 @@ impl Opened {
             failure: String::new(),
             frame: RefCell::default(),
             tracks: OnceCell::new(),
+            folder,
+            library,
+            named: Vec::new(),
         };
         file.parse();
         Ok(file)
@@ -352,13 +368,34 @@ impl Opened {
 
     fn parse(&mut self) {
         let limits = Limits { max_described: DESCRIBED, ..Limits::default() };
-        let parsed = parse(&self.name, &self.document.bytes(), &limits);
+        let parsed = parse_with_files(&self.name, &self.document.bytes(), &limits, &self.library);
+        self.named = parsed.files.into_iter().map(|name| (self.state_of(&name), name)).collect();
         self.diagnostics = parsed.diagnostics;
         if parsed.script.is_some() {
             self.script = parsed.script.map(Arc::new);
         }
         self.frame = RefCell::default();
         self.tracks = OnceCell::new();
+    }
+
+    /// Returns the names of the models in the script's folder, in natural order.
+    pub(crate) fn models(&self) -> Vec<String> {
+        let folder = if self.folder == Path::new("") { Path::new(".") } else { &self.folder };
+        let names = folder.read_dir().into_iter().flatten();
+        let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        let is_model = |name: &String| {
+            let ending = name.rsplit('.').next().unwrap_or_default();
+            MODELS.iter().any(|known| ending.eq_ignore_ascii_case(known)) && file_name(name).is_ok()
+        };
+        let mut names: Vec<_> = names.filter(is_model).collect();
+        names.sort_by(|a, b| natural_cmp(a, b));
+        names
+    }
+
+    /// Returns the state of a file that the script names.
+    fn state_of(&self, name: &str) -> Option<(u64, SystemTime)> {
+        let metadata = self.folder.join(name).metadata().ok()?;
+        Some((metadata.len(), metadata.modified().ok()?))
     }
 
     /// Returns a frame, counted from 0.
@@ -387,7 +424,12 @@ impl Opened {
             // The file was gone and is there again.
             let is_back = self.saved == Saved::Conflict && self.changed.is_none();
             self.saved = if is_back { Saved::Yes } else { self.saved };
-            return is_back.then(Vec::new);
+            // A file that the script names may have changed.
+            let is_new = self.named.iter().any(|(state, name)| *state != self.state_of(name));
+            if is_new {
+                self.parse();
+            }
+            return (is_back || is_new).then(Vec::new);
         }
         if self.changed.is_some() || theirs.is_none() {
             let news = self.saved != Saved::Conflict;

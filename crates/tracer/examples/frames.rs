@@ -8,7 +8,8 @@
 use std::hash::{DefaultHasher, Hasher};
 use std::process::ExitCode;
 
-use rayfold_scene::{Limits, parse};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Limits, parse_with_files};
 use rayfold_tracer::{Level, Precision, RenderError, RenderOptions, render_frame};
 
 /// The exit code for a scene that needs a feature which this build leaves out.
@@ -35,7 +36,14 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         "f64" => Precision::F64,
         _ => Precision::Auto,
     };
-    let parsed = parse(path, &std::fs::read(path)?, &Limits::default());
+    // The model beside the script, if there is one.
+    let model = std::path::Path::new(path).with_file_name("model.obj");
+    let mut files = MemoryFiles::default();
+    if let Ok(bytes) = std::fs::read(model) {
+        files.insert("model.obj", bytes);
+    }
+    let library = Library::new(files);
+    let parsed = parse_with_files(path, &std::fs::read(path)?, &Limits::default(), &library);
     let script = parsed.script.ok_or("not a script")?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
     let mut digest = DefaultHasher::new();

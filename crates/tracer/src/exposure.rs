@@ -2,6 +2,8 @@
 
 use rayfold_scene::Scene;
 
+use crate::meshes::expanded_count;
+
 /// The number of moments at which a moving scene is drawn, per sample that each pixel has.
 const MOMENTS_FOR_A_SAMPLE: u32 = 2;
 
@@ -69,7 +71,8 @@ impl<'a> Exposure<'a> {
         let samples = self.scene.samples;
         let for_a_sample = if samples.error() > 0.0 { MOMENTS_IF_ADAPTIVE } else { MOMENTS_FOR_A_SAMPLE };
         let wanted = samples.most().saturating_mul(for_a_sample).min(most).next_power_of_two();
-        let few = (OBJECTS / self.scene.objects.len().max(1)).clamp(least as usize, most as usize) as u32;
+        let few = (OBJECTS / expanded_count(&self.scene.objects).max(1)).clamp(least as usize, most as usize)
+            as u32;
         let count = wanted.clamp(least, most).min(1 << few.ilog2());
         let moments: Vec<Scene> =
             (0..count).map(|k| self.at((f64::from(k) + 0.5) / f64::from(count))).collect();

@@ -24,6 +24,7 @@ mod camera;
 mod cut_light;
 mod exposure;
 mod fast;
+mod meshes;
 #[cfg(feature = "accuracy")]
 mod nans;
 mod parallel;

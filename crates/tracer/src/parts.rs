@@ -37,6 +37,7 @@ macro_rules! parts {
 }
 
 parts! {
+    meshes, "meshes", |scene| has(scene, |o| matches!(o, Object::Mesh(_)));
     planes, "planes", |scene| has(scene, |o| matches!(o, Object::Plane(_)));
     discs, "discs", |scene| has(scene, |o| matches!(o, Object::Disc(_)));
     cones, "cones", |scene| has(scene, |o| matches!(o, Object::Cylinder(_) | Object::Cone(_)));

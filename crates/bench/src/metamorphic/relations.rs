@@ -115,6 +115,7 @@ fn lengths(scene: &Scene) -> Vec<f64> {
         Object::Cone(o) => o.ends().to_vec(),
         Object::Torus(o) => vec![o.center(), DVec3::splat(o.thickness())],
         Object::Capsule(o) => [o.ends().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
+        Object::Mesh(o) => o.model().positions().to_vec(),
         Object::Instance(o) => vec![o.placement().translation(), DVec3::splat(o.placement().scale())],
     });
     std::iter::once(eye).chain(lamps).chain(of_objects).flat_map(|v| v.to_array()).collect()

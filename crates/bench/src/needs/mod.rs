@@ -104,6 +104,7 @@ pub fn run(args: &Args) -> Result<()> {
         .map(|(k, subject)| {
             let script = folder.path().join(format!("{k}.txt"));
             std::fs::write(&script, &subject.script)?;
+            std::fs::write(script.with_file_name("model.obj"), subjects::MODEL)?;
             Ok(script)
         })
         .collect::<Result<_>>()?;

@@ -14,7 +14,7 @@ type IsUsed = fn(&Scene) -> bool;
 /// The parts of version 1, and those that all shapes of version 2 share: cargo features, and the scenes that use them.
 const OF_VERSION_1: [(&str, IsUsed); 7] = [
     ("boxes", |scene| has(scene, |o| matches!(o, Object::Cuboid(_)))),
-    ("triangles", |scene| has(scene, |o| matches!(o, Object::Triangle(_)))),
+    ("triangles", |scene| has(scene, |o| matches!(o, Object::Triangle(_) | Object::Mesh(_)))),
     ("mirrors", |scene| scene.objects.iter().any(is_mirror) || uses("glass", scene)),
     ("shadows", |scene| !scene.lights.is_empty() && !is_one_ball(scene)),
     ("tree", |scene| scene.objects.len() > 64),
@@ -39,6 +39,7 @@ pub(super) const VERSION_2: &[&str] = &[
     "capsules",
     "turned-boxes",
     "groups",
+    "meshes",
     "highlights",
     "patterns",
     "glass",
@@ -56,13 +57,13 @@ pub(super) const VERSION_2: &[&str] = &[
 /// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). One of the six is
 /// here in two, since its nine parts together cost a cylinder more than one part may (0.59 %), and neither half does.
 const OF_VERSION_2: [&[&str]; 7] = [
-    &["planes", "groups", "highlights", "glass", "skies", "extents"],
+    &["planes", "groups", "meshes", "highlights", "glass", "skies", "extents"],
     &["planes", "discs", "capsules", "highlights", "patterns", "lenses", "fogs"],
-    &["tori", "capsules", "turned-boxes", "groups", "srgb"],
+    &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb"],
     &["capsules", "turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents", "fogs"],
     &["cones", "tori", "turned-boxes", "groups", "glass", "lamps", "skies", "srgb", "shutters", "fogs"],
     &["discs", "cones", "tori", "highlights", "patterns", "lamps", "skies", "extents"],
-    &["planes", "discs", "cones", "glass", "srgb", "samples", "lenses", "shutters"],
+    &["planes", "discs", "cones", "meshes", "glass", "srgb", "samples", "lenses", "shutters"],
 ];
 
 /// A build of the tracer.

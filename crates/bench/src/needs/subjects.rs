@@ -2,7 +2,8 @@
 
 use anyhow::{Context, Result, bail};
 use glam::DVec3;
-use rayfold_scene::{Limits, Object, Scene, parse};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Limits, Object, Scene, parse_with_files};
 
 use super::parts::is_mirror;
 use crate::scenes::{cloud, example, rock, table};
@@ -25,7 +26,8 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
     let mut subjects = of_version_1()?;
     for (name, lines) in OF_VERSION_2 {
         let script = format!("{BEFORE}{lines}Trace\n");
-        let parsed = parse(name, script.as_bytes(), &Limits::default());
+        let library = Library::new(MemoryFiles::from([("model.obj", MODEL.to_vec())]));
+        let parsed = parse_with_files(name, script.as_bytes(), &Limits::default(), &library);
         let scene = parsed.script.and_then(|script| script.frame(0));
         let scene = scene.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
         subjects.push(Subject { name, precision: "auto", scene, script, is_of_version_2: true });
@@ -40,8 +42,15 @@ Camera 0 2 8   0 -0.2 -1   0 1 0   1   -0.6 -0.45 0.6 0.45
 Ilight 0.9 0.9 0.8   -1 -2 -1
 ";
 
+/// A model with normals, which scenes name as `model.obj`: an octahedron.
+pub(super) const MODEL: &[u8] = b"v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1
+vn 1 0 0\nvn -1 0 0\nvn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1
+f 1//1 3//3 5//5\nf 3//3 2//2 5//5\nf 2//2 4//4 5//5\nf 4//4 1//1 5//5
+f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
+";
+
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 18] = [
+const OF_VERSION_2: [(&str, &str); 19] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -80,6 +89,12 @@ Box -1 -.5 -1  1 .5 1  .1 .1 .1  .6 .2 .2
 End
 Use brick  -1 0 0  10 20 30
 Use brick  1.5 1 -2  40 50 60
+",
+    ),
+    (
+        "a mesh with normals",
+        "Mesh \"model.obj\"
+Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
 ",
     ),
     (

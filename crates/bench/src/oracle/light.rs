@@ -16,11 +16,12 @@ pub(super) struct Arriving {
 }
 
 /// Returns the light that arrives at `point`, or `None` if the source is behind the surface, hidden, or at `point`
-/// itself. Surfaces nearer than `start` contain `point` and are ignored.
+/// itself. Surfaces nearer than `start` contain `point` and are ignored. With a `lift` the shadow ray starts so far from
+/// `point`.
 pub(super) fn arriving(
     scene: &Scene,
     light: &Light,
-    point: &Vector,
+    (point, lift): (&Vector, Option<&Vector>),
     normal: &Vector,
     start: &Real,
 ) -> Option<Arriving> {
@@ -43,7 +44,16 @@ pub(super) fn arriving(
     if normal.dot(&towards).sign() <= 0 {
         return None;
     }
-    let line = Line { origin: point.clone(), direction: towards.clone() };
+    let one = Real::from(1.0);
+    let origin = lift.map_or_else(|| point.clone(), |lift| point.plus(&one, lift));
+    let (direction, distance) = match light {
+        Light::Lamp(lamp) if lift.is_some() => {
+            let way = Vector::from(lamp.position()).minus(&origin);
+            (way.unit(), Some(&way.dot(&way).root() - start))
+        }
+        _ => (towards.clone(), distance),
+    };
+    let line = Line { origin, direction };
     let mut passed = start.clone();
     while let Some(hit) = nearest_on(&scene.objects, &line, &passed) {
         if distance.as_ref().is_some_and(|distance| hit.t >= *distance) {

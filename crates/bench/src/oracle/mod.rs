@@ -27,7 +27,7 @@ mod shapes;
 
 use glam::DVec3;
 use image::RgbImage;
-use rayfold_scene::{Scene, Tone};
+use rayfold_scene::{Object, Scene, Tone};
 use rayon::prelude::*;
 
 use hit::{glass_of, nearest_on};
@@ -114,7 +114,19 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
     let object = &scene.objects[hit.object];
     let material = object.material();
     let (place, face) = shapes::place(object, line, &hit.t);
-    let [ambient, diffuse, mirror] = pattern::coefficients(material, &place, face);
+    let [mut ambient, mut diffuse, mirror] = pattern::coefficients(material, &place, face);
+    let shaded = shapes::shaded(object, line, hit, scene.tone == Tone::Srgb);
+    if let Some(shaded) = &shaded {
+        let color = Vector::from(shaded.color);
+        if shaded.unlit {
+            (ambient, diffuse) = (color, DVec3::ZERO.into());
+        } else {
+            ambient = ambient.times(&color).plus(&Real::from(1.0), &shaded.glow.into());
+            diffuse = diffuse.times(&color);
+        }
+    }
+    let normal = shaded.as_ref().map_or(&hit.normal, |shaded| &shaded.normal);
+    let lift = shaded.as_ref().map(|shaded| &shaded.lift);
     let point = line.at(&hit.t);
     // A point on a surface is rounded, so the ray that leaves it hits the surface again next to its start.
     let farthest = point.to_dvec3().abs().max_element();
@@ -123,18 +135,19 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
     let mut color = ambient;
     let shine = material.finish().and_then(|finish| finish.shine);
     for light in scene.lights.iter() {
-        let Some(arriving) = light::arriving(scene, light, &point, &hit.normal, &start) else { continue };
-        let cosine = hit.normal.dot(&arriving.towards);
+        let Some(arriving) = light::arriving(scene, light, (&point, lift), normal, &start) else { continue };
+        let cosine = normal.dot(&arriving.towards);
         let mut answer = diffuse.times(&Vector([cosine.clone(), cosine.clone(), cosine]));
         if let Some(shine) = shine {
             let towards_eye = line.direction.unit().opposite();
-            let part = light::highlight(shine.exponent(), &hit.normal, &arriving.towards, &towards_eye);
+            let part = light::highlight(shine.exponent(), normal, &arriving.towards, &towards_eye);
             answer = answer.plus(&Real::from(part), &shine.color().into());
         }
         color = color.plus(&Real::from(1.0), &arriving.color.times(&answer));
     }
 
     let one = Real::from(1.0);
+    let normal = onward_normal(line, normal, hit, object);
     let mut mirrored = mirror;
     let mut through = None;
     let glass = glass_of(object);
@@ -142,14 +155,14 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
         let ior = Real::from(glass.ior());
         let index = if hit.leaves && shapes::has_inside(object) { one.over(&ior) } else { ior };
         let direction = line.direction.unit();
-        let (share, bent) = glass::refracted(&direction, &hit.normal, &index);
+        let (share, bent) = glass::refracted(&direction, &normal, &index);
         mirrored = Vector(mirrored.0.map(|channel| &channel + &share));
         through = bent.map(|bent| {
             let factor = Vector::from(DVec3::ZERO).plus(&(&one - &share), &glass.color().into());
             (factor, if shapes::has_inside(object) { bent } else { direction })
         });
     }
-    let onwards = [Some((mirrored, reflected(&line.direction, &hit.normal).unit())), through];
+    let onwards = [Some((mirrored, reflected(&line.direction, &normal).unit())), through];
     for (factor, direction) in onwards.into_iter().flatten() {
         let weight = path.weight.times(&factor.magnitude());
         let has_met_glass = path.has_met_glass || glass.is_some();
@@ -166,4 +179,17 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
         }
     }
     color
+}
+
+/// Returns the normal at which a ray goes on: that of the face if a ray would leave on the wrong side of it.
+fn onward_normal(line: &Line, normal: &Vector, hit: &Hit, object: &Object) -> Vector {
+    if reflected(&line.direction, normal).dot(&hit.normal).sign() <= 0 {
+        return hit.normal.clone();
+    }
+    let Some(glass) = glass_of(object).filter(|_| shapes::has_inside(object)) else { return normal.clone() };
+    let ior = Real::from(glass.ior());
+    let index = if hit.leaves { Real::from(1.0).over(&ior) } else { ior };
+    let (_, bent) = glass::refracted(&line.direction.unit(), normal, &index);
+    let is_above = bent.is_some_and(|bent| bent.dot(&hit.normal).sign() >= 0);
+    if is_above { hit.normal.clone() } else { normal.clone() }
 }

@@ -160,6 +160,7 @@ fn shape(object: &Object) -> Result<String> {
             let axes = matrix(DMat3::from_cols(x, y, z), t.center());
             format!("torus {{ {:e}, {:e} {axes}", t.radius(), t.thickness())
         }
+        Object::Mesh(_) => anyhow::bail!("a mesh is not translated"),
         Object::Instance(_) => anyhow::bail!("an object of a group in a group"),
     })
 }

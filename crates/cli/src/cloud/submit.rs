@@ -8,7 +8,7 @@ use anyhow::Context;
 use rayfold_client::{
     Content, Ended, Error, File, Preview, Sending, Submission, Submitted, Waiting, settings_with_frames,
 };
-use rayfold_files::probe;
+use rayfold_files::{named_by_scripts, probe};
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_scene::{Limits, script_name};
 use rayon::prelude::*;
@@ -145,6 +145,7 @@ impl Order {
             Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
         };
         plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
+        must_name_no_files()?;
         let submission = submission(&input, &plan, &animation, console)?;
         Ok(Self { animation, submission, output })
     }
@@ -165,6 +166,16 @@ impl Order {
         }
         fetch::gif(client, &self.animation, &self.output, bucket, console).await
     }
+}
+
+/// Files beside scripts are not read in a bucket yet.
+fn must_name_no_files() -> anyhow::Result<()> {
+    let Some(file) = named_by_scripts().into_iter().next() else { return Ok(()) };
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    anyhow::bail!(
+        "nothing was uploaded: the scripts name files, such as `{name}`, which are not read in a bucket yet; rayfold render \
+         draws them on this machine"
+    )
 }
 
 fn name_of(folder: &Path) -> anyhow::Result<Animation> {

@@ -1,4 +1,4 @@
-//! Drawing again whenever a script changes.
+//! Drawing again whenever a script changes, or a file that a script names.
 //!
 //! Changes are found by looking at the files a few times a second, not by the system's notifications: those are silent on
 //! network drives and in folders that a virtual machine or a container shares, and lose a file that an editor replaces.
@@ -9,6 +9,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
+
+use rayfold_files::named_by_scripts;
 
 use crate::console::Console;
 use crate::input::is_part_of_animation;
@@ -31,11 +33,17 @@ pub(super) fn draw_again(
     mut draw: impl FnMut() -> anyhow::Result<()>,
 ) -> anyhow::Result<Outcome> {
     loop {
-        let drawn = look(inputs);
+        let mut drawn = look(inputs);
         match draw() {
             Err(error) if interrupt::signalled() || error.is::<Usage>() => return Err(error),
             Err(error) => console.error(&error),
             Ok(()) => {}
+        }
+        // Files that scripts name are known once the scripts were read.
+        for (path, state) in look(inputs) {
+            if is_named(&path) {
+                drawn.entry(path).or_insert(state);
+            }
         }
         interrupt::go_on();
         console.note("waiting for a script to change; Ctrl-C ends this");
@@ -78,7 +86,16 @@ fn look(inputs: &[PathBuf]) -> Seen {
             Err(_) => _ = seen.insert(input.clone(), state(input)),
         }
     }
+    for path in named_by_scripts() {
+        let state = state(&path);
+        seen.insert(path, state);
+    }
     seen
+}
+
+/// Returns whether a path is that of a file which a script names.
+fn is_named(path: &Path) -> bool {
+    !is_part_of_animation(path)
 }
 
 /// `None` for a file that is not there.

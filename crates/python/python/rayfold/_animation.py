@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from . import _arguments, _rayfold
 from ._picture import image_of, picture_of
-from ._scene import Scene, parse
+from ._scene import Scene, copy_files, parse
 
 FORMATS = ("gif", "apng", "webp")
 PATTERN = re.compile(r"%(\d*)d")
@@ -112,9 +112,15 @@ class Animation:
             if not wait:
                 raise ValueError("submit(): there is no file without waiting: expected either path or wait=False")
         scripts, settings = self._folder(has_one_size=True)
+        named = next((name for _, _, (_, names) in scripts for name in names), None)
+        if named is not None:
+            raise ValueError(
+                f"submit(): the scripts name files, such as {named!r}, which are not read in a bucket yet; save() draws them here"
+            )
+        texts = [(name, text) for name, text, _ in scripts]
         with _Progress(progress) as bar:
             report = bar.at if progress else None
-            return _rayfold.submit(address, scripts, settings, path, delete, wait, report)
+            return _rayfold.submit(address, texts, settings, path, delete, wait, report)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         if self._shown is None:
@@ -249,7 +255,7 @@ class Animation:
             _rayfold.write_file(os.path.join(folder, file), image.png())
 
     def _folder(self, has_one_size=False):
-        """The names of the scripts, without `.txt`, and their texts; and the text of `animation.json`."""
+        """The name of each script, without `.txt`, its text and the files that it names; and the text of `animation.json`."""
         if self.loop == -1:
             raise ValueError("animation.json cannot say that an animation is shown once: expected a loop from 0")
         scripts, frames, size = [], 0, None
@@ -263,7 +269,7 @@ class Animation:
                         f"an animation has one size, but frame 1 is {size[0]} x {size[1]} and the scene of frame {frames + 1}"
                         f" has {own[0]} x {own[1]}"
                     )
-            scripts.append((f"{len(scripts) + 1:04d}", str(scene)))
+            scripts.append((f"{len(scripts) + 1:04d}", str(scene), scene._files()))
             frames += scene.frame_count
         if not scripts:
             raise ValueError("an animation needs at least one frame")
@@ -277,13 +283,15 @@ class Animation:
     def _save_scripts(self, folder):
         scripts, settings = self._folder()
         os.makedirs(folder, exist_ok=True)
-        names = {f"{name}.txt" for name, _ in scripts}
+        names = {f"{name}.txt" for name, *_ in scripts}
         others = [file for file in os.listdir(folder) if file.endswith(".txt") and file not in names]
         if others:
             raise FileExistsError(
                 f"{folder} holds other scripts, which would be frames too: {', '.join(sorted(others)[:5])}"
             )
-        for name, text in scripts:
+        for files in dict.fromkeys((own, *names) for _, _, (own, names) in scripts):
+            copy_files(files, folder)
+        for name, text, *_ in scripts:
             _rayfold.write_file(os.path.join(folder, f"{name}.txt"), text.encode())
         _rayfold.write_file(os.path.join(folder, "animation.json"), settings.encode())
 

@@ -1,6 +1,8 @@
 """Scenes: a method for each command of the language, made from its table."""
 
 import inspect
+import os
+import shutil
 
 from . import _arguments, _rayfold
 from ._picture import picture_of
@@ -62,6 +64,8 @@ class Scene(_rayfold.Script):
         """Draws a frame and writes it as PNG; or writes the script, for a path that ends in `.txt`."""
         path = _arguments.path("save", "path", path)
         if path.lower().endswith(".txt"):
+            own, names = self._files()
+            copy_files((own, *names), os.path.dirname(path) or ".")
             _rayfold.write_file(path, str(self).encode())
         elif path.lower().endswith(".png"):
             _rayfold.write_file(path, self._draw("save", frame).png())
@@ -93,6 +97,15 @@ class Group:
         if kind is None:
             self._scene.end()
         return False
+
+
+def copy_files(files, folder):
+    """Copies files into a folder: `files` is their own folder, then their names."""
+    own, *names = files
+    for name in names:
+        source, target = os.path.join(own, name), os.path.join(folder, name)
+        if os.path.exists(source) and not (os.path.exists(target) and os.path.samefile(source, target)):
+            shutil.copyfile(source, target)
 
 
 def _read(text, name):

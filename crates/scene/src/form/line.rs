@@ -113,3 +113,23 @@ pub(crate) fn write_line<T: Scripted>(f: &mut Formatter<'_>, item: &T, surface: 
     item.write(&mut Line::new(f, surface))?;
     f.write_str("\n")
 }
+
+/// Returns a text as a word in quotes, which reads back as the text.
+///
+/// ```
+/// assert_eq!(rayfold_scene::quoted_word("my \"best\" pot.obj"), r#""my \"best\" pot.obj""#);
+/// ```
+pub fn quoted_word(text: &str) -> String {
+    let mut word = String::with_capacity(text.len() + 2);
+    word.push('"');
+    for c in text.chars() {
+        match c {
+            '"' => word.push_str("\\\""),
+            '\\' => word.push_str("\\\\"),
+            '\n' => word.push_str("\\n"),
+            c => word.push(c),
+        }
+    }
+    word.push('"');
+    word
+}

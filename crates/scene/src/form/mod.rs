@@ -13,6 +13,7 @@ use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
 pub use color::color_levels;
+pub use line::quoted_word;
 pub(crate) use line::{Line, Numbers, write_line, write_number};
 
 use crate::model::{Faults, Parameter};
@@ -42,6 +43,10 @@ pub struct Form {
     most: usize,
     /// The first number that the name of a material may replace, together with all that follow.
     surface: Option<usize>,
+    /// Whether all numbers may be omitted together.
+    may_be_bare: bool,
+    /// The usage, where it is not derived from the parameters.
+    usage: Option<&'static str>,
 }
 
 /// A name that follows the command.
@@ -51,6 +56,15 @@ pub enum Subject {
     Defines(Names),
     /// The line refers to a name defined before.
     Refers(Names),
+    /// The word is in quotes.
+    Quotes(Quotes),
+}
+
+/// The meaning of a word in quotes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quotes {
+    /// The plain name of a file in the script's own folder.
+    File,
 }
 
 /// A kind of named items. Each kind has its own names.
@@ -212,7 +226,31 @@ impl Form {
             i += 1;
         }
         let (subject, constraints, curves, ends_with, word, radii) = (None, &[], true, None, None, &[]);
-        Self { name, subject, fields, constraints, curves, ends_with, word, radii, required, most, surface }
+        Self {
+            name,
+            subject,
+            fields,
+            constraints,
+            curves,
+            ends_with,
+            word,
+            radii,
+            required,
+            most,
+            surface,
+            may_be_bare: false,
+            usage: None,
+        }
+    }
+
+    /// Sets the usage, for a line that is more than a row of numbers.
+    pub(crate) const fn with_usage(self, usage: &'static str) -> Self {
+        Self { usage: Some(usage), ..self }
+    }
+
+    /// Makes the numbers those of a surface, which may be omitted together.
+    pub(crate) const fn with_optional_surface(self) -> Self {
+        Self { surface: Some(0), may_be_bare: true, ..self }
     }
 
     /// Adds a name before the numbers.
@@ -259,11 +297,19 @@ impl Form {
 
     /// Returns the least and the largest count of numbers.
     pub const fn arity(&self) -> (usize, usize) {
-        (self.required, self.most)
+        (if self.may_be_bare { 0 } else { self.required }, self.most)
+    }
+
+    /// Returns the count of numbers of the parameters that are required if there is any number.
+    pub const fn required(&self) -> usize {
+        self.required
     }
 
     /// Returns whether this count of numbers is allowed.
     pub fn takes(&self, count: usize) -> bool {
+        if self.may_be_bare && count == 0 {
+            return true;
+        }
         if self.required == self.most {
             return count == self.most;
         }
@@ -280,7 +326,7 @@ impl Form {
 
     /// Returns all allowed counts of numbers.
     pub fn counts(&self) -> impl Iterator<Item = usize> {
-        (self.required..=self.most).filter(|count| self.takes(*count))
+        (self.arity().0..=self.most).filter(|count| self.takes(*count))
     }
 
     /// Returns the first number that the name of a material may replace, together with all that follow.
@@ -321,6 +367,9 @@ impl Form {
 /// Writes the usage: `Sphere R cx cy cz ar ag ab rr rg rb [sr sg sb]` or `Fog r g b d or none`.
 impl Display for Form {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if let Some(usage) = self.usage {
+            return f.write_str(usage);
+        }
         f.write_str(self.name)?;
         if self.subject.is_some() {
             f.write_str(" NAME")?;

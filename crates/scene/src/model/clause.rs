@@ -68,6 +68,7 @@ clauses! {
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
     Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material in a random pattern.";
     Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
+    Own: Form::new("own", &[]), "The colours of a model's file as factors.";
 }
 
 impl Clause {
@@ -129,6 +130,7 @@ impl Clauses {
             Clause::Gradient => {
                 self.finish.pattern = pattern(Weight::Gradient(numbers.number(), numbers.number()))?;
             }
+            Clause::Own => self.finish.own = true,
         }
         Ok(())
     }

@@ -30,6 +30,8 @@ pub struct Finish {
     pub glass: Option<Glass>,
     /// The pattern of other coefficients.
     pub pattern: Option<Pattern>,
+    /// Whether the colour of a model's file multiplies the ambient and diffuse coefficients.
+    pub own: bool,
 }
 
 /// Highlights: for each visible light, light·shine·max(0, N·h)ⁿ (Blinn and Phong).

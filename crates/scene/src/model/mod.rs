@@ -31,14 +31,14 @@ pub use look::Look;
 pub use material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
 pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
-pub use shapes::{Instance, Object, Placement};
+pub use shapes::{Instance, Mesh, Object, Placement};
 pub use vector::unit;
 
 pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
-pub(crate) use shapes::{USE, with_shapes};
+pub(crate) use shapes::{FLAT, MESH, SMOOTH, USE, mesh_surface, with_shapes};
 pub(crate) use vector::PARALLEL;
 
 use crate::shared_slice::SharedSlice;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::doubts::Looks;
 use super::line::Statement;
+use super::meshes::Models;
 use super::text::{Parameters, is_name};
 use super::visibility::{Animated, Origin, Suffix, VisibleSpan, join};
 use super::{Parser, curve, number, wording};
@@ -37,6 +38,8 @@ pub(super) struct GroupInfo {
     /// Whether an object has a colour that needs light.
     pub(super) needs_light: bool,
     pub(super) reach: Reach,
+    /// The models that it draws.
+    pub(super) models: Models,
     contents: Contents,
     visible_span: Option<VisibleSpan>,
 }
@@ -67,6 +70,7 @@ pub(super) struct OpenGroup<'a> {
     pub(super) uses: usize,
     pub(super) needs_light: bool,
     reach: Reach,
+    pub(super) models: Models,
     contents: Contents,
 }
 
@@ -185,6 +189,7 @@ impl<'a> Parser<'a> {
             | Effect::Frames
             | Effect::End
             | Effect::Object(_)
+            | Effect::Mesh
             | Effect::Light(_)
             | Effect::Clear
             | Effect::Trace => {}
@@ -399,6 +404,7 @@ impl<'a> Parser<'a> {
             uses: 0,
             needs_light: false,
             reach: Reach::NONE,
+            models: Models::default(),
             contents: Contents::default(),
         });
     }
@@ -439,9 +445,20 @@ impl<'a> Parser<'a> {
 
     pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
-        let OpenGroup { name, line, subject, recorder, drawn, uses, needs_light, reach, contents, .. } =
-            group;
-        let info = GroupInfo { drawn, uses, needs_light, reach, contents, visible_span: None };
+        let OpenGroup {
+            name,
+            line,
+            subject,
+            recorder,
+            drawn,
+            uses,
+            needs_light,
+            reach,
+            models,
+            contents,
+            ..
+        } = group;
+        let info = GroupInfo { drawn, uses, needs_light, reach, models, contents, visible_span: None };
         if self.groups.define(name, line, subject, Some(info)).is_ok() {
             self.record(|script| script.add_group(recorder.finish(name, drawn)));
         }

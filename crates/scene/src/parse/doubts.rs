@@ -49,6 +49,8 @@ pub(super) struct Doubts<'a> {
 pub(super) struct Looks {
     pub(super) is_diffuse: bool,
     pub(super) refracts: bool,
+    /// Whether it has the colours of a file.
+    pub(super) is_own: bool,
 }
 
 impl Looks {
@@ -59,7 +61,11 @@ impl Looks {
         let is_diffuse = [Clause::Diffuse, Clause::Shine].into_iter().filter_map(has).any(is_bright);
         let refracts = has(Clause::Glass)
             .is_some_and(|line| !matches!(line.row.numbers().get(3), Some(Number::Constant(1.0))));
-        Self { is_diffuse: is_diffuse || other.is_some_and(|other| other.is_diffuse), refracts }
+        Self {
+            is_diffuse: is_diffuse || other.is_some_and(|other| other.is_diffuse),
+            refracts,
+            is_own: has(Clause::Own).is_some(),
+        }
     }
 }
 
@@ -173,6 +179,14 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Warns of the colours of a file on an object that has no file.
+    pub(super) fn doubt_own(&mut self, s: &Statement<'a, '_>, looks: Option<Looks>) {
+        if looks.is_some_and(|looks| looks.is_own) {
+            let span = s.surface.clone().unwrap_or_else(|| s.words.command.clone());
+            self.report.warning(s.line, span, || wording::own_without_file(s.command));
+        }
+    }
+
     /// Records a group that is drawn.
     pub(super) fn doubt_group(&mut self, needs_light: bool) {
         match &mut self.group {
@@ -215,6 +229,7 @@ pub(super) fn looks_of(material: &Material) -> Looks {
         is_diffuse: material.diffuse() != glam::DVec3::ZERO
             || material.finish().is_some_and(|finish| finish.shine.is_some() || finish.pattern.is_some()),
         refracts: material.finish().and_then(|finish| finish.glass).is_some_and(|glass| glass.ior() != 1.0),
+        is_own: material.finish().is_some_and(|finish| finish.own),
     }
 }
 
@@ -222,5 +237,5 @@ pub(super) fn looks_of(material: &Material) -> Looks {
 pub(super) fn looks_in(form: &Form, row: &Row) -> Looks {
     let mut diffuse =
         form.numbers().enumerate().filter(|(_, (_, field))| field.parameter == Parameter::Diffuse);
-    Looks { is_diffuse: diffuse.any(|(i, _)| row.largest(i) != Some(0.0)), refracts: false }
+    Looks { is_diffuse: diffuse.any(|(i, _)| row.largest(i) != Some(0.0)), refracts: false, is_own: false }
 }

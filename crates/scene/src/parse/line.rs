@@ -3,10 +3,10 @@
 use std::ops::Range;
 use std::str::Utf8Error;
 
-use super::text::{Words, is_name};
+use super::text::{Words, is_mesh_option, is_name};
 use super::{Parser, curve, number, wording};
 use crate::command::{Command, Effect, MAX_NUMBERS};
-use crate::form::{Subject, Values, color_levels};
+use crate::form::{Quotes, Subject, Values, color_levels};
 use crate::model::Tone;
 use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
@@ -29,6 +29,8 @@ pub(super) struct Statement<'a, 'w> {
     pub(super) surface: Option<Range<usize>>,
     /// Whether the word of the command's form stands in place of all numbers.
     pub(super) is_word: bool,
+    /// The words behind the surface of a mesh.
+    pub(super) options: Vec<Range<usize>>,
 }
 
 /// The parts of a line's parameters that are not plain numbers.
@@ -69,6 +71,10 @@ pub(super) fn decimal_comma(text: &str, command: Command, words: &Words) -> Opti
         return None;
     }
     let form = command.form();
+    // A comma in quotes is none of a number.
+    if matches!(form.subject, Some(Subject::Quotes(_))) {
+        return None;
+    }
     let start = words.command.end;
     let parameters = text[start..].split('#').next().unwrap_or_default();
     let is_decimal = |part: &&str| {
@@ -139,8 +145,30 @@ impl<'a> Parser<'a> {
         };
         words.read_colors(text.as_bytes(), command.form());
         if matches!(command.effect(), Effect::Material) {
-            let (row, surface, is_word) = (None, None, false);
-            return Some(Statement { line, text, command, words, subject, values, row, surface, is_word });
+            let (row, surface, is_word, options) = (None, None, false, Vec::new());
+            return Some(Statement {
+                line,
+                text,
+                command,
+                words,
+                subject,
+                values,
+                row,
+                surface,
+                is_word,
+                options,
+            });
+        }
+        let options = match command.effect() {
+            Effect::Mesh => words.split_off(|word| is_mesh_option(&text[word])),
+            _ => Vec::new(),
+        };
+        if matches!(command.effect(), Effect::Mesh)
+            && let Some(word) = words.parameters().iter().skip(1).find(|word| is_name(&text[(*word).clone()]))
+        {
+            self.report.error(line, word.clone(), || wording::unknown_mesh_option(&text[word.clone()]));
+            self.faulty_line(line, text, command, subject, words);
+            return None;
         }
         let Some(Parameters { row, surface, is_word }) = self.parameters(line, text, command, words, values)
         else {
@@ -153,7 +181,7 @@ impl<'a> Parser<'a> {
         {
             self.report.warning(line, comma.clone(), || wording::decimal_comma(&text[comma]));
         }
-        Some(Statement { line, text, command, words, subject, values, row, surface, is_word })
+        Some(Statement { line, text, command, words, subject, values, row, surface, is_word, options })
     }
 
     /// Returns the name before the numbers. If it is missing or malformed, returns `None` and reports that.
@@ -165,7 +193,10 @@ impl<'a> Parser<'a> {
         subject: Subject,
         words: &mut Words,
     ) -> Option<Range<usize>> {
-        let (Subject::Defines(names) | Subject::Refers(names)) = subject;
+        let names = match subject {
+            Subject::Defines(names) | Subject::Refers(names) => names,
+            Subject::Quotes(Quotes::File) => return self.quotes(line, text, command, words),
+        };
         let Some(name) = words.take_first() else {
             self.report.error(line, words.end(), || wording::no_name(command, names));
             return None;
@@ -175,6 +206,25 @@ impl<'a> Parser<'a> {
             return None;
         }
         Some(name)
+    }
+
+    /// Returns the word in quotes before the numbers. If it is missing, returns `None` and reports that.
+    fn quotes(
+        &mut self,
+        line: Line<'a>,
+        text: &str,
+        command: Command,
+        words: &mut Words,
+    ) -> Option<Range<usize>> {
+        let Some(word) = words.take_first() else {
+            self.report.error(line, words.end(), || wording::no_file(command, None));
+            return None;
+        };
+        if !text[word.clone()].starts_with('"') {
+            self.report.error(line, word.clone(), || wording::no_file(command, Some(&text[word])));
+            return None;
+        }
+        Some(word)
     }
 
     /// Records that there was a faulty line with this command, so that its absence is not reported.

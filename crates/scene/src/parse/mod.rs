@@ -13,6 +13,7 @@ mod definitions;
 mod doubts;
 mod foreign;
 mod line;
+mod meshes;
 mod names;
 mod number;
 mod picture;
@@ -21,6 +22,8 @@ mod visibility;
 mod wording;
 
 use std::ops::Range;
+
+use rayfold_assets::Library;
 
 use crate::command::{Command, Effect, Reader};
 use crate::diagnostic::Diagnostic;
@@ -35,6 +38,7 @@ pub use curve::parse_curve;
 use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
 use doubts::{Doubts, looks_in, looks_of};
 use line::Statement;
+use meshes::Named;
 use names::Names;
 use picture::Picture;
 pub use text::is_name;
@@ -48,12 +52,20 @@ pub struct Parsed {
     pub script: Option<Script>,
     /// Errors and warnings in the order of the text.
     pub diagnostics: Vec<Diagnostic>,
+    /// The names of the files that the script names, and of those that its models refer to, in order. Some may be absent.
+    pub files: Vec<String>,
 }
 
-/// Parses the script `bytes`. `name` is its name in diagnostics.
+/// Parses the script `bytes` for a caller that reads no files: a script that names one is faulty. `name` is its name in
+/// diagnostics.
 ///
 /// The `Trace` commands become the frames of the script. There is at least one frame.
 pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
+    parse_with_files(name, bytes, limits, &Library::none())
+}
+
+/// Parses the script `bytes`, as [`parse`] does, with the models of `library`: the files of the script's own folder.
+pub fn parse_with_files(name: &str, bytes: &[u8], limits: &Limits, library: &Library) -> Parsed {
     let mut report = Report::new(name, limits.max_described);
     if bytes.len() > limits.max_script_bytes {
         if let Some(line) = lines(bytes).next() {
@@ -64,13 +76,15 @@ pub fn parse(name: &str, bytes: &[u8], limits: &Limits) -> Parsed {
     } else if let Some(what) = foreign::not_text(bytes) {
         report.error(Line { number: 1, offset: 0, bytes: &[] }, 0..0, || wording::not_text(what));
     } else {
-        return Parser::new(limits, report).text(bytes);
+        return Parser::new(limits, report, library).text(bytes);
     }
-    Parsed { script: None, diagnostics: report.finish() }
+    Parsed { script: None, diagnostics: report.finish(), files: Vec::new() }
 }
 
 struct Parser<'a> {
     limits: &'a Limits,
+    library: &'a Library,
+    named: Named,
     report: Report<'a>,
     recorder: Recorder,
     screen: ScreenState,
@@ -131,9 +145,11 @@ enum ScreenState {
 }
 
 impl<'a> Parser<'a> {
-    fn new(limits: &'a Limits, report: Report<'a>) -> Self {
+    fn new(limits: &'a Limits, report: Report<'a>, library: &'a Library) -> Self {
         Self {
             limits,
+            library,
+            named: Named::default(),
             report,
             recorder: Recorder::default(),
             screen: ScreenState::Unset,
@@ -193,7 +209,7 @@ impl<'a> Parser<'a> {
         if self.unknown > self.read {
             self.report.describe_at_most(foreign::DESCRIBED);
         }
-        Parsed { script, diagnostics: self.report.finish() }
+        Parsed { script, diagnostics: self.report.finish(), files: self.named.into_files() }
     }
 
     /// Records that a line could not be read, which may contain anything that is missing.
@@ -229,6 +245,7 @@ impl<'a> Parser<'a> {
             | Effect::Material
             | Effect::Use
             | Effect::Object(_)
+            | Effect::Mesh
             | Effect::Light(_)
             | Effect::Clear => {}
         }
@@ -236,7 +253,9 @@ impl<'a> Parser<'a> {
 
     fn run(&mut self, s: &Statement<'a, '_>) {
         let effect = s.command.effect();
-        if self.group.is_some() && !matches!(effect, Effect::Object(_) | Effect::Use | Effect::End) {
+        if self.group.is_some()
+            && !matches!(effect, Effect::Object(_) | Effect::Mesh | Effect::Use | Effect::End)
+        {
             self.leave_group_at(s);
         }
         match effect {
@@ -260,6 +279,7 @@ impl<'a> Parser<'a> {
             Effect::End => self.end_group(s),
             Effect::Use => self.draw_group(s),
             Effect::Object(read) => self.object(s, read),
+            Effect::Mesh => self.mesh(s),
             Effect::Light(read) => self.light(s, read),
             Effect::Clear => self.clear(),
             Effect::Trace => self.trace(s),
@@ -395,6 +415,7 @@ impl<'a> Parser<'a> {
             let Some(object) = self.read(s, material.as_ref(), read) else { return };
             self.lint_object(s, &object);
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_of(object.material())));
+            self.doubt_own(s, named_looks);
             if s.command.form().hides(s.values) {
                 return;
             }
@@ -408,6 +429,7 @@ impl<'a> Parser<'a> {
             }
             let row = s.row.clone().unwrap_or_else(|| s.still_row());
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_in(s.command.form(), &row)));
+            self.doubt_own(s, named_looks);
             let template = Template { command: s.command, row: row.clone() };
             if moves {
                 let spans = s.words.parameters().to_vec();
@@ -454,6 +476,7 @@ impl<'a> Parser<'a> {
 
     fn clear(&mut self) {
         (self.objects, self.uses, self.lights) = (0, 0, 0);
+        self.named.models = Default::default();
         self.doubt_no_more_of_scene();
         if let Some((line, span)) = self.unseen.removable.take() {
             self.report.warning(line, span, wording::cleared);
@@ -484,7 +507,8 @@ impl<'a> Parser<'a> {
             ScreenState::Set(screen) => {
                 self.picture.check(screen, &mut self.report);
                 self.doubt_picture(s);
-                let drawn = self.objects;
+                // Each triangle of a mesh takes the memory of an object.
+                let drawn = self.objects.saturating_add(self.named.models.drawn());
                 self.record(|recorder| recorder.trace(screen, drawn));
             }
             ScreenState::Unset => {
@@ -525,8 +549,15 @@ impl<'a> Parser<'a> {
             let span = if s.words.count() == 0 { whole } else { s.words.rest(0) };
             self.report.error(s.line, span, wording::too_far);
         }
+        let models = if is_hidden { Default::default() } else { info.models.clone() };
         self.see_group(number, reach, scale);
         self.doubt_group(needs_light);
+        let before = self.named.models.clone();
+        match &mut self.group {
+            Some(group) => group.models.extend(&models),
+            None => self.named.models.extend(&models),
+        }
+        self.check_triangles(s, &before);
         self.count_drawn(s, drawn, uses);
         let drawn = Drawn::Use { group: number, row };
         match &mut self.group {

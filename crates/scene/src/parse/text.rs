@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::command::MAX_NUMBERS;
 use crate::form::{Form, color_levels};
+use crate::model::{FLAT, SMOOTH};
 use crate::report::{BYTE_ORDER_MARK, Line};
 
 /// Returns the lines of a text without their ends and without the byte-order mark. The last one is empty if the text
@@ -34,6 +35,8 @@ enum Class {
     Comment,
     /// A word on its own.
     Mark,
+    /// The start of a word in quotes.
+    Quote,
 }
 
 /// The classes of all bytes, so that a line is split with one lookup per byte.
@@ -46,6 +49,7 @@ const CLASSES: [Class; 256] = {
     classes[b'(' as usize] = Class::Mark;
     classes[b')' as usize] = Class::Mark;
     classes[b':' as usize] = Class::Mark;
+    classes[b'"' as usize] = Class::Quote;
     classes
 };
 
@@ -58,11 +62,75 @@ pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     };
     let start = behind(*at, Class::Separator);
     let mut end = behind(start, Class::Word);
-    if end == start && end < line.len() && CLASSES[usize::from(line[end])] == Class::Mark {
-        end += 1;
+    if end < line.len() {
+        match CLASSES[usize::from(line[end])] {
+            Class::Mark if end == start => end += 1,
+            Class::Quote => end = behind_quotes(line, end),
+            Class::Mark | Class::Separator | Class::Comment | Class::Word => {}
+        }
     }
     *at = end;
     (end > start).then_some(start..end)
+}
+
+/// Returns the end of a word with quotes from `at` on. What is glued to it is a part of it, so that it can be reported.
+#[cold]
+fn behind_quotes(line: &[u8], mut at: usize) -> usize {
+    while at < line.len() {
+        match CLASSES[usize::from(line[at])] {
+            Class::Quote => match closing_quote(line, at) {
+                Some(end) => at = end + 1,
+                None => return line.len(),
+            },
+            Class::Word => at += 1,
+            Class::Separator | Class::Comment | Class::Mark => break,
+        }
+    }
+    at
+}
+
+/// Returns the place of the quote that closes the one at `at`.
+fn closing_quote(line: &[u8], at: usize) -> Option<usize> {
+    let mut next = at + 1;
+    while next < line.len() {
+        match line[next] {
+            b'"' => return Some(next),
+            b'\\' => next += 2,
+            _ => next += 1,
+        }
+    }
+    None
+}
+
+/// A fault of a word in quotes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum QuoteFault {
+    /// The closing quote is missing.
+    Open,
+    /// Something is glued to the quotes.
+    Glued,
+    /// A backslash before another character.
+    Escape(char),
+}
+
+/// Returns the text of a word in quotes.
+pub(super) fn unquoted(word: &str) -> Result<String, QuoteFault> {
+    let Some(rest) = word.strip_prefix('"') else { return Err(QuoteFault::Glued) };
+    let (mut text, mut chars) = (String::with_capacity(rest.len()), rest.chars());
+    loop {
+        match chars.next() {
+            None => return Err(QuoteFault::Open),
+            Some('"') if chars.as_str().is_empty() => return Ok(text),
+            Some('"') => return Err(QuoteFault::Glued),
+            Some('\\') => text.push(match chars.next() {
+                None => return Err(QuoteFault::Open),
+                Some(c @ ('"' | '\\')) => c,
+                Some('n') => '\n',
+                Some(c) => return Err(QuoteFault::Escape(c)),
+            }),
+            Some(c) => text.push(c),
+        }
+    }
 }
 
 /// Returns the next parameter: a word, or a curve from its opening bracket to the closing one. If that is missing,
@@ -213,6 +281,19 @@ impl Words {
         Some(first)
     }
 
+    /// Removes and returns the parameters from the first one on for which `is_first` holds.
+    pub(super) fn split_off(&mut self, is_first: impl Fn(Range<usize>) -> bool) -> Vec<Range<usize>> {
+        let Some(first) = self.parameters().iter().position(|word| is_first(word.clone())) else {
+            return Vec::new();
+        };
+        let rest = self.parameters()[first..].to_vec();
+        self.count = first;
+        if let Some(last) = first.checked_sub(1) {
+            self.end = self.parameters[last].end;
+        }
+        rest
+    }
+
     /// Returns the range from the first to the last of some parameters, as far as they exist.
     pub(super) fn span(&self, parameters: Range<usize>) -> Range<usize> {
         if parameters.start >= self.count {
@@ -231,6 +312,11 @@ impl Words {
     pub(super) fn rest(&self, first: usize) -> Range<usize> {
         self.parameters().get(first).map_or(self.end, |word| word.start)..self.end
     }
+}
+
+/// Returns whether a word begins the options of a mesh, which stand behind its surface.
+pub(super) fn is_mesh_option(word: &str) -> bool {
+    word.eq_ignore_ascii_case(SMOOTH) || word.eq_ignore_ascii_case(FLAT)
 }
 
 /// Returns whether a word can be the name of a material or a group.
@@ -277,6 +363,10 @@ mod tests {
         check("a ( 1:2#)", &["a", "( 1:2"]);
         check("a)b:c", &["a", ")", "b", ":", "c"]);
         check("a (1 (2) 3", &["a", "(1 (2)", "3"]);
+        check(r#"Mesh "a b, #1.obj" x # c"#, &["Mesh", r#""a b, #1.obj""#, "x"]);
+        check(r#"Mesh "a\"b" c"d e"f"#, &["Mesh", r#""a\"b""#, r#"c"d e"f"#]);
+        check(r#"Mesh "open # x"#, &["Mesh", r#""open # x"#]);
+        check(r##"Mesh "a#b" # c"##, &["Mesh", r##""a#b""##]);
     }
 
     #[test]
@@ -296,5 +386,21 @@ mod tests {
         assert_eq!((words.count(), words.parameters().len(), words.end()), (0, 0, 5..5));
         assert_eq!(words.span(0..2), 0..0);
         assert!(!words.read(b"  # nothing"));
+    }
+
+    #[test]
+    fn words_in_quotes_have_three_escapes() {
+        assert_eq!(unquoted(r#""a\"b\\c\nd""#).as_deref(), Ok("a\"b\\c\nd"));
+        assert_eq!(unquoted(r#""ü #,()""#).as_deref(), Ok("ü #,()"));
+        for (word, fault) in [
+            (r#""a"#, QuoteFault::Open),
+            (r#""a\""#, QuoteFault::Open),
+            (r#""a"b"#, QuoteFault::Glued),
+            (r#"a"b""#, QuoteFault::Glued),
+            (r#""a""b""#, QuoteFault::Glued),
+            (r#""a\tb""#, QuoteFault::Escape('t')),
+        ] {
+            assert_eq!(unquoted(word), Err(fault), "{word}");
+        }
     }
 }

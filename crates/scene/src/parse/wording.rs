@@ -2,7 +2,9 @@
 
 use super::curve::CurveFault;
 use super::number::{self, NumberFault};
-use super::text::Words;
+use super::text::{QuoteFault, Words};
+use rayfold_assets::{AssetError, Closure, NameFault};
+
 use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
@@ -656,4 +658,90 @@ pub(super) fn color_at(comment: &str) -> Option<[f64; 3]> {
         6 | 8 => Some([0, 1, 2].map(|i| level(i, 2))),
         _ => None,
     }
+}
+
+/// Describes a missing name of a file, or `word` in its place.
+pub(super) fn no_file(command: Command, word: Option<&str>) -> Fault {
+    let message = match word {
+        None => format!("`{command}` names no file"),
+        Some(word) => format!("{} is not in quotes", quoted(word)),
+    };
+    Fault::new(Code::MalformedQuote, message)
+        .expected("expected the name of a file in quotes, as in `\"teapot.obj\"`")
+        .help(format!("a line is `{}`", command.form()))
+}
+
+pub(super) fn malformed_quote(fault: QuoteFault) -> Fault {
+    let (message, expected) = match fault {
+        QuoteFault::Open => {
+            ("the quotes are not closed".to_string(), "expected `\"` before the end of the line")
+        }
+        QuoteFault::Glued => ("quotes within a word".to_string(), "expected blanks around a word in quotes"),
+        QuoteFault::Escape(c) => {
+            (format!("`\\{c}` means nothing in quotes"), "expected `\\\"`, `\\\\` or `\\n`")
+        }
+    };
+    Fault::new(Code::MalformedQuote, message).expected(expected)
+}
+
+pub(super) fn no_file_name(fault: NameFault) -> Fault {
+    Fault::new(Code::MalformedQuote, fault.to_string())
+        .expected("expected the plain name of a file in the script's own folder, as in `\"teapot.obj\"`")
+}
+
+pub(super) fn unusable_file(error: &AssetError) -> Fault {
+    let fault = Fault::new(Code::UnusableFile, error.to_string());
+    match error.help() {
+        Some(help) => fault.help(help),
+        None => fault,
+    }
+}
+
+pub(super) fn two_paths(one: &str, other: &str) -> Fault {
+    Fault::new(Code::UnusableFile, format!("`{one}` and `{other}` would be one file in the script's folder"))
+        .help("rename one of them, and export the model again")
+}
+
+pub(super) fn model_doubt(file: &str, warning: &str) -> Fault {
+    Fault::new(Code::UnusedPart, format!("`{file}`: {warning}"))
+}
+
+pub(super) fn open_glass(file: &str, closure: &Closure) -> Fault {
+    let why = match closure {
+        Closure::Open([a, b]) => {
+            format!("is open at the edge from {} {} {} to {} {} {}", a.x, a.y, a.z, b.x, b.y, b.z)
+        }
+        Closure::InsideOut => "is inside out: its faces are seen clockwise from outside".to_string(),
+        Closure::NoVolume | Closure::Closed => "has no volume".to_string(),
+    };
+    Fault::new(Code::GlassPanes, format!("`{file}` {why}, so its glass is panes that do not refract"))
+        .help("a closed model, whose faces are seen counterclockwise from outside, refracts")
+}
+
+pub(super) fn own_without_file(command: Command) -> Fault {
+    Fault::new(Code::NoEffect, format!("`own` has no effect on a `{command}`"))
+        .help("the colours of a file are those of a `Mesh`")
+}
+
+pub(super) fn no_smooth_angle() -> Fault {
+    Fault::new(Code::TooFewParameters, "`smooth` lacks its angle")
+        .expected("expected an angle from 0 to 180 degrees, as in `smooth 30`")
+}
+
+pub(super) fn bad_smooth_angle(word: &str) -> Fault {
+    Fault::new(Code::InvalidValue, format!("{} is no angle of `smooth`", quoted(word)))
+        .expected("expected a number from 0 to 180, not a curve")
+}
+
+pub(super) fn unknown_mesh_option(word: &str) -> Fault {
+    Fault::new(
+        Code::TooManyParameters,
+        format!("{} is neither a material nor `smooth` or `flat`", quoted(word)),
+    )
+    .help("a line is `Mesh \"FILE\" [M] [smooth a or flat]`; a `Use` moves a model")
+}
+
+pub(super) fn too_many_mesh_options() -> Fault {
+    Fault::new(Code::TooManyParameters, "there is more behind the normals of the mesh")
+        .help("a line is `Mesh \"FILE\" [M] [smooth a or flat]`")
 }

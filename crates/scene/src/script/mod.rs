@@ -18,7 +18,7 @@ use std::ops::Range;
 
 use crate::command::Command;
 use crate::model::{
-    Background, Camera, Clause, Depth, Fog, FrameNumbers, InvalidValue, Lens, Light, Material, Object,
+    Background, Camera, Clause, Depth, Fog, FrameNumbers, InvalidValue, Lens, Light, Material, Mesh, Object,
     Samples, Scene, Screen, Shutter, Tone,
 };
 use crate::row::Row;
@@ -132,6 +132,8 @@ pub(crate) enum Drawn {
     Object { template: Template, surface: Option<usize> },
     /// A group that is drawn.
     Use { group: usize, row: Row },
+    /// A mesh whose surface is evaluated at each moment: a named material, or numbers.
+    Mesh { mesh: Mesh, surface: Option<usize>, row: Row },
 }
 
 /// A named material with its clauses.
@@ -290,7 +292,7 @@ impl Script {
             objects.surfaces.iter_mut().filter_map(|(_, k)| k.as_mut()).for_each(|k| new(k, &materials));
             for (_, drawn) in &mut objects.list.others {
                 match drawn {
-                    Drawn::Object { surface, .. } => {
+                    Drawn::Object { surface, .. } | Drawn::Mesh { surface, .. } => {
                         surface.iter_mut().for_each(|k| new(k, &materials));
                     }
                     Drawn::Use { group, .. } => new(group, &groups),
@@ -360,7 +362,9 @@ impl Objects {
         self.surfaces.iter().filter_map(|(_, surface)| *surface).for_each(|k| materials[k] = true);
         for (_, drawn) in &self.list.others {
             match drawn {
-                Drawn::Object { surface, .. } => surface.iter().for_each(|k| materials[*k] = true),
+                Drawn::Object { surface, .. } | Drawn::Mesh { surface, .. } => {
+                    surface.iter().for_each(|k| materials[*k] = true);
+                }
                 Drawn::Use { group, .. } => groups[*group] = true,
             }
         }

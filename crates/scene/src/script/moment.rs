@@ -9,7 +9,8 @@ use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
 use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
 use crate::model::{
-    Clauses, Coefficients, Faults, Instance, Light, Material, Object, Placement, Scene, Tone,
+    Clauses, Coefficients, Faults, Instance, Light, Material, Mesh, Object, Placement, Scene, Tone,
+    mesh_surface,
 };
 use crate::row::Row;
 use crate::shared_slice::SharedSlice;
@@ -90,6 +91,7 @@ impl Script {
             match drawn {
                 Drawn::Object { template, surface } => objects.extend(moment.object(template, *surface)?),
                 Drawn::Use { group, row } => moment.draw(*group, row, &mut objects)?,
+                Drawn::Mesh { mesh, surface, row } => objects.push(moment.mesh(mesh, *surface, row)?),
             }
         }
         objects.extend_from_slice(&list.still[next..still.end]);
@@ -102,6 +104,17 @@ impl Moment<'_> {
     fn object(&mut self, template: &Template, surface: Option<usize>) -> Result<Option<Object>, Faults> {
         let surface = surface.map(|material| self.material(material)).transpose()?;
         template.object(self.frame, self.tone, surface.as_ref())
+    }
+
+    fn mesh(&mut self, mesh: &Mesh, surface: Option<usize>, row: &Row) -> Result<Object, Faults> {
+        let material = match surface {
+            Some(material) => self.material(material)?,
+            None => {
+                let values = row.at(self.frame, self.tone);
+                mesh_surface(&mut Numbers::new(&values, row.len(), None))?
+            }
+        };
+        Ok(mesh.with_material(material).into())
     }
 
     fn material(&mut self, i: usize) -> Result<Material, Faults> {
@@ -122,7 +135,7 @@ impl Moment<'_> {
         }
         let script = self.script;
         let list = &script.groups[i].objects.list;
-        let moves = |(_, drawn): &(usize, Drawn)| matches!(drawn, Drawn::Object { .. });
+        let moves = |(_, drawn): &(usize, Drawn)| !matches!(drawn, Drawn::Use { .. });
         let objects = if list.others.iter().any(moves) {
             let mut objects = Vec::with_capacity(list.still.len() + list.others.len());
             let mut next = 0;
@@ -131,6 +144,9 @@ impl Moment<'_> {
                 next = *before;
                 match drawn {
                     Drawn::Object { template, surface } => objects.extend(self.object(template, *surface)?),
+                    Drawn::Mesh { mesh, surface, row } => {
+                        objects.push(self.mesh(mesh, *surface, row)?);
+                    }
                     Drawn::Use { .. } => {}
                 }
             }
@@ -153,9 +169,12 @@ impl Moment<'_> {
             let still = other.map_or(objects.list.still.len(), |(before, _)| *before);
             let mut count = still - level.still;
             (level.still, level.other) = (still, level.other + 1);
-            if let Some((_, Drawn::Object { template, .. })) = other
-                && !template.is_hidden(self.frame, self.tone)
-            {
+            let is_seen = match other {
+                Some((_, Drawn::Object { template, .. })) => !template.is_hidden(self.frame, self.tone),
+                Some((_, Drawn::Mesh { .. })) => true,
+                Some((_, Drawn::Use { .. })) | None => false,
+            };
+            if is_seen {
                 count += 1;
             }
             if count > 0 {
@@ -165,7 +184,7 @@ impl Moment<'_> {
                 into.extend(range.map(|i| Object::from(Instance::new(&own, i, &level.placement))));
             }
             match other {
-                Some((_, Drawn::Object { .. })) => {}
+                Some((_, Drawn::Object { .. } | Drawn::Mesh { .. })) => {}
                 Some((_, Drawn::Use { group, row })) => {
                     let outer = Arc::clone(&level.placement);
                     if let Some(placement) = self.placement(*group, row, Some(&outer))? {

@@ -45,7 +45,7 @@ impl Namer {
         match object {
             Object::Instance(instance) => self.add_instance(instance),
             _ => {
-                let surface = self.surface(object.material());
+                let surface = self.surface_of(object);
                 self.recorder.add_object(object.clone(), surface);
             }
         }
@@ -56,7 +56,7 @@ impl Namer {
         let group = match &self.last_group {
             Some((last, group)) if last == object => *group,
             _ => {
-                let surface = self.surface(object.material());
+                let surface = self.surface_of(object);
                 let mut group = GroupRecorder::default();
                 group.add_object(object.clone(), surface);
                 self.groups += 1;
@@ -66,6 +66,14 @@ impl Namer {
             }
         };
         self.recorder.add_drawn(Drawn::Use { group, row: row_of(instance.placement()) });
+    }
+
+    /// Returns the number of the name of an object's material, or `None` if it needs none.
+    fn surface_of(&mut self, object: &Object) -> Option<usize> {
+        match object {
+            Object::Mesh(mesh) if !mesh.has_material() => None,
+            _ => self.surface(object.material()),
+        }
     }
 
     /// Returns the number of a material's name, or `None` if it needs none.
@@ -93,6 +101,9 @@ impl Namer {
                 Weight::Gradient(start, end) => (Clause::Gradient, vec![start, end]),
             };
             clauses.push(line(clause, &[&numbers], Some(other)));
+        }
+        if finish.own {
+            clauses.push(line(Clause::Own, &[], None));
         }
         let number = self.name(clauses, material.clone());
         self.last_material = Some((material.clone(), number));

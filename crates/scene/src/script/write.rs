@@ -114,6 +114,8 @@ impl Script {
             write_still(f, *before)?;
             match drawn {
                 Drawn::Object { template, surface } => template.write(f, name(*surface))?,
+                Drawn::Mesh { mesh, surface: None, row } => mesh.write_with(f, |f| row.write(f))?,
+                Drawn::Mesh { mesh, surface, .. } => mesh.write(f, name(*surface))?,
                 Drawn::Use { group, row } => {
                     write!(f, "{} {}", Command::Use, self.groups[*group].name)?;
                     row.write(f)?;

@@ -1,18 +1,22 @@
 //! Changes of the file that is shown.
 
 use glam::{DVec2, DVec3};
-use rayfold_scene::Command;
+use rayfold_scene::{Command, quoted_word};
 
 use super::Session;
 use crate::document::Splice;
 use crate::edits;
 use crate::groups;
+use crate::line::Line;
 use crate::materials;
 use crate::names;
 use crate::project::Project;
 use crate::protocol::ServerMessage;
 use crate::tables::{Role, role};
 use crate::view::Projection;
+
+/// The notice for a mesh where there is no model.
+const NO_MODEL: &str = "There is no model (.obj, .ply, .stl, .glb, .gltf) beside the script.";
 
 /// The number of frames of a new animation.
 const FRAMES: u32 = 50;
@@ -57,6 +61,10 @@ impl Session {
         let (name, subject) = name.split_once(' ').unwrap_or((name, ""));
         let Some(command) = Command::from_name(name) else { return };
         match role(command) {
+            Role::Object if command == Command::Mesh => {
+                self.add_mesh(project, tell);
+                return;
+            }
             Role::Object | Role::Light => {}
             Role::Use if names::is_name(subject) => {}
             Role::Camera => {
@@ -116,6 +124,21 @@ impl Session {
             edits::new_line(command, ground, size, count)
         };
         let (splices, place) = edits::add(self.file_lines(project), source_map, line);
+        self.edit(project, splices, None, tell);
+        self.select(project, vec![place]);
+        self.outline(project, tell);
+    }
+
+    /// Adds a mesh of the first model beside the script.
+    fn add_mesh(&mut self, project: &mut Project, tell: &mut ServerMessage) {
+        let shown = self.shown(project);
+        let file = self.place(project).file;
+        let Some(model) = project.files.get(file).and_then(|file| file.models().into_iter().next()) else {
+            tell.notice = Some(NO_MODEL.into());
+            return;
+        };
+        let line = Line::new(&format!("{} {}", Command::Mesh.name(), quoted_word(&model)));
+        let (splices, place) = edits::add(self.file_lines(project), &shown.source_map, line);
         self.edit(project, splices, None, tell);
         self.select(project, vec![place]);
         self.outline(project, tell);

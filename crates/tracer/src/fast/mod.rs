@@ -88,8 +88,9 @@ impl<'a> Drawing<'a> {
                 sampled_backend(exposure, options)?.unwrap_or(Backend::Reference(exposure, options)),
             ));
         }
-        let Ranked { scene: ranked, .. } = &Ranked::new(scene);
+        let Ranked { scene: ranked, faces, .. } = &Ranked::new(scene);
         let geometry = if has_kernels(options) { Geometry::new(ranked, options.tree).ok() } else { None };
+        let geometry = geometry.map(|geometry| geometry.with_faces(faces.as_ref()));
         let precision = |geometry| Some((precision::resolve(options, &geometry, ranked)?, geometry));
         Ok(Self(match geometry.and_then(precision) {
             Some((Precision::F64, geometry)) => {
@@ -237,8 +238,16 @@ fn sampled_backend<'a>(
         return Ok(None);
     }
     let moments = exposure.moments();
-    let moments: Vec<Scene> = moments.iter().map(|moment| Ranked::new(moment).scene.into_owned()).collect();
-    let geometries = moments.iter().map(|moment| Geometry::new(moment, options.tree));
+    let (moments, faces): (Vec<Scene>, Vec<_>) = moments
+        .iter()
+        .map(|moment| {
+            let Ranked { scene, faces, .. } = Ranked::new(moment);
+            (scene.into_owned(), faces)
+        })
+        .unzip();
+    let geometries = moments.iter().zip(&faces).map(|(moment, faces)| {
+        Geometry::new(moment, options.tree).map(|geometry| geometry.with_faces(faces.as_ref()))
+    });
     let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let precisions = geometries.iter().zip(&moments);
     let precisions = precisions.map(|(geometry, moment)| precision::resolve(options, geometry, moment));
@@ -274,7 +283,8 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// Returns the precision that [`Precision::Auto`] selects for a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    let geometry = Geometry::new(scene, None).ok();
+    let Ranked { scene, faces, .. } = &Ranked::new(scene);
+    let geometry = Geometry::new(scene, None).ok().map(|geometry| geometry.with_faces(faces.as_ref()));
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
     resolved.unwrap_or(Precision::F64)

@@ -44,6 +44,24 @@ pub(super) fn refract(
     Refraction { mirrored: 0.5 * (across + along), direction: if is_flat { direction } else { straight } }
 }
 
+/// Returns the normal at which a ray goes on from a face: the shading normal, or that of the face if a ray would leave on
+/// the wrong side of the face. Both face the ray. `glass` is the glass of the face, with whether the ray comes from within
+/// and whether it has no inside.
+pub(crate) fn onward_normal(
+    direction: DVec3,
+    normal: DVec3,
+    face: DVec3,
+    glass: Option<(Glass, bool, bool)>,
+) -> DVec3 {
+    let mirrored = direction - 2.0 * direction.dot(normal).min(0.0) * normal;
+    if mirrored.dot(face) <= 0.0 {
+        return face;
+    }
+    let refraction = glass.map(|(glass, within, is_flat)| refract(glass, direction, normal, within, is_flat));
+    let is_above = |bent: Refraction| bent.mirrored < 1.0 && bent.direction.dot(face) >= 0.0;
+    if refraction.is_some_and(is_above) { face } else { normal }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -27,11 +27,13 @@ mod whole;
 mod world;
 
 use core::ops::Range;
+use std::borrow::Cow;
 
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
 
+pub(crate) use glass::onward_normal;
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
 pub use sampled::{Estimate, estimate, render_exposed};
@@ -44,6 +46,7 @@ pub(crate) use shapes::{
 pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
+use crate::meshes::{Expanded, expanded, mesh};
 use crate::parallel::{CHANNELS, bands};
 use crate::{RenderError, RenderOptions};
 use shading::Shader;
@@ -70,7 +73,8 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 
 /// Draws some rows of a scene with the reference tracer.
 fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let world = World::new(scene);
+    let expanded = Expanded::new(Cow::Borrowed(scene));
+    let world = World::of(&expanded);
     let lights = world.middles();
     let shader = Shader { world: &world, lights: &lights, cancel: options.cancel };
     let image = bands(
@@ -94,7 +98,8 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
 
 /// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
-    let world = World::new(scene);
+    let expanded = Expanded::new(Cow::Borrowed(scene));
+    let world = World::of(&expanded);
     let ray = world.rays.ray(f64::from(i), f64::from(j));
     Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces())
 }
@@ -104,6 +109,11 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 ///
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
+    if objects.iter().any(|object| mesh(object).is_some()) {
+        let (objects, faces) = expanded(objects, false);
+        let hit = nearest(&objects, origin, direction)?;
+        return Some(Hit { object: faces.origin(hit.object), ..hit });
+    }
     let ray = Ray { origin, direction };
     if objects.iter().any(|object| matches!(object, Object::Instance(_))) {
         let objects: Vec<Object> = objects.iter().map(|o| shapes::in_world(o).into_owned()).collect();

@@ -2,6 +2,7 @@
 //! lights, and moments.
 
 use core::ops::Range;
+use std::borrow::Cow;
 
 use glam::DVec3;
 use image::RgbImage;
@@ -11,6 +12,7 @@ use super::shading::Shader;
 use super::tone;
 use super::world::World;
 use crate::camera::Ray;
+use crate::meshes::Expanded;
 use crate::parallel::{CHANNELS, bands};
 use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
 use crate::sampling::{Dimensions, coordinate, pixel_seed};
@@ -89,8 +91,9 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
     let scenes = exposure.moments();
     let dimensions = Dimensions::new(&scenes);
     let bounces = options.bounces(scene);
+    let scenes: Vec<Expanded> = scenes.iter().map(|scene| Expanded::new(Cow::Borrowed(scene))).collect();
     let moments =
-        scenes.iter().map(|scene| Moment { world: World::new(scene), dimensions: &dimensions, bounces });
+        scenes.iter().map(|scene| Moment { world: World::of(scene), dimensions: &dimensions, bounces });
     let moments: Vec<Moment> = moments.collect();
     let middles = moments[0].world.middles();
     draw(&|column, row| {
@@ -203,8 +206,8 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
     let batch = if exposure.motion().is_some() { 1 } else { samples };
     for first in (0..samples).step_by(batch as usize) {
         let time = independent(seed, u64::MAX, first.into(), 0);
-        let of_moment = exposure.at(time);
-        let moment = Moment { world: World::new(&of_moment), dimensions: &dimensions, bounces };
+        let of_moment = Expanded::new(Cow::Owned(exposure.at(time)));
+        let moment = Moment { world: World::of(&of_moment), dimensions: &dimensions, bounces };
         sums.par_iter_mut().enumerate().for_each(|(place, sum)| {
             let place = place as u64;
             let pixel = ((place % u64::from(width)) as u32, (place / u64::from(width)) as u32);

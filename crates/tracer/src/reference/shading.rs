@@ -9,9 +9,10 @@ use super::Hit;
 use super::glass::{Refraction, refract};
 use super::light::{arriving, held, highlight};
 use super::pattern::coefficients;
-use super::shapes::has_inside;
+use super::shapes::Surface;
 use super::world::{World, glass};
 use crate::camera::Ray;
+use crate::meshes::Shading;
 
 /// The weight below which, in every channel, a ray is not followed once its path has met glass.
 pub(crate) const FAINT: f64 = 1.0 / 4096.0;
@@ -69,10 +70,16 @@ impl Shader<'_> {
         let world = self.world;
         let (object, place, local_normal) = world.in_script(hit.object, &hit.surface);
         let coefficients = coefficients(object, place, local_normal, &hit.surface);
-        let normal = hit.surface.normal;
-        let start = hit.surface.point + hit.surface.offset * normal;
+        let face = hit.surface.normal;
+        let start = hit.surface.point + hit.surface.offset * face;
+        let shading = world.shading(hit, ray.direction);
+        let normal = shading.map_or(face, |shading| shading.normal);
+        let tint = shading.map_or(DVec3::ONE, |shading| shading.color);
 
         let mut color = coefficients.ambient();
+        if let Some(shading) = shading {
+            color = held(color * tint + shading.glow);
+        }
         let shine = object.material().finish().and_then(|finish| finish.shine);
         for (light, point) in world.lights.iter().zip(self.lights) {
             let Some(arriving) = arriving(light, *point, &hit.surface) else { continue };
@@ -80,9 +87,11 @@ impl Shader<'_> {
             if cosine <= 0.0 {
                 continue;
             }
+            let start =
+                shading.map_or(start, |shading| shadow_start(&hit.surface, shading, arriving.towards));
             let Some(left) = arriving.let_through(world, start) else { continue };
             let light = held(arriving.color * left);
-            color = held(color + light * coefficients.diffuse() * cosine);
+            color = held(color + light * (coefficients.diffuse() * tint) * cosine);
             if let Some(shine) = shine {
                 let part = highlight(&shine, normal, arriving.towards, -ray.direction);
                 color = held(color + light * shine.color() * part);
@@ -92,11 +101,13 @@ impl Shader<'_> {
             return color;
         }
 
+        let normal = shading.map_or(face, |shading| shading.onward);
         let mut factor = coefficients.mirror();
         let mut refracted = None;
         if let Some(glass) = glass(object) {
+            let within = shading.map_or(hit.surface.within, |shading| shading.within);
             let Refraction { mirrored, direction } =
-                refract(glass, ray.direction, normal, hit.surface.within, !has_inside(object));
+                refract(glass, ray.direction, normal, within, !world.has_inside(hit.object, object));
             factor += mirrored;
             refracted = Some(((1.0 - mirrored) * glass.color(), direction));
         }
@@ -111,7 +122,7 @@ impl Shader<'_> {
         if let Some((factor, direction)) = refracted
             && let Some(path) = self.scattered(path, factor, has_met_glass)
         {
-            let origin = hit.surface.point - hit.surface.offset * normal;
+            let origin = hit.surface.point - hit.surface.offset * face;
             let seen = self.color_along(Ray { origin, direction }, path);
             color = held(color + factor * seen);
         }
@@ -128,6 +139,15 @@ impl Shader<'_> {
         let is_followed = if has_met_glass { weight.max_element() >= faint } else { factor != DVec3::ZERO };
         is_followed.then(|| Path { bounces: path.bounces - 1, weight, has_met_glass })
     }
+}
+
+/// Returns where the shadow ray towards a light starts on a face with normals. A face that the start is lifted off can
+/// hide the light; a face that it starts on cannot.
+fn shadow_start(surface: &Surface, shading: Shading, towards: DVec3) -> DVec3 {
+    let Surface { point, normal, offset, .. } = *surface;
+    let is_lifted = shading.lift.dot(normal) > offset;
+    let side = if is_lifted || towards.dot(normal) >= 0.0 { offset } else { -offset };
+    point + shading.lift + side * normal
 }
 
 #[cfg(test)]

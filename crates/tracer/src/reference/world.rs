@@ -9,6 +9,7 @@ use rayfold_scene::{Camera, Glass, Lamp, Light, Object, Scene};
 use super::Hit;
 use super::shapes::{self, Surface};
 use crate::camera::{Ray, Rays, Single};
+use crate::meshes::{Expanded, FaceHit, Faces, Shading};
 
 /// The world that rays are traced through.
 pub(super) struct World<'a> {
@@ -22,11 +23,18 @@ pub(super) struct World<'a> {
     /// The origin of these coordinates in those of the script.
     center: DVec3,
     pub(super) has_glass: bool,
+    /// The faces that triangles are.
+    faces: Option<&'a Faces>,
 }
 
 impl<'a> World<'a> {
     /// Makes the world with the eye at the origin, so that coordinates are small for objects that are near. Keeps the
     /// coordinates of the script if the scene cannot be moved, or if rounding would move the eye through a surface.
+    pub(super) fn of(expanded: &'a Expanded) -> Self {
+        Self { faces: expanded.faces.as_deref(), ..Self::new(&expanded.scene) }
+    }
+
+    /// Makes the world of a scene without meshes, as [`Self::of`] does.
     pub(super) fn new(scene: &'a Scene) -> Self {
         let rays = Rays::new(&scene.camera, scene.screen, Single::of(scene));
         let has_groups = scene.objects.iter().any(|object| matches!(object, Object::Instance(_)));
@@ -42,6 +50,7 @@ impl<'a> World<'a> {
             lights: Cow::Borrowed(&scene.lights),
             center: DVec3::ZERO,
             has_glass: scene.objects.iter().any(|object| glass(object).is_some()),
+            faces: None,
         };
         world.seen_from_eye().unwrap_or(world)
     }
@@ -76,6 +85,19 @@ impl<'a> World<'a> {
             Light::Lamp(lamp) => lamp.position(),
         };
         self.lights.iter().map(middle).collect()
+    }
+
+    /// Returns what a face of a mesh adds to the surface of a hit.
+    pub(super) fn shading(&self, hit: &Hit, direction: DVec3) -> Option<Shading> {
+        let Surface { point, normal: face, .. } = hit.surface;
+        let material = self.scene.objects[hit.object].material();
+        let at = FaceHit { point, center: self.center, scale: 1.0, direction, face };
+        self.faces?.shading(hit.object, material, at)
+    }
+
+    /// Returns whether an object, which is no instance, is a body that glass fills.
+    pub(super) fn has_inside(&self, order: usize, object: &Object) -> bool {
+        shapes::has_inside(object) || self.faces.is_some_and(|faces| faces.is_filled(order))
     }
 
     pub(super) fn nearest(&self, ray: Ray) -> Option<Hit> {

@@ -5,6 +5,7 @@ mod cone;
 mod cuboid;
 mod disc;
 mod instance;
+mod mesh;
 mod plane;
 mod sphere;
 mod torus;
@@ -13,6 +14,7 @@ mod triangle;
 use glam::DVec3;
 use rayfold_scene::Object;
 
+pub(super) use mesh::shaded;
 pub use sphere::sphere_clearance;
 pub use triangle::edge_clearance;
 
@@ -57,6 +59,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Torus(torus) => torus,
         Object::Capsule(capsule) => capsule,
         Object::Instance(instance) => instance,
+        Object::Mesh(mesh) => mesh,
     }
 }
 

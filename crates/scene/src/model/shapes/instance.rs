@@ -136,6 +136,11 @@ impl Instance {
         &self.placement
     }
 
+    /// Returns the placement, which the objects of one drawn group share.
+    pub fn shared_placement(&self) -> &Arc<Placement> {
+        &self.placement
+    }
+
     /// Returns the material of the surface. A pattern is in the group's coordinates.
     pub fn material(&self) -> &Material {
         self.object().material()

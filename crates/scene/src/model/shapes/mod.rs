@@ -9,6 +9,7 @@ mod cuboid;
 mod cylinder;
 mod disc;
 mod instance;
+mod mesh;
 mod plane;
 mod sphere;
 mod torus;
@@ -20,6 +21,8 @@ use glam::DVec3;
 
 pub(crate) use instance::USE;
 pub use instance::{Instance, Placement};
+pub use mesh::Mesh;
+pub(crate) use mesh::{FLAT, MESH, SMOOTH, mesh_surface};
 
 use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
@@ -72,6 +75,8 @@ macro_rules! objects {
             $(#[doc = $summary] $Shape($Shape),)*
             /// An object of a group, as it is drawn.
             Instance(Instance),
+            /// The triangles of a model.
+            Mesh(Mesh),
         }
 
         $(impl From<$Shape> for Object {
@@ -86,12 +91,19 @@ macro_rules! objects {
             }
         }
 
+        impl From<Mesh> for Object {
+            fn from(mesh: Mesh) -> Self {
+                Self::Mesh(mesh)
+            }
+        }
+
         impl Object {
             /// Returns the material of the surface.
             pub fn material(&self) -> &Material {
                 match self {
                     $(Self::$Shape(shape) => shape.material(),)*
                     Self::Instance(instance) => instance.material(),
+                    Self::Mesh(mesh) => mesh.material(),
                 }
             }
 
@@ -103,6 +115,7 @@ macro_rules! objects {
                 match self {
                     $(Self::$Shape(shape) => shape.moved(motion, material).map(Self::$Shape),)*
                     Self::Instance(instance) => instance.moved(motion).map(Self::Instance),
+                    Self::Mesh(mesh) => mesh.moved(motion, material).map(Self::Mesh),
                 }
             }
 
@@ -112,6 +125,7 @@ macro_rules! objects {
                 match self {
                     $(Self::$Shape(shape) => shape.support(direction),)*
                     Self::Instance(instance) => instance.support(direction),
+                    Self::Mesh(mesh) => mesh.support(direction),
                 }
             }
 
@@ -119,7 +133,7 @@ macro_rules! objects {
             pub(crate) fn lint(&self) -> Option<Lint> {
                 match self {
                     $(Self::$Shape(shape) => shape.lint(),)*
-                    Self::Instance(_) => None,
+                    Self::Instance(_) | Self::Mesh(_) => None,
                 }
             }
 
@@ -129,6 +143,7 @@ macro_rules! objects {
                     $(Self::$Shape(shape) => write_line(f, shape, surface),)*
                     // An object of a group is written with its group.
                     Self::Instance(_) => Err(fmt::Error),
+                    Self::Mesh(mesh) => mesh.write(f, surface),
                 }
             }
         }
@@ -151,6 +166,9 @@ impl Object {
     /// # Errors
     /// Never fails for an object that could be made.
     pub fn with_material(&self, material: Material) -> Result<Self, InvalidValue> {
+        if let Self::Mesh(mesh) = self {
+            return Ok(mesh.with_material(material).into());
+        }
         self.moved(&Shift { scale: 1.0, place: |position| position }, material)
     }
 

@@ -7,6 +7,7 @@ use crate::fast::arithmetic::real::Real;
 use crate::fast::bodies::Bodies;
 use crate::fast::build::features::BUILT;
 use crate::fast::lights::lamp::Lamp;
+use crate::fast::materials::faces::ShadedFaces;
 use crate::fast::materials::finish::Finishes;
 use crate::fast::materials::fog::Fog;
 use crate::fast::materials::glass::Glass;
@@ -21,6 +22,7 @@ pub(crate) struct Extensions<E> {
     finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
     fog: Option<Fog>,
+    shaded: Option<ShadedFaces>,
 }
 
 impl<E: Real> Extensions<E> {
@@ -30,8 +32,9 @@ impl<E: Real> Extensions<E> {
             bodies: (!geometry.bodies.is_empty()).then(|| Bodies::new(&geometry.bodies)),
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
-            glass: Glass::new(scene),
+            glass: Glass::new(scene, geometry.faces.as_deref()),
             fog: Fog::new(scene, geometry.scale),
+            shaded: ShadedFaces::new(scene, geometry),
         })
     }
 
@@ -51,6 +54,12 @@ impl<E: Real> Extensions<E> {
     #[inline(always)]
     pub(crate) fn fog(&self) -> Option<&Fog> {
         if parts::BUILT.fogs { self.fog.as_ref() } else { None }
+    }
+
+    /// Returns the faces of meshes, if any has more than a triangle.
+    #[inline(always)]
+    pub(crate) fn shaded(&self) -> Option<&ShadedFaces> {
+        if parts::BUILT.meshes { self.shaded.as_ref() } else { None }
     }
 
     #[inline(always)]
@@ -77,5 +86,9 @@ impl<E: Real> Extensions<E> {
 
 /// Returns whether the scene uses any of these features. If it does, it is drawn in `f64`.
 pub(crate) fn is_needed(geometry: &Geometry) -> bool {
-    !geometry.bodies.is_empty() || !geometry.lamps.is_empty() || geometry.is_finished || geometry.is_foggy
+    !geometry.bodies.is_empty()
+        || !geometry.lamps.is_empty()
+        || geometry.is_finished
+        || geometry.is_foggy
+        || geometry.faces.is_some()
 }

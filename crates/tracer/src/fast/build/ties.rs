@@ -3,13 +3,19 @@
 //! The kernels take the hit of the lowest order. So they are given the objects in the order in which they count.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use rayfold_scene::{Object, Scene};
+
+use crate::meshes::{Expanded, Faces};
+use crate::parts::BUILT;
 
 /// A scene whose objects stand in the order in which equal hits count.
 #[derive(Debug)]
 pub(crate) struct Ranked<'a> {
     pub(crate) scene: Cow<'a, Scene>,
+    /// The faces that its triangles are.
+    pub(crate) faces: Option<Arc<Faces>>,
     /// Positions in the script, if they are others.
     places: Option<Vec<usize>>,
 }
@@ -17,18 +23,26 @@ pub(crate) struct Ranked<'a> {
 impl<'a> Ranked<'a> {
     pub(crate) fn new(scene: &'a Scene) -> Self {
         if scene.objects.is_sorted_by_key(is_glass) {
-            return Self { scene: Cow::Borrowed(scene), places: None };
+            let Expanded { scene, faces } = expanded(Cow::Borrowed(scene));
+            return Self { scene, faces, places: None };
         }
         let mut places: Vec<usize> = (0..scene.objects.len()).collect();
         places.sort_by_key(|&place| is_glass(&scene.objects[place]));
         let objects = places.iter().map(|&place| scene.objects[place].clone()).collect();
-        Self { scene: Cow::Owned(Scene { objects, ..scene.clone() }), places: Some(places) }
+        let Expanded { scene, faces } = expanded(Cow::Owned(Scene { objects, ..scene.clone() }));
+        Self { scene, faces, places: Some(places) }
     }
 
     /// The position in the script of an object.
     pub(crate) fn in_script(&self, order: usize) -> usize {
+        let order = self.faces.as_ref().map_or(order, |faces| faces.origin(order));
         self.places.as_ref().map_or(order, |places| places[order])
     }
+}
+
+/// Expands meshes, in builds that have them.
+fn expanded(scene: Cow<'_, Scene>) -> Expanded<'_> {
+    if BUILT.meshes { Expanded::new(scene) } else { Expanded { scene, faces: None } }
 }
 
 fn is_glass(object: &Object) -> bool {

@@ -288,6 +288,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
+    shade_faces::<S, E, EYE>(Some(beyond), queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.bodies().is_some() {
         occluders.find_bodies(simd, scene, hits);
@@ -297,6 +298,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     } else {
         add_all_lights::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, occluders);
     }
+    hits.leave_faces();
     let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
@@ -331,7 +333,8 @@ fn surfaces_of_all<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     queue: &RayBatch<E>,
     hits: &mut Hits<E>,
 ) {
-    if scene.has_glass() {
+    let is_shaded = scene.beyond.as_ref().is_some_and(|beyond| beyond.shaded().is_some());
+    if scene.has_glass() || is_shaded {
         surfaces::<S, E, Anything<N::By>, EYE, true, true, true>(simd, scene, background, queue, hits);
     } else {
         surfaces::<S, E, Anything<N::By>, EYE, true, true, false>(simd, scene, background, queue, hits);
@@ -359,11 +362,13 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
+    shade_faces::<S, E, EYE>(beyond, queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.is_some_and(|beyond| beyond.bodies().is_some()) {
         occluders.find_bodies(simd, scene, hits);
     }
     light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, occluders);
+    hits.leave_faces();
     let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
@@ -380,6 +385,20 @@ fn paint<S: Simd, E: Real, const EYE: bool>(
         finishes.paint::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
     }
     painted.is_some()
+}
+
+/// Gives hits the normals and colours of the faces of meshes.
+#[inline(always)]
+fn shade_faces<S: Simd, E: Real, const EYE: bool>(
+    beyond: Option<&Extensions<E>>,
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+) {
+    match beyond.and_then(Extensions::shaded) {
+        Some(faces) => faces.shade::<E, EYE>(queue, hits, Lanes::<S, E>::LEN),
+        None if parts::BUILT.meshes => hits.forget_faces(),
+        None => {}
+    }
 }
 
 /// Mixes fog into the colours of hits. Returns whether the mirror coefficients are stored with the hits: after patterns

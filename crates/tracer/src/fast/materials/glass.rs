@@ -9,6 +9,7 @@ use rayfold_scene::{Object, Scene, Tone};
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::Surface;
+use crate::meshes::Faces;
 use crate::reference;
 
 /// The glass of a scene.
@@ -46,8 +47,10 @@ pub(crate) const SURFACES_OF_ONE: usize = 4;
 
 impl<E: Real> Glass<E> {
     /// Returns `None` if there is no glass.
-    pub(crate) fn new(scene: &Scene) -> Option<Self> {
-        let panes: Vec<_> = scene.objects.iter().map(Pane::new).collect();
+    pub(crate) fn new(scene: &Scene, faces: Option<&Faces>) -> Option<Self> {
+        let is_filled = |order| faces.is_some_and(|faces| faces.is_filled(order));
+        let panes: Vec<_> =
+            scene.objects.iter().enumerate().map(|(order, o)| Pane::new(o, is_filled(order))).collect();
         let count = panes.iter().flatten().count();
         let faint = match scene.tone {
             Tone::Plain => reference::FAINT,
@@ -80,7 +83,8 @@ impl<E: Real> Glass<E> {
 }
 
 impl<E: Real> Pane<E> {
-    fn new(object: &Object) -> Option<Self> {
+    /// `is_filled` is whether the object is a face of a closed body.
+    fn new(object: &Object, is_filled: bool) -> Option<Self> {
         let glass = object.material().finish()?.glass?;
         let shape = match object {
             Object::Instance(instance) => instance.object(),
@@ -89,7 +93,7 @@ impl<E: Real> Pane<E> {
         Some(Self {
             color: glass.color().to_array().map(E::narrow),
             ior: E::narrow(glass.ior()),
-            is_flat: !reference::has_inside(shape),
+            is_flat: !is_filled && !reference::has_inside(shape),
         })
     }
 

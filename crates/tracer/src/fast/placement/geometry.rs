@@ -22,6 +22,7 @@ use crate::fast::rays::placed::{RenderSpaceShape, nearest_within};
 use crate::fast::rays::view::{View, middle, view};
 use crate::fast::shapes::{Shape, Solid, reach};
 use crate::fast::shared::SharedSurfaces;
+use crate::meshes::Faces;
 use crate::parallel::map;
 use crate::sampling::places::spread;
 use crate::scale::below_inverse;
@@ -46,6 +47,8 @@ pub(crate) struct Geometry {
     pub(crate) is_foggy: bool,
     /// The objects that share surfaces, after [the search for them](Self::with_shared_surfaces).
     pub(crate) shared: Option<SharedSurfaces>,
+    /// The faces that triangles are, if they have more than triangles.
+    pub(crate) faces: Option<Arc<Faces>>,
     /// A length of the scene times this is a length in these coordinates.
     pub(crate) scale: f64,
     /// The origin of these coordinates in the scene: `(point - center) * scale` is a point in these coordinates.
@@ -113,6 +116,7 @@ impl Geometry {
             is_finished,
             is_foggy: scene.fog.get().is_some(),
             shared: None,
+            faces: None,
             scale,
             center,
         })
@@ -120,6 +124,11 @@ impl Geometry {
 }
 
 impl Geometry {
+    /// Adds what the faces of meshes have beyond triangles.
+    pub(crate) fn with_faces(self, faces: Option<&Arc<Faces>>) -> Self {
+        Self { faces: faces.filter(|faces| faces.are_shaded()).cloned(), ..self }
+    }
+
     /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.
     pub(crate) fn with_shared_planes(mut self, scene: &Scene) -> Self {
         let first = scene.objects.first().map(Object::material);

@@ -92,6 +92,15 @@ pub(crate) struct Hits<E> {
     pub(crate) mirror: [Vec<E>; 3],
     /// The share that fog leaves of what a ray brings. Filled only for scenes with fog.
     pub(crate) clearness: Vec<E>,
+    /// The normals of the faces of meshes. These four are filled only for scenes with faces that have normals, colours or
+    /// an inside; in them `start` is where shadow rays start, and `normal` that of the light.
+    pub(crate) face: [Vec<E>; 3],
+    /// The starts of rays that go on.
+    pub(crate) place: [Vec<E>; 3],
+    /// The way from the starts of shadow rays to the other side of the face, for lights behind it; 0 if it hides them.
+    pub(crate) under: [Vec<E>; 3],
+    /// The normals at which rays go on.
+    pub(crate) onward: [Vec<E>; 3],
     /// For each packet with hits: its first index, and the spheres that can occlude its light, as bits.
     pub(crate) packets: Vec<(usize, u64)>,
     /// For each packet with mirrors: its first index, and the lanes that hit them, as bits.
@@ -110,8 +119,35 @@ impl<E: Real> Hits<E> {
             color: columns(),
             mirror: [vec![], vec![], vec![]],
             clearness: vec![],
+            face: [vec![], vec![], vec![]],
+            place: [vec![], vec![], vec![]],
+            under: [vec![], vec![], vec![]],
+            onward: [vec![], vec![], vec![]],
             packets: Vec::with_capacity(PIXELS),
             mirrors: Vec::new(),
+        }
+    }
+
+    /// Returns the starts of shadow rays towards a light. A face with normals does not hide a light from a ray that starts
+    /// on it.
+    #[inline(always)]
+    pub(crate) fn shadow_start<S: Simd>(&self, simd: S, at: usize, towards: Vec3<S, E>) -> Vec3<S, E> {
+        let start = Vec3::load(simd, &self.start, at);
+        if self.under[0].is_empty() {
+            return start;
+        }
+        let under = Vec3::<S, E>::load(simd, &self.under, at);
+        let is_behind = under.dot(towards).simd_gt(Lanes::<S, E>::splat(simd, E::narrow(0.0)));
+        Vec3::select(is_behind, start.sub(under.scale(Lanes::<S, E>::splat(simd, E::narrow(-1.0)))), start)
+    }
+
+    /// Returns the hits as lights see them: the points themselves, where shadow rays start elsewhere.
+    #[inline(always)]
+    pub(crate) fn places<S: Simd>(&self, simd: S, at: usize) -> Vec3<S, E> {
+        if self.place[0].is_empty() {
+            Vec3::load(simd, &self.start, at)
+        } else {
+            Vec3::load(simd, &self.place, at)
         }
     }
 

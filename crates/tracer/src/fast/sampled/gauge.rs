@@ -176,7 +176,9 @@ fn curvature(object: &Object) -> Option<(f64, DVec3)> {
         Object::Torus(o) => Some((o.thickness(), o.center())),
         Object::Capsule(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
         Object::Instance(o) => curvature(&in_world(o)?),
-        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) => None,
+        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
+            None
+        }
     }
 }
 
@@ -213,7 +215,7 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
             Hull { points: o.vertices().to_vec(), girth: height(o.vertices()), is_flat: true }
         }
         Object::Cuboid(o) => of_box(o, |p| p, 1.0),
-        Object::Plane(_) => return None,
+        Object::Plane(_) | Object::Mesh(_) => return None,
         Object::Disc(o) => {
             let points = ring(o.center(), o.normal(), o.radius()).collect();
             Hull { points, girth: f64::INFINITY, is_flat: true }

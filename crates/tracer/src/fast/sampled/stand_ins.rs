@@ -63,7 +63,7 @@ impl<'a> Widener<'a> {
                 }
             }
             Object::Cuboid(o) => self.brick((o.min(), o.max()), None, HALVINGS),
-            Object::Plane(_) => {}
+            Object::Plane(_) | Object::Mesh(_) => {}
             Object::Disc(o) => {
                 let n = unit(o.normal());
                 let wider = self.wider(o.center())
@@ -153,7 +153,9 @@ pub(super) fn repainted(object: &Object, material: Material) -> Option<Object> {
         }
         Object::Capsule(o) => Object::from(Capsule::new(o.radius(), o.ends(), material).ok()?),
         Object::Instance(o) => return repainted(&in_world(o)?, material),
-        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) => return None,
+        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
+            return None;
+        }
     };
     Some(made)
 }

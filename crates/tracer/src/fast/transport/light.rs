@@ -172,6 +172,7 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                         facing &= shows(simd, hits, at, glossy);
                     }
                     let mut lit = facing;
+                    let start = hits.shadow_start(simd, at, towards);
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
                         lit = unoccluded::<S, E, F>(simd, scene, light, start, lit, candidates);
@@ -196,8 +197,16 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     }
                 }
                 for lamp in lamps {
-                    let Rays { ray, far, part } = lamp.rays(simd, start);
-                    let cosine = normal.dot(ray.direction);
+                    let Rays { ray, far, part } = lamp.rays(simd, hits.places(simd, at));
+                    let (towards, cosine) = (ray.direction, normal.dot(ray.direction));
+                    let (ray, far) = match hits.place[0].is_empty() {
+                        true => (ray, far),
+                        false => {
+                            let start = hits.shadow_start(simd, at, towards);
+                            let Rays { ray, far, .. } = lamp.rays(simd, start);
+                            (ray, far)
+                        }
+                    };
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
                         facing &= shows(simd, hits, at, glossy);
@@ -222,7 +231,7 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     }
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
+                        let lit = Lit { lanes: lit, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
                     }
                 }
@@ -293,6 +302,13 @@ pub(crate) fn region<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> ([E; 3], [E; 
         let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, &hits.start, at);
         low = Vec3::<S, E>::new(low.x.min(x), low.y.min(y), low.z.min(z));
         high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
+        if !hits.under[0].is_empty() {
+            let minus = constant::<S, E>(simd, -1.0);
+            let under = Vec3::<S, E>::load(simd, &hits.under, at).scale(minus);
+            let Vec3 { x, y, z } = Vec3::<S, E>::load(simd, &hits.start, at).sub(under);
+            low = Vec3::<S, E>::new(low.x.min(x), low.y.min(y), low.z.min(z));
+            high = Vec3::<S, E>::new(high.x.max(x), high.y.max(y), high.z.max(z));
+        }
     }
     (
         [low.x.reduce_min(), low.y.reduce_min(), low.z.reduce_min()],

@@ -50,6 +50,11 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                 let offset = Lanes::<S, E>::from_slice(simd, &offset.0[lanes.clone()]);
                 let within = Lanes::<S, E>::from_slice(simd, &within.0[lanes.clone()]);
                 let surface = Surface { start, normal, offset, within: within.simd_ne(zero.x) };
+                // Rays that go through a face start behind the face itself.
+                let face = match hits.face[0].is_empty() {
+                    true => surface,
+                    false => Surface { normal: Vec3::load(simd, &hits.face, at), ..surface },
+                };
                 // The weights of the reflected and of the refracted ray.
                 let mut mirror = if PAINTED { Vec3::load(simd, &hits.mirror, at) } else { zero };
                 let (mut through, mut bent) = (zero, zero);
@@ -87,7 +92,7 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                     lanes: sent & glass.followed(simd, mirror, have_met_glass),
                 };
                 let refracted = SpawnedRays {
-                    origin: surface.beyond(simd),
+                    origin: face.beyond(simd),
                     direction: bent,
                     weight: through,
                     lanes: sent & of_glass & glass.followed(simd, through, have_met_glass),

@@ -230,6 +230,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         None => light.sun.towards(simd),
                         Some((own, _)) => points.of::<S, EYE>(simd, *own, &queue.pixel, at),
                     };
+                    let start = hits.shadow_start(simd, at, towards);
                     let ray = Ray { origin: start, direction: towards };
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
@@ -265,14 +266,22 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     }
                 }
                 for (index, lamp) in lamps.iter().enumerate() {
-                    let Rays { ray, far, part } = match &extents.lamps[index] {
+                    let rays_from = |start: Vec3<S, E>| match &extents.lamps[index] {
                         None => lamp.rays(simd, start),
                         Some((own, _)) => {
                             let point = points.of::<S, EYE>(simd, *own, &queue.pixel, at);
                             lamp.rays_to(simd, start, point)
                         }
                     };
-                    let cosine = normal.dot(ray.direction);
+                    let Rays { ray, far, part } = rays_from(hits.places(simd, at));
+                    let (towards, cosine) = (ray.direction, normal.dot(ray.direction));
+                    let (ray, far) = match hits.place[0].is_empty() {
+                        true => (ray, far),
+                        false => {
+                            let Rays { ray, far, .. } = rays_from(hits.shadow_start(simd, at, towards));
+                            (ray, far)
+                        }
+                    };
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
                         facing &= shows(simd, hits, at, finishes);
@@ -295,7 +304,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     }
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards: ray.direction, color: color.scale(part) };
+                        let lit = Lit { lanes: lit, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
                     }
                 }

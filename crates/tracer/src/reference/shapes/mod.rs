@@ -99,6 +99,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Torus(torus) => torus,
         Object::Capsule(capsule) => capsule,
         Object::Instance(instance) => instance,
+        Object::Mesh(_) => unreachable!("meshes are expanded to their triangles"),
     }
 }
 

@@ -1,0 +1,282 @@
+//! Meshes as the tracers see them: every face is a triangle, and a table says what a face has beyond one.
+//!
+//! A mesh is expanded before a scene is prepared, to the very triangles that a script could write out. So a flat mesh has
+//! the pixels of its triangles, bit for bit. A mesh in a group is expanded once, however often the group is drawn.
+//! Normals, colours at vertices and the inside of closed glass are looked up by the position of a triangle among all
+//! objects ([`Faces`]), when a ray has hit it.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayfold_scene::assets::{Closure, Look, Model};
+use rayfold_scene::{
+    Coefficients, Finish, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone, Triangle,
+};
+
+use crate::reference::onward_normal;
+
+/// A scene without meshes, and the faces that its triangles were.
+#[derive(Debug)]
+pub(crate) struct Expanded<'a> {
+    pub(crate) scene: Cow<'a, Scene>,
+    pub(crate) faces: Option<Arc<Faces>>,
+}
+
+/// The faces of meshes, by their positions among all objects.
+#[derive(Debug, Default)]
+pub(crate) struct Faces {
+    /// In the order of the objects.
+    runs: Vec<Run>,
+}
+
+/// The faces of one mesh, as it is drawn once.
+#[derive(Debug)]
+struct Run {
+    /// The position of the first face, and the number of faces.
+    first: usize,
+    count: usize,
+    /// The position of the mesh before it was expanded.
+    object: usize,
+    model: Arc<Model>,
+    placement: Option<Arc<Placement>>,
+    /// Whether colours are linear light.
+    is_linear: bool,
+    /// Whether the colours at its vertices multiply its coefficients.
+    has_colors: bool,
+    /// Whether it also glows with the light of its file. Without colours at vertices that is a part of its materials.
+    glows: bool,
+    /// Whether it is a closed body of glass.
+    is_filled: bool,
+}
+
+/// What a face adds to the surface of a hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shading {
+    /// The unit normal that light and highlights see. It faces the ray.
+    pub(crate) normal: DVec3,
+    /// The unit normal at which rays are reflected and refracted. It faces the ray.
+    pub(crate) onward: DVec3,
+    /// The way from the hit to where shadow rays start, without the offset from the surface.
+    pub(crate) lift: DVec3,
+    /// The factor of ambient and diffuse coefficients.
+    pub(crate) color: DVec3,
+    /// The colour that is added.
+    pub(crate) glow: DVec3,
+    /// Whether the ray comes from within a closed body of glass.
+    pub(crate) within: bool,
+}
+
+/// A hit on a face.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FaceHit {
+    /// The point, in coordinates in which a point p of the world is at `(p - center) * scale`.
+    pub(crate) point: DVec3,
+    pub(crate) center: DVec3,
+    pub(crate) scale: f64,
+    /// The direction of the ray.
+    pub(crate) direction: DVec3,
+    /// The unit normal of the face, which faces the ray.
+    pub(crate) face: DVec3,
+}
+
+impl<'a> Expanded<'a> {
+    pub(crate) fn new(scene: Cow<'a, Scene>) -> Self {
+        if !scene.objects.iter().any(|object| mesh(object).is_some()) {
+            return Self { scene, faces: None };
+        }
+        let (objects, faces) = expanded(&scene.objects, scene.tone == Tone::Srgb);
+        Self {
+            scene: Cow::Owned(Scene { objects: objects.into(), ..scene.into_owned() }),
+            faces: Some(Arc::new(faces)),
+        }
+    }
+}
+
+/// Returns the number of objects after meshes are expanded.
+pub(crate) fn expanded_count(objects: &[Object]) -> usize {
+    objects.iter().map(|object| mesh(object).map_or(1, |mesh| mesh.model().triangle_count())).sum()
+}
+
+/// Returns the mesh that an object is, also in a group.
+pub(crate) fn mesh(object: &Object) -> Option<&Mesh> {
+    match object {
+        Object::Mesh(mesh) => Some(mesh),
+        Object::Instance(instance) => match instance.object() {
+            Object::Mesh(mesh) => Some(mesh),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Expands the meshes among objects. `is_linear` is whether colours are linear light.
+pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Faces) {
+    let mut all = Vec::with_capacity(expanded_count(objects));
+    let mut faces = Faces::default();
+    // The triangles of a group's mesh, by its place in memory.
+    let mut of_groups: HashMap<*const Mesh, SharedSlice<Object>> = HashMap::new();
+    for (place, object) in objects.iter().enumerate() {
+        let Some(mesh) = mesh(object) else {
+            all.push(object.clone());
+            continue;
+        };
+        let first = all.len();
+        let placement = match object {
+            Object::Instance(instance) => {
+                let triangles = of_groups
+                    .entry(std::ptr::from_ref(mesh))
+                    .or_insert_with(|| triangles(mesh, is_linear).collect());
+                let placement = instance.shared_placement();
+                all.extend(
+                    (0..triangles.len()).map(|k| Object::from(Instance::new(triangles, k, placement))),
+                );
+                Some(placement.clone())
+            }
+            _ => {
+                all.extend(triangles(mesh, is_linear));
+                None
+            }
+        };
+        let model = mesh.model();
+        let finish = mesh.material().finish();
+        let has_colors = finish.is_some_and(|finish| finish.own) && model.has_vertex_colors();
+        faces.runs.push(Run {
+            first,
+            count: all.len() - first,
+            object: place,
+            model: model.clone(),
+            placement,
+            is_linear,
+            has_colors,
+            glows: has_colors && !mesh.has_material() && model.looks().iter().any(|l| l.glow != DVec3::ZERO),
+            is_filled: finish.is_some_and(|finish| finish.glass.is_some())
+                && *model.closure() == Closure::Closed,
+        });
+    }
+    (all, faces)
+}
+
+/// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
+fn triangles(mesh: &Mesh, is_linear: bool) -> impl Iterator<Item = Object> {
+    let model = mesh.model();
+    let materials: Vec<Material> =
+        (0..model.looks().len()).map(|look| material(mesh, look, is_linear)).collect();
+    (0..model.triangle_count()).map(move |k| {
+        let triangle = Triangle::new(model.corners(k), materials[model.look(k)].clone());
+        triangle.unwrap_or_else(|_| unreachable!("positions of a model are finite")).into()
+    })
+}
+
+/// Returns the material of the faces of a look.
+fn material(mesh: &Mesh, look: usize, is_linear: bool) -> Material {
+    let material = mesh.material();
+    let Some(finish) = material.finish().filter(|finish| finish.own) else { return material.clone() };
+    let model = mesh.model();
+    let Look { unlit, .. } = model.looks()[look];
+    // Colours at vertices are looked up where they are hit.
+    let color = if model.has_vertex_colors() { DVec3::ONE } else { model.look_color(look, is_linear) };
+    let tinted = |own: Coefficients| {
+        let made = Coefficients::new(own.ambient() * color, own.diffuse() * color, own.mirror());
+        made.unwrap_or(own)
+    };
+    let mut coefficients = tinted(material.coefficients());
+    if !mesh.has_material() {
+        let glow = if model.has_vertex_colors() { DVec3::ZERO } else { model.glow(look, is_linear) };
+        let made = if unlit {
+            Coefficients::new(color, DVec3::ZERO, DVec3::ZERO)
+        } else {
+            Coefficients::new(coefficients.ambient() + glow, coefficients.diffuse(), coefficients.mirror())
+        };
+        coefficients = made.unwrap_or(coefficients);
+    }
+    let pattern =
+        finish.pattern.map(|pattern| rayfold_scene::Pattern { other: tinted(pattern.other), ..pattern });
+    Material::finished(coefficients, Finish { own: false, pattern, ..*finish })
+}
+
+impl Faces {
+    /// Returns whether a face has more than a triangle: normals, colours at its vertices, or an inside.
+    pub(crate) fn are_shaded(&self) -> bool {
+        self.runs.iter().any(Run::is_shaded)
+    }
+
+    /// Returns the position before meshes were expanded of the object at `order`.
+    pub(crate) fn origin(&self, order: usize) -> usize {
+        match self.runs[..self.runs.partition_point(|run| run.first <= order)].last() {
+            None => order,
+            Some(run) if order < run.first + run.count => run.object,
+            Some(run) => order - (run.first + run.count) + run.object + 1,
+        }
+    }
+
+    /// Returns whether the object at `order` is a face of a closed body of glass.
+    pub(crate) fn is_filled(&self, order: usize) -> bool {
+        self.run_of(order).is_some_and(|run| run.is_filled)
+    }
+
+    fn run_of(&self, order: usize) -> Option<&Run> {
+        let run = self.runs[..self.runs.partition_point(|run| run.first <= order)].last()?;
+        (order < run.first + run.count).then_some(run)
+    }
+
+    /// Returns what the face at `order` adds to the surface of a hit, or `None` for what is no more than a triangle.
+    /// `material` is that of the object at `order`.
+    pub(crate) fn shading(&self, order: usize, material: &Material, hit: FaceHit) -> Option<Shading> {
+        let run = self.run_of(order).filter(|run| run.is_shaded())?;
+        let k = order - run.first;
+        let FaceHit { point, center, scale, direction, face } = hit;
+        let into = |p: DVec3| match &run.placement {
+            Some(placement) => (placement.point(p) - center) * scale,
+            None => (p - center) * scale,
+        };
+        let corners = run.model.corners(k).map(into);
+        let weights = weights(corners, point);
+        let outwards = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let within = run.is_filled && outwards.dot(direction) > 0.0;
+        let (mut normal, mut lift) = (face, DVec3::ZERO);
+        if let Some(normals) = run.model.normals(k) {
+            let turned = |n: DVec3| match &run.placement {
+                Some(placement) => placement.rotation() * n,
+                None => n,
+            };
+            let normals = normals.map(turned);
+            let mixed: DVec3 = normals.iter().zip(weights).map(|(n, b)| *n * b).sum();
+            let mixed = if mixed.dot(face) < 0.0 { -mixed } else { mixed }.normalize_or_zero();
+            if mixed.dot(direction) < 0.0 {
+                normal = mixed;
+            }
+            for ((n, corner), b) in normals.into_iter().zip(corners).zip(weights) {
+                let n = if n.dot(face) < 0.0 { -n } else { n };
+                lift += b * n.dot(corner - point).max(0.0) * n;
+            }
+        }
+        let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
+        if run.has_colors {
+            color = run.model.color(k, weights, run.is_linear);
+        }
+        if run.glows {
+            glow = run.model.glow(run.model.look(k), run.is_linear);
+        }
+        let glass = material.finish().and_then(|finish| finish.glass);
+        let glass = glass.map(|glass| (glass, within, !run.is_filled));
+        let onward = onward_normal(direction, normal, face, glass);
+        Some(Shading { normal, onward, lift, color, glow, within })
+    }
+}
+
+impl Run {
+    fn is_shaded(&self) -> bool {
+        self.model.has_normals() || self.has_colors || self.is_filled
+    }
+}
+
+/// Returns the barycentric weights of a point of a triangle, none below 0.
+fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> [f64; 3] {
+    let across = (b - a).cross(c - a);
+    let [a, b, c] = [a, b, c].map(|corner| corner - point);
+    let areas = [b.cross(c), c.cross(a), a.cross(b)].map(|area| area.dot(across).max(0.0));
+    let sum: f64 = areas.iter().sum();
+    if sum > 0.0 { areas.map(|area| area / sum) } else { [1.0, 0.0, 0.0] }
+}

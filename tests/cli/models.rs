@@ -1,0 +1,81 @@
+//! Scripts that name models: `render`, `check` and `split` with files beside them.
+
+use crate::Folder;
+
+/// A script that draws the model in `corner.obj`.
+const SCRIPT: &str =
+    "Screen 8 6\nLook 2 2 3 .3 .3 0 40\nIlight 1 1 1 -1 -2 -1\nMesh \"corner.obj\"\nTrace\nTrace\n";
+
+const CORNER: &str = "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+
+const COLORS: &str = "newmtl red\nKd 1 0 0\n";
+
+#[test]
+fn a_model_is_read_from_the_folder_of_its_script() {
+    let folder = Folder::with("film/1.txt", SCRIPT);
+    folder.write("film/corner.obj", CORNER);
+    folder.write("film/colours.mtl", COLORS);
+    folder.rayfold("render film -o film.gif").assert().code(0);
+    folder.rayfold("render film/1.txt -o script.gif").assert().code(0);
+    assert_eq!(folder.read("film.gif"), folder.read("script.gif"));
+    folder.write("film/colours.mtl", "newmtl red\nKd 0 0 1\n");
+    folder.rayfold("render film -o blue.gif").assert().code(0);
+    assert_ne!(folder.read("film.gif"), folder.read("blue.gif"));
+}
+
+#[test]
+fn missing_files_and_other_letter_case_are_errors() {
+    let folder = Folder::with("film/1.txt", SCRIPT);
+    let said = |folder: &Folder| {
+        let output = folder.rayfold("check film").assert().code(1).get_output().stderr.clone();
+        String::from_utf8(output).unwrap()
+    };
+    assert!(said(&folder).contains("there is no file `corner.obj` in the script's folder"));
+    folder.write("film/Corner.OBJ", CORNER);
+    assert!(said(&folder).contains("there is `Corner.OBJ`: names are compared byte for byte"));
+}
+
+#[test]
+fn models_that_no_script_names_are_warnings() {
+    let folder = Folder::with("film/1.txt", SCRIPT);
+    folder.write("film/corner.obj", CORNER);
+    folder.write("film/colours.mtl", COLORS);
+    folder.write("film/other.stl", "solid");
+    folder.write("film/notes.md", "no model");
+    let output = folder.rayfold("check film").assert().code(0).get_output().stderr.clone();
+    let said = String::from_utf8(output).unwrap();
+    assert!(said.contains("other.stl: no script names this model"), "{said}");
+    assert!(
+        !said.contains("corner.obj") && !said.contains("colours.mtl") && !said.contains("notes"),
+        "{said}"
+    );
+}
+
+#[test]
+fn split_copies_the_files() {
+    let folder = Folder::with("1.txt", SCRIPT);
+    folder.write("corner.obj", CORNER);
+    folder.write("colours.mtl", COLORS);
+    folder.rayfold("split 1.txt parts").assert().code(0);
+    assert_eq!(folder.list("parts"), ["1-1.txt", "1-2.txt", "colours.mtl", "corner.obj"]);
+    folder.rayfold("render 1.txt -o whole.gif").assert().code(0);
+    folder.rayfold("render parts -o parts.gif").assert().code(0);
+    assert_eq!(folder.read("whole.gif"), folder.read("parts.gif"));
+    folder.rayfold("split 1.txt parts").assert().code(0);
+    folder.write("parts/corner.obj", "v 0 0 0");
+    let output = folder.rayfold("split 1.txt parts").assert().code(1).get_output().stderr.clone();
+    assert!(String::from_utf8(output).unwrap().contains("corner.obj holds another file already"));
+}
+
+#[test]
+fn submit_says_that_a_bucket_reads_no_files_yet() {
+    let folder = Folder::with("film/1.txt", SCRIPT);
+    folder.write("film/corner.obj", CORNER);
+    folder.write("film/colours.mtl", COLORS);
+    let output = folder.rayfold("submit film --bucket b").assert().code(1).get_output().stderr.clone();
+    let said = String::from_utf8(output).unwrap();
+    assert!(
+        said.contains("the scripts name files, such as `colours.mtl`, which are not read in a bucket yet"),
+        "{said}"
+    );
+}

@@ -1,0 +1,236 @@
+//! Meshes are drawn like the triangles of their files. Normals, colours and glass are drawn by the packets like by the
+//! reference tracer, and like shapes without triangles.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::fmt::Write;
+
+use glam::DVec3;
+use image::RgbImage;
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Limits, Scene, parse_with_files};
+use rayfold_tracer::probe::nearest_hits;
+use rayfold_tracer::{RenderOptions, reference, render};
+
+/// The triangles of a ball of radius 1, seen counterclockwise from outside, of about 2n² triangles.
+fn ball(n: usize) -> Vec<[DVec3; 3]> {
+    let point = |i: usize, j: usize| {
+        let (across, around) = (2.0 * n as f64, n as f64);
+        let (longitude, latitude) =
+            (std::f64::consts::TAU * (i % (2 * n)) as f64 / across, std::f64::consts::PI * j as f64 / around);
+        match j {
+            0 => DVec3::Y,
+            _ if j == n => DVec3::NEG_Y,
+            _ => DVec3::new(
+                latitude.sin() * longitude.cos(),
+                latitude.cos(),
+                -latitude.sin() * longitude.sin(),
+            ),
+        }
+    };
+    let mut all = vec![];
+    for j in 0..n {
+        for i in 0..2 * n {
+            let [a, b, c, d] = [point(i, j), point(i, j + 1), point(i + 1, j + 1), point(i + 1, j)];
+            if j + 1 < n {
+                all.push([a, b, c]);
+            }
+            if j > 0 {
+                all.push([a, c, d]);
+            }
+        }
+    }
+    all
+}
+
+/// Writes triangles as OBJ; with the normals of the ball, and a colour for each vertex.
+fn obj(triangles: &[[DVec3; 3]], with_normals: bool, with_colors: bool) -> Vec<u8> {
+    let mut text = String::new();
+    for p in triangles.iter().flatten() {
+        write!(text, "v {} {} {}", p.x, p.y, p.z).unwrap();
+        if with_colors {
+            let c = 0.5 + 0.5 * *p;
+            write!(text, " {} {} {}", c.x, c.y, c.z).unwrap();
+        }
+        writeln!(text).unwrap();
+        writeln!(text, "vn {} {} {}", p.x, p.y, p.z).unwrap();
+    }
+    for k in 0..triangles.len() {
+        let corners = [3 * k + 1, 3 * k + 2, 3 * k + 3];
+        let corner = |i: usize| if with_normals { format!(" {i}//{i}") } else { format!(" {i}") };
+        writeln!(text, "f{}", corners.map(corner).concat()).unwrap();
+    }
+    text.into_bytes()
+}
+
+fn library() -> Library {
+    let open: Vec<_> = ball(6).into_iter().filter(|t| t[0].y < 0.4).collect();
+    Library::new(MemoryFiles::from([
+        ("flat.obj", obj(&ball(6), false, false)),
+        ("round.obj", obj(&ball(6), true, false)),
+        ("fine.obj", obj(&ball(40), true, false)),
+        ("colored.obj", obj(&ball(6), true, true)),
+        ("open.obj", obj(&open, true, false)),
+    ]))
+}
+
+const STAGE: &str = "Screen 80 60\nLook 3 2.5 5 0 .2 0 32\nBackground .9 .95 1 .3 .5 .9\nIlight .8 .8 .7 -1 -2 -1\nPlight .5 .4 .4 \
+                     2 3 2\nMaterial floor ambient .1 .1 .1 diffuse .5 .5 .5\nMaterial red ambient .1 0 0 diffuse .8 .2 .1 shine .4 \
+                     .4 .4 30\nMaterial chrome diffuse .1 .1 .1 mirror .8 .8 .8\nMaterial glassy glass .95 .97 1 1.5 shine .5 .5 .5 \
+                     60\nMaterial own diffuse 1 1 1 own\nMaterial checks diffuse .9 .9 .9 checker .3 floor\nPlane 0 -1.05 0 0.02 1 \
+                     .01 floor\n";
+
+fn scene(lines: &str) -> Scene {
+    let text = format!("{STAGE}{lines}\nTrace");
+    let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library());
+    parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap()
+}
+
+fn drawn(scene: &Scene) -> RgbImage {
+    render(scene, &RenderOptions::default()).unwrap()
+}
+
+/// The lines of the triangles that a mesh is.
+fn written_out(triangles: &[[DVec3; 3]], material: &str) -> String {
+    let line = |[a, b, c]: &[DVec3; 3]| {
+        format!(
+            "Triangle {} {} {} {} {} {} {} {} {} {material}\n",
+            a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z
+        )
+    };
+    triangles.iter().map(line).collect()
+}
+
+#[test]
+fn a_flat_mesh_has_the_pixels_of_its_triangles() {
+    for material in ["red", "chrome", "checks", ".1 .1 .2 .5 .5 .9"] {
+        let (defined, name) = match material.starts_with('.') {
+            true => ("Material own2 ambient .1 .1 .2 diffuse .5 .5 .9\n", "own2"),
+            false => ("", material),
+        };
+        for samples in ["", "Samples 4 0\n"] {
+            let of = |object: &str| drawn(&scene(&format!("{samples}{defined}{object}")));
+            let mesh = of(&format!("Mesh \"flat.obj\" {name}"));
+            assert!(mesh == of(&written_out(&ball(6), material)), "{material} {samples}");
+            let flat = of(&format!("Mesh \"round.obj\" {name} flat"));
+            assert!(mesh == flat, "{material} {samples}: normals of the file are not used");
+            let used = |inner: &str| of(&format!("Group g\n{inner}\nEnd\nUse g .3 .1 -.4 10 20 30 .8"));
+            let group = used(&format!("Mesh \"flat.obj\" {name}"));
+            assert!(group == used(&written_out(&ball(6), material)), "{material} {samples}: in a group");
+            assert!(group != mesh);
+        }
+    }
+}
+
+#[test]
+fn without_a_material_a_mesh_has_the_colours_of_its_file() {
+    let neutral = "Material neutral ambient .08000000000000002 .08000000000000002 .08000000000000002 diffuse .7200000000000001 \
+                   .7200000000000001 .7200000000000001\n";
+    for tone in ["", "Tone srgb\n"] {
+        let mesh = drawn(&scene(&format!("{tone}Mesh \"flat.obj\"")));
+        let named = drawn(&scene(&format!("{tone}{neutral}Mesh \"flat.obj\" neutral")));
+        assert!(mesh == named, "{tone}");
+    }
+}
+
+/// Compares the packets with the reference tracer: at most one level, but for some pixels at outlines.
+fn compare(lines: &str) {
+    let scene = scene(lines);
+    let (fast, plain) = (drawn(&scene), reference::render(&scene, &RenderOptions::default()).unwrap());
+    let is_off =
+        |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1);
+    let off = fast.pixels().zip(plain.pixels()).filter(|pair| is_off(*pair)).count();
+    assert!(off <= 2, "{off} pixels of {lines}");
+}
+
+#[test]
+fn the_packets_draw_meshes_like_the_reference() {
+    for tone in ["", "Tone srgb\n"] {
+        for mesh in [
+            "Mesh \"round.obj\"",
+            "Mesh \"round.obj\" red",
+            "Mesh \"flat.obj\" red smooth 180",
+            "Mesh \"flat.obj\" red smooth 25",
+            "Mesh \"round.obj\" chrome",
+            "Mesh \"round.obj\" checks",
+            "Mesh \"colored.obj\"",
+            "Mesh \"colored.obj\" own flat",
+            "Mesh \"open.obj\" red",
+            "Mesh \"open.obj\" glassy",
+            "Mesh \"round.obj\" glassy",
+            "Mesh \"flat.obj\" glassy",
+            "Sphere .5 0 0 0 red\nMesh \"round.obj\" glassy",
+            "Mesh \"round.obj\" .1 .1 .2 .5 .5 .9 .2 .2 .2 smooth 90",
+        ] {
+            compare(&format!("{tone}{mesh}"));
+            compare(&format!(
+                "{tone}Group g\n{mesh}\nEnd\nUse g .3 .1 -.4 10 20 30 .8\nUse g -1.2 .2 0 0 40 0 .5"
+            ));
+        }
+    }
+}
+
+#[test]
+fn fog_lies_before_meshes() {
+    for mesh in ["\"colored.obj\"", "\"round.obj\" chrome", "\"round.obj\" glassy", "\"open.obj\" glassy"] {
+        compare(&format!("Fog .5 .6 .7 4\nMesh {mesh}"));
+    }
+}
+
+/// Returns the mean difference of the channels of two pictures, in levels.
+fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
+    let sum: u64 = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f64 / a.as_raw().len() as f64
+}
+
+#[test]
+fn a_fine_ball_with_normals_looks_like_a_sphere() {
+    for (material, most) in [("red", 0.7), ("chrome", 1.0), ("glassy", 2.0)] {
+        let sphere = drawn(&scene(&format!("Sphere 1 0 0 0 {material}")));
+        let mesh = drawn(&scene(&format!("Mesh \"fine.obj\" {material}")));
+        let off = difference(&sphere, &mesh);
+        assert!(off < most, "{material}: {off} levels");
+        // The faces alone are further off.
+        let flat = difference(&sphere, &drawn(&scene(&format!("Mesh \"fine.obj\" {material} flat"))));
+        assert!(flat > off, "{material}: {flat} levels");
+    }
+}
+
+#[test]
+fn a_coarse_ball_with_normals_has_no_dark_terminator() {
+    // Light from the side: nothing between full light and the terminator may be black.
+    let lines = "Clear\nIlight 1 1 1 -1 0 -.6\nMaterial white diffuse 1 1 1\nMesh \"round.obj\" white";
+    let scene = scene(lines);
+    let picture = drawn(&scene);
+    let expected = drawn(&self::scene(&lines.replace("Mesh \"round.obj\"", "Sphere 1 0 0 0")));
+    let dark =
+        picture.pixels().zip(expected.pixels()).filter(|(mesh, ball)| ball.0[0] > 60 && mesh.0[0] == 0);
+    // Only the outline differs.
+    assert!(dark.count() < 60, "shadows of faces on themselves");
+}
+
+#[test]
+fn rays_find_the_object_that_a_mesh_is() {
+    let scene = scene("Sphere .2 0 3 0 red\nMesh \"round.obj\" red\nSphere .2 0 -3 9 red");
+    let from = |target: DVec3| {
+        let origin = DVec3::new(0.0, 0.0, 9.0);
+        (origin, (target - origin).normalize())
+    };
+    let rays =
+        [from(DVec3::new(0.0, 3.0, 0.0)), from(DVec3::ZERO), (DVec3::new(0.0, -3.0, 20.0), DVec3::NEG_Z)];
+    let found = nearest_hits(&scene, &rays, &RenderOptions::default()).unwrap();
+    assert_eq!(found.map_objects(), [Some(1), Some(2), Some(3)]);
+    let hit = reference::nearest(&scene.objects, rays[1].0, rays[1].1).unwrap();
+    assert_eq!(hit.object, 2);
+}
+
+/// The positions of the objects that were found.
+trait Objects {
+    fn map_objects(&self) -> Vec<Option<usize>>;
+}
+
+impl Objects for Vec<Option<rayfold_tracer::probe::Found>> {
+    fn map_objects(&self) -> Vec<Option<usize>> {
+        self.iter().map(|found| found.as_ref().map(|found| found.object)).collect()
+    }
+}
