@@ -24,6 +24,7 @@ pub mod hard_cases;
 pub mod laptop;
 pub mod measure;
 pub mod metamorphic;
+pub mod models;
 pub mod needs;
 pub mod oracle;
 pub mod outlines;

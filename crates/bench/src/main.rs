@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
-    accuracy, coincident, fingerprints, gif, growth, measure, metamorphic, needs, outlines, parsing,
+    accuracy, coincident, fingerprints, gif, growth, measure, metamorphic, models, needs, outlines, parsing,
     sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
@@ -52,6 +52,8 @@ enum Measurement {
     Measure(measure::Args),
     /// Random scenes compared with variants that must look the same: scaled, rotated, reordered, split, grouped
     Metamorphic(metamorphic::Args),
+    /// Models of many triangles: time to load and to draw them
+    Models(models::Args),
     /// Instructions that scenes execute for unused parts of the tracer (needs valgrind)
     Needs(needs::Args),
     /// Dots at the outlines of triangle meshes, and wrong pixels at needles and planes seen edge-on
@@ -91,6 +93,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Growth(args) => growth::run(&args),
         Measurement::Measure(args) => measure::run(&args),
         Measurement::Metamorphic(args) => metamorphic::run(&args),
+        Measurement::Models(args) => models::run(&args),
         Measurement::Needs(args) => needs::run(&args),
         Measurement::Outlines(args) => outlines::run(&args),
         #[cfg(feature = "bucket")]
