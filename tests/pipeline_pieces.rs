@@ -76,6 +76,22 @@ async fn a_gif_in_pieces_has_the_bytes_of_one_in_one_piece() {
 }
 
 /// Returns a fate for the `number`th request of a kind below a prefix by assemblers.
+/// From the third frame on there is no background.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_gif_in_pieces_keeps_what_is_transparent() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = film((240, 180), 5);
+        for (_, script) in &mut files[2..5] {
+            *script = script.replace("Background .1 .2 .3", "Background none");
+        }
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        assert_tidy(&stage).await;
+    })
+    .await;
+}
+
 fn at(number: usize, kind: RequestKind, prefix: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
     let met = Arc::new(AtomicUsize::new(0));
     let count = met.clone();

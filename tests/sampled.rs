@@ -211,7 +211,11 @@ fn each_pass_is_a_picture_and_the_last_is_the_one_that_is_drawn() {
     let mut passes = vec![];
     let last = frame.with(|exposure| {
         let options = RenderOptions::default();
-        Drawing::exposed(exposure, &options).unwrap().draw_progressively(|image| passes.push(image)).unwrap()
+        Drawing::exposed(exposure, &options)
+            .unwrap()
+            .draw_progressively(|image| passes.push(image.into_rgb8()))
+            .unwrap()
+            .into_rgb8()
     });
     assert!(last == frame.draw(&RenderOptions::default()));
     assert!(passes.len() > 5, "{}", passes.len());

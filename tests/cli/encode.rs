@@ -77,7 +77,7 @@ fn grey_deep_and_transparent_images_are_frames_too() {
         image.save(folder.join(name)).unwrap();
     }
     let names = images.each_ref().map(|(name, ..)| *name).join(" ");
-    folder.rayfold(&format!("encode {names} --no-sort -o out.gif")).assert().code(0);
+    folder.rayfold(&format!("encode {names} --no-sort --matte #000000 -o out.gif")).assert().code(0);
     let shown = decode_gif(&folder.read("out.gif"));
     assert_eq!(shown.len(), images.len());
     for ((name, _, expected), (frame, _)) in images.iter().zip(&shown) {

@@ -6,6 +6,7 @@
 
 mod bad_input;
 mod check;
+mod clear;
 mod cost;
 mod documented;
 mod encode;

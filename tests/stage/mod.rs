@@ -287,7 +287,8 @@ pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
     for (_, script) in &scripts {
         for scene in script.frames() {
             let options = rayfold_tracer::RenderOptions::default();
-            encoder.push(rayfold_tracer::render(&scene, &options).unwrap()).unwrap();
+            let exposure = rayfold_tracer::Exposure::still(&scene);
+            encoder.push(rayfold_tracer::render_picture(exposure, &options).unwrap()).unwrap();
         }
     }
     encoder.finish().unwrap();

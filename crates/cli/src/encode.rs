@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use image::RgbImage;
+use image::DynamicImage;
 use rayfold_files::probe;
 use rayfold_gif::{Encoder, Settings};
 use rayfold_movie::{Container, Movie, Plays};
@@ -41,7 +41,7 @@ const AHEAD: u64 = 14 << 20;
 /// Turn images into an animation
 ///
 /// Every image is a frame, and all are of one size; of an animated GIF, PNG or WebP and of a .y4m each frame is one, of
-/// a TIFF each page. What is transparent is shown over black.
+/// a TIFF each page. What is transparent stays so; a .gif shows a pixel or does not, and a .y4m shows black there.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -75,6 +75,9 @@ pub(crate) struct Args {
     /// Durations of frames, as JSON: {"5": 0.5} shows the fifth for half a second. An animation.json is such a file, too
     #[arg(long, value_name = "FILE")]
     durations: Option<PathBuf>,
+    /// Colour behind what is transparent, such as '#ffffff'
+    #[arg(long, value_name = "#RRGGBB", value_parser = values::color)]
+    matte: Option<[u8; 3]>,
     #[command(flatten)]
     playback: Playback,
     /// Reduce the levels of colours until the .gif or .webp has at most this size, such as 8M or 500k
@@ -123,15 +126,20 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         plays: args.playback.plays(Plays::Endless),
         last_delay_cs: args.playback.last_delay_cs(),
         exact: args.exact,
+        alpha: args.matte.is_none() && pictures.iter().any(|picture| picture.has_alpha),
     };
     let progress = Progress::start(console, "frames", frames.unwrap_or_default());
     let fill = |push: Push<'_>| {
         let (mut of_images, mut done) = (pictures.iter(), 0);
-        let take = |image: Option<RgbImage>| {
+        let take = |image: Option<DynamicImage>| {
             let picture = of_images.next().context("a picture for each image")?;
-            let mut take_one = |image, own: Option<f64>| {
+            let mut take_one = |image: DynamicImage, own: Option<f64>| {
                 anyhow::ensure!(!interrupt::stopping(), "interrupted");
                 done += 1;
+                let image = match args.matte {
+                    Some(matte) => rayfold_movie::over(image, matte).into(),
+                    None => image,
+                };
                 let seconds = durations.get(&done).copied().or(own.filter(|_| args.fps.is_none()));
                 push(image, seconds).map_err(|error| explain(error, &picture.name()))?;
                 progress.set(console, done);

@@ -46,6 +46,8 @@ pub(crate) struct Plan {
     pub(crate) settings: AnimationSettings,
     /// The numbers to compute with.
     pub(crate) precision: Precision,
+    /// The levels of the colour behind the objects of frames without background; `None` for alpha.
+    pub(crate) matte: Option<[u8; 3]>,
 }
 
 /// A frame to draw.
@@ -71,6 +73,8 @@ struct Part {
 struct Shape {
     screen: Screen,
     orthographic: bool,
+    /// Without background.
+    clear: bool,
     /// Rounded up to a power of two, so that a growing scene is few runs.
     objects: usize,
 }
@@ -86,6 +90,8 @@ pub(crate) struct Wishes {
     pub(crate) frames: (Option<u64>, Option<u64>),
     /// The numbers to compute with.
     pub(crate) precision: Precision,
+    /// The levels of the colour behind the objects of frames without background, which have alpha if it is not given.
+    pub(crate) matte: Option<[u8; 3]>,
 }
 
 /// Why the frames cannot be drawn although each script is fine by itself.
@@ -193,6 +199,7 @@ impl Plan {
             selected: first..=last,
             settings,
             precision: wishes.precision,
+            matte: wishes.matte,
         };
         if plan.size.is_some()
             && let Some((frame, part, _)) = plan.runs().find(|(_, _, shape)| shape.orthographic)
@@ -200,6 +207,11 @@ impl Plan {
             return Err(PlanError::Orthographic { frame, name: part.file.name.clone() });
         }
         Ok(plan)
+    }
+
+    /// Returns whether a frame that is drawn has no background.
+    pub(crate) fn has_clear_frames(&self) -> bool {
+        self.runs().any(|(_, _, shape)| shape.clear)
     }
 
     /// How many frames are to be drawn.
@@ -375,6 +387,7 @@ impl Part {
             let shape = Shape {
                 screen: shot.screen,
                 orthographic: shot.is_orthographic,
+                clear: shot.is_clear,
                 objects: shot.objects.next_power_of_two(),
             };
             match runs.last_mut() {

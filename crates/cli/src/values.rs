@@ -84,6 +84,24 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     if (1.0..=1e15).contains(&size) { Ok(size as u64) } else { Err(expected.into()) }
 }
 
+/// The levels of a colour, as `#rrggbb`.
+///
+/// # Errors
+/// The message says what was expected.
+pub(crate) fn color(text: &str) -> Result<[u8; 3], String> {
+    let expected = "expected # and six hexadecimal digits in quotes, such as '#ffffff'";
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii());
+    let digits = digits.ok_or(expected)?;
+    let level = |at: usize| {
+        digits
+            .get(at..at + 2)
+            .filter(|two| two.bytes().all(|digit| digit.is_ascii_hexdigit()))
+            .and_then(|two| u8::from_str_radix(two, 16).ok())
+            .ok_or(expected)
+    };
+    Ok([level(0)?, level(2)?, level(4)?])
+}
+
 /// Width and height, as `640x480`.
 ///
 /// # Errors

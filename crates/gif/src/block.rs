@@ -61,6 +61,8 @@ pub(crate) struct Block {
     /// The index that leaves a pixel as it is.
     pub(crate) transparent: Option<u8>,
     pub(crate) delay_cs: u16,
+    /// The canvas is clear after the block, where it was drawn.
+    pub(crate) clears: bool,
     /// The compressed indices, row by row.
     pub(crate) data: Vec<u8>,
 }
@@ -87,12 +89,17 @@ impl Block {
         let filler = transparent.map(|_| [0; 3]);
         let palette = colours.iter().chain(&filler).flatten().copied().collect::<Vec<_>>();
         let data = lzw::join(bits(palette.len() / 3), parts);
-        Self { area, palette, is_of_file: false, transparent, delay_cs, data }
+        Self { area, palette, is_of_file: false, transparent, delay_cs, clears: false, data }
     }
 
     /// Marks the palette as that of the file.
     pub(crate) fn of_file(self) -> Self {
         Self { is_of_file: true, ..self }
+    }
+
+    /// Makes the canvas clear after the block.
+    pub(crate) fn clearing(self) -> Self {
+        Self { clears: true, ..self }
     }
 
     /// Returns the bytes that depend on the choice of the palette.

@@ -5,8 +5,9 @@ use std::io::{self, Write};
 use std::num::NonZeroU16;
 
 use gif::{DisposalMethod, Repeat};
-use image::RgbImage;
+use image::{DynamicImage, RgbImage, RgbaImage};
 
+use crate::alone::{self, Alone};
 use crate::block::Block;
 use crate::error::{Error, LONGEST_SIDE};
 use crate::exact::{self, FewColours};
@@ -114,6 +115,49 @@ struct Running<W: Write> {
     size: (u32, u32),
     file: gif::Encoder<Counting<W>>,
     quantiser: Quantiser,
+    /// From the first frame with clear pixels on, in place of the quantiser.
+    alone: Option<Alone>,
+}
+
+/// A frame as it is drawn.
+enum Frame {
+    /// All of it is covered.
+    Opaque(RgbImage),
+    /// Some of it is clear.
+    Clear(RgbaImage),
+}
+
+impl Frame {
+    fn new(frame: DynamicImage) -> Self {
+        match frame {
+            DynamicImage::ImageRgba8(frame) if !alone::is_opaque(&frame) => Self::Clear(frame),
+            other => Self::Opaque(other.into_rgb8()),
+        }
+    }
+}
+
+impl<W: Write> Running<W> {
+    /// Takes the next frame, and returns the block of the one before it.
+    fn push(&mut self, frame: Frame, delay_cs: u16) -> Option<Block> {
+        if self.alone.is_none() && matches!(frame, Frame::Clear(_)) {
+            // What was drawn so far can be cleared only as a whole.
+            let before = self.quantiser.take_back();
+            let mut alone = Alone::default();
+            if let Some((frame, delay_cs)) = before {
+                alone.push(DynamicImage::ImageRgb8(frame).into_rgba8(), delay_cs);
+            }
+            self.alone = Some(alone);
+        }
+        match (&mut self.alone, frame) {
+            (Some(alone), Frame::Clear(frame)) => alone.push(frame, delay_cs),
+            (Some(alone), Frame::Opaque(frame)) => {
+                alone.push(DynamicImage::ImageRgb8(frame).into_rgba8(), delay_cs)
+            }
+            // No frame has clear pixels yet.
+            (None, Frame::Opaque(frame)) => self.quantiser.push(frame, delay_cs),
+            (None, Frame::Clear(_)) => None,
+        }
+    }
 }
 
 impl<W: Write> Encoder<W> {
@@ -132,15 +176,22 @@ impl<W: Write> Encoder<W> {
         Ok(Self { settings, thinning, timeline, pushed: 0, written: 0, duration_cs: 0, stage })
     }
 
-    /// Adds the next frame, and writes the one before it.
+    /// Adds the next frame, and writes the one before it. The frame has eight bits per channel, with or without alpha; others are
+    /// converted.
     ///
     /// # Errors
     ///
     /// [`Error::Size`] and [`Error::UnlikeSize`]: the frame is refused, and another may be pushed in its place.
     /// [`Error::Write`]: the animation is lost, and every later call returns the same error.
-    pub fn push(&mut self, frame: RgbImage) -> Result<(), Error> {
+    pub fn push(&mut self, frame: impl Into<DynamicImage>) -> Result<(), Error> {
         let number = self.pushed + 1;
-        let found = frame.dimensions();
+        let frame: DynamicImage = frame.into();
+        let frame = match frame {
+            DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => frame,
+            other if other.color().has_alpha() => other.into_rgba8().into(),
+            other => other.into_rgb8().into(),
+        };
+        let found = (frame.width(), frame.height());
         if found.0.min(found.1) == 0 || found.0.max(found.1) > LONGEST_SIDE {
             return Err(Error::Size { frame: number, found });
         }
@@ -160,7 +211,7 @@ impl<W: Write> Encoder<W> {
     /// # Errors
     ///
     /// The errors of [`push`](Self::push), and [`Error::TooFastForDelays`].
-    pub fn push_for(&mut self, frame: RgbImage, delay_cs: u16) -> Result<(), Error> {
+    pub fn push_for(&mut self, frame: impl Into<DynamicImage>, delay_cs: u16) -> Result<(), Error> {
         if self.settings.fps > MAX_FPS {
             return Err(Error::TooFastForDelays { fps: self.settings.fps });
         }
@@ -173,24 +224,28 @@ impl<W: Write> Encoder<W> {
     }
 
     /// Encodes a frame that is not dropped.
-    fn encode(&mut self, frame: RgbImage) -> Result<(), Error> {
-        let (number, size) = (self.pushed, frame.dimensions());
+    fn encode(&mut self, frame: DynamicImage) -> Result<(), Error> {
+        let (number, size) = (self.pushed, (frame.width(), frame.height()));
+        let frame = Frame::new(frame);
         let place = self.timeline.handed_out();
         let by_rate = self.timeline.advance();
         let delay_cs = self.settings.delays_cs.get(&place).copied().unwrap_or(by_rate);
         let mut running = match std::mem::replace(&mut self.stage, Stage::Failed) {
             Stage::Empty(writer) => {
                 let writer = Counting { inner: Some(writer), bytes: 0 };
-                let of_file = exact::palette_of_file(frame.as_raw().as_chunks().0);
+                let of_file = match &frame {
+                    Frame::Opaque(frame) => exact::palette_of_file(frame.as_raw().as_chunks().0),
+                    Frame::Clear(_) => None,
+                };
                 let file = begin(writer, size, self.settings.plays, of_file.as_ref())
                     .map_err(|source| Error::Write { frame: number, source })?;
                 let quantiser = Quantiser::new(self.settings.exact, of_file);
-                Box::new(Running { size, file, quantiser })
+                Box::new(Running { size, file, quantiser, alone: None })
             }
             Stage::Running(running) => running,
             Stage::Failed => return Err(self.failed_before()),
         };
-        if let Some(block) = running.quantiser.push(frame, delay_cs) {
+        if let Some(block) = running.push(frame, delay_cs) {
             self.write(&mut running.file, block)?;
         }
         self.stage = Stage::Running(running);
@@ -206,13 +261,17 @@ impl<W: Write> Encoder<W> {
         if let Some(last) = self.thinning.finish() {
             self.encode(last)?;
         }
-        let Running { size, mut file, mut quantiser } =
+        let Running { size, mut file, mut quantiser, alone } =
             match std::mem::replace(&mut self.stage, Stage::Failed) {
                 Stage::Empty(_) => return Err(Error::NoFrames),
                 Stage::Running(running) => *running,
                 Stage::Failed => return Err(self.failed_before()),
             };
-        if let Some(mut block) = quantiser.finish() {
+        let last = match alone {
+            Some(mut alone) => alone.finish(),
+            None => quantiser.finish(),
+        };
+        if let Some(mut block) = last {
             block.delay_cs = self.settings.last_delay_cs.unwrap_or(block.delay_cs);
             self.write(&mut file, block)?;
         }
@@ -262,7 +321,7 @@ impl<W: Write> Encoder<W> {
             match stage {
                 Stage::Empty(_) | Stage::Failed => state.bytes(&[EMPTY])?,
                 Stage::Running(running) => {
-                    let Running { size, mut file, quantiser } = *running;
+                    let Running { size, mut file, quantiser, alone } = *running;
                     // The file is not finished, so its trailer must not be written.
                     file.get_mut().inner = None;
                     state.bytes(&[RUNNING])?;
@@ -272,7 +331,11 @@ impl<W: Write> Encoder<W> {
                     let of_file = quantiser.of_file().map_or(&[][..], |of_file| &of_file.colours);
                     state.u16(of_file.len() as u16)?;
                     state.bytes(of_file.as_flattened())?;
-                    quantiser.write(&mut state)?;
+                    state.bytes(&[u8::from(alone.is_some())])?;
+                    match alone {
+                        Some(alone) => alone.write(&mut state)?,
+                        None => quantiser.write(&mut state)?,
+                    }
                 }
             }
             state.finish()
@@ -330,9 +393,13 @@ impl<W: Write> Encoder<W> {
                 let nowhere = Counting { inner: None, bytes: 0 };
                 let mut file = begin(nowhere, size, plays, of_file.as_ref())
                     .map_err(|source| Error::State { source })?;
-                let quantiser = Quantiser::read(&mut state, size, exact, of_file)?;
+                let (quantiser, alone) = if state.u8()? == 0 {
+                    (Quantiser::read(&mut state, size, exact, of_file)?, None)
+                } else {
+                    (Quantiser::new(exact, of_file), Some(Alone::read(&mut state, size)?))
+                };
                 *file.get_mut() = Counting { inner: Some(writer), bytes };
-                Stage::Running(Box::new(Running { size, file, quantiser }))
+                Stage::Running(Box::new(Running { size, file, quantiser, alone }))
             }
             _ => return Err(damaged("it is neither begun nor not")),
         };
@@ -386,10 +453,10 @@ fn begin<W: Write>(
 }
 
 fn write<W: Write>(file: &mut gif::Encoder<Counting<W>>, block: Block) -> io::Result<()> {
-    let Block { area, palette, is_of_file, transparent, delay_cs, data } = block;
+    let Block { area, palette, is_of_file, transparent, delay_cs, clears, data } = block;
     let frame = gif::Frame {
         delay: delay_cs,
-        dispose: DisposalMethod::Keep,
+        dispose: if clears { DisposalMethod::Background } else { DisposalMethod::Keep },
         transparent,
         left: area.left as u16,
         top: area.top as u16,

@@ -38,7 +38,7 @@ impl FewColours {
     }
 
     /// Returns the number of a colour, or the slot where it belongs.
-    fn find(&self, rgb: [u8; 3]) -> Result<u8, usize> {
+    pub(crate) fn find(&self, rgb: [u8; 3]) -> Result<u8, usize> {
         let key = u32::from_le_bytes([rgb[0], rgb[1], rgb[2], 0]);
         let mut at = (key.wrapping_mul(0x9E37_79B1) >> 22) as usize % SLOTS;
         loop {

@@ -18,6 +18,8 @@
 //!   the picture drifts: at least an eighth of it changes from one frame to the next, and three quarters of that by
 //!   less than three levels, as in a slow fade of a gradient. Such a frame, and those after it until much changes
 //!   clearly, are off by at most 4 levels; the first is exact. With [`Settings::exact`] all are exact.
+//! - Frames may have alpha. A GIF has none: their pixels are drawn or clear, and of those that are covered in part an ordered
+//!   pattern is drawn. From the first such frame on, each frame is drawn alone.
 //! - No pixel of another frame is further off than 1.25 times the worst pixel of that frame encoded alone, measured
 //!   as the largest difference of a level, however many frames come before it.
 //!
@@ -36,6 +38,7 @@
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
 
+mod alone;
 mod block;
 mod bound;
 mod colour;

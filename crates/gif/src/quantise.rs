@@ -206,6 +206,13 @@ impl Quantiser {
     }
 }
 
+impl Quantiser {
+    /// Takes back the last frame, whose block is not written yet, and its delay.
+    pub(crate) fn take_back(&mut self) -> Option<(RgbImage, u16)> {
+        self.prepared.take().map(|prepared| (prepared.frame, prepared.delay_cs))
+    }
+}
+
 /// Tags for the plan of a prepared frame in a suspended animation.
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
@@ -388,7 +395,9 @@ impl Prepared {
                 let transparent = reservation.is_some().then_some(palette.colours.len() as u8);
                 let histogram = &self.buffers.histogram;
                 let (changed, error, bound) = (*changed, *error, *bound);
-                let colours = Colours { palette, nearest, histogram, transparent, changed, error, bound };
+                let is_alone = false;
+                let colours =
+                    Colours { palette, nearest, histogram, transparent, is_alone, changed, error, bound };
                 draw(pixels, width, *area, &self.buffers.updates.pixels, seen, colours, self.delay_cs)
             }
         }
@@ -409,7 +418,8 @@ fn least_stripes(changed: f64, colours: usize) -> usize {
     }
 }
 
-fn draw(
+/// Draws an area of a frame with the colours of a palette. Returns the block, and the static pixels that were redrawn.
+pub(crate) fn draw(
     pixels: &[[u8; 3]],
     width: usize,
     area: Area,

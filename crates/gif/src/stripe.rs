@@ -76,12 +76,21 @@ pub(crate) struct Colours<'a> {
     pub(crate) histogram: &'a Histogram,
     /// The index that leaves a pixel as it is.
     pub(crate) transparent: Option<u8>,
+    /// Nothing is seen where the frame leaves a pixel as it is.
+    pub(crate) is_alone: bool,
     /// The part of the frame that is drawn because it changed.
     pub(crate) changed: f64,
     /// The mean squared error of the pixels drawn.
     pub(crate) error: f32,
     /// The largest error of a pixel in levels. The nearest entries are within it.
     pub(crate) bound: u8,
+}
+
+impl Colours<'_> {
+    /// Returns the index that leaves a pixel as it is seen, unless nothing is seen there.
+    fn over(&self) -> Option<u8> {
+        self.transparent.filter(|_| !self.is_alone)
+    }
 }
 
 /// The position of a block, and its division into stripes.
@@ -153,7 +162,7 @@ impl<'a> Stripe<'a> {
     pub(crate) fn new(colours: Colours<'a>, writer: &'a mut Writer) -> Self {
         let part = (colours.changed / MUCH_CHANGED).min(1.0) as f32;
         // A viewer may see the first frame for a long time.
-        let soon_gone = if colours.transparent.is_some() { part } else { 0.0 };
+        let soon_gone = if colours.over().is_some() { part } else { 0.0 };
         let least = if colours.bound <= FEW_LEVELS { TOLERANCE_IF_FEW_LEVELS } else { TOLERANCE };
         let tolerance = least.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
         Self {
@@ -259,14 +268,14 @@ impl<'a> Stripe<'a> {
         let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
         // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
         if entry.error == 0.0
-            && (self.colours.transparent.is_none() || now != seen)
+            && (self.colours.over().is_none() || now != seen)
             && self.writer.extend(entry.index)
         {
             return entry.index;
         }
         let form = self.metric.around(now);
         let nearest = form.error(target, colour::levels(self.colour(entry.index)));
-        if let Some(transparent) = self.colours.transparent
+        if let Some(transparent) = self.colours.over()
             && self.is_within(now, seen)
         {
             let shown = form.error(target, colour::levels(seen));
@@ -392,6 +401,7 @@ mod tests {
             nearest: &nearest,
             histogram: &histogram,
             transparent: None,
+            is_alone: false,
             changed: 1.0,
             error,
             bound: u8::MAX,

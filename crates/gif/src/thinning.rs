@@ -2,7 +2,7 @@
 
 use std::io;
 
-use image::RgbImage;
+use image::{DynamicImage, GenericImageView as _, RgbImage, RgbaImage};
 
 use crate::error::{Error, LONGEST_SIDE};
 use crate::state::{StateReader, StateWriter, damaged};
@@ -26,9 +26,9 @@ pub struct Thinning {
 /// The frames of the current fiftieth of a second.
 #[derive(Debug)]
 struct Held {
-    first: RgbImage,
+    first: DynamicImage,
     /// The newest frame, unless it is `first`.
-    last: Option<RgbImage>,
+    last: Option<DynamicImage>,
 }
 
 impl Thinning {
@@ -59,7 +59,8 @@ impl Thinning {
     }
 
     /// Takes the next frame. Returns the next frame that remains, if that is known already.
-    pub fn push(&mut self, frame: RgbImage) -> Option<RgbImage> {
+    pub fn push(&mut self, frame: impl Into<DynamicImage>) -> Option<DynamicImage> {
+        let frame = frame.into();
         let number = self.pushed;
         self.pushed += 1;
         if !self.thins {
@@ -76,7 +77,7 @@ impl Thinning {
     }
 
     /// Returns the last frame, unless it was returned before.
-    pub fn finish(&mut self) -> Option<RgbImage> {
+    pub fn finish(&mut self) -> Option<DynamicImage> {
         self.held.take().map(|held| held.last.unwrap_or(held.first))
     }
 }
@@ -93,8 +94,11 @@ impl Thinning {
         state.bytes(&[1 + u8::from(last.is_some())])?;
         state.u64(first.width().into())?;
         state.u64(first.height().into())?;
-        state.bytes(first.as_raw())?;
-        last.as_ref().map_or(Ok(()), |last| state.bytes(last.as_raw()))
+        for frame in [Some(first), last.as_ref()].into_iter().flatten() {
+            state.bytes(&[frame.color().channel_count()])?;
+            state.bytes(frame.as_bytes())?;
+        }
+        Ok(())
     }
 
     /// Reads the state that was written after `pushed` frames.
@@ -107,8 +111,16 @@ impl Thinning {
         if count > 0 {
             let (width, height) = read_size(state)?;
             let mut image = || {
-                let levels = state.bytes(width as usize * height as usize * 3)?;
-                RgbImage::from_raw(width, height, levels).ok_or_else(|| damaged("its size is wrong"))
+                let channels = state.u8()?;
+                if !(3..=4).contains(&channels) {
+                    return Err(damaged("a frame that it holds has channels that there cannot be"));
+                }
+                let levels = state.bytes(width as usize * height as usize * usize::from(channels))?;
+                let frame = match channels {
+                    3 => RgbImage::from_raw(width, height, levels).map(DynamicImage::ImageRgb8),
+                    _ => RgbaImage::from_raw(width, height, levels).map(DynamicImage::ImageRgba8),
+                };
+                frame.ok_or_else(|| damaged("its size is wrong"))
             };
             let first = image()?;
             held = Some(Held { first, last: if count > 1 { Some(image()?) } else { None } });
@@ -139,7 +151,7 @@ mod tests {
         let mut left = (0..count).filter_map(|k| thinning.push(numbered(k))).collect::<Vec<_>>();
         left.extend(thinning.finish());
         assert_eq!(left.len() as u64, expected, "{fps} frames a second, {count} frames");
-        left.iter().map(|frame| frame[(0, 0)].0[0]).collect()
+        left.iter().map(|frame| frame.as_bytes()[0]).collect()
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Frames in the form in which the bucket stores them: PNG files of exactly an image's RGB pixels. The bytes of a
+//! Frames in the form in which the bucket stores them: PNG files of exactly an image's pixels, RGB or RGB and alpha. The bytes of a
 //! file depend on its pixels alone, not on the number of rows per write.
 
 use std::io::{Cursor, Write};
@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bytes::Bytes;
 use image::codecs::png::PngDecoder;
 use image::error::{LimitError, LimitErrorKind};
-use image::{ImageDecoder, ImageError, ImageResult, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageResult};
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter, StreamWriter};
 
 /// The size of a chunk of the file in bytes.
@@ -16,13 +16,13 @@ const CHUNK: usize = 1 << 16;
 /// The largest number of bytes per pixel of a PNG: 16 bits each of red, green, blue and alpha.
 const BYTES_A_PIXEL: u64 = 8;
 
-/// Encodes an image as PNG.
+/// Encodes an image of eight bits per channel, RGB or RGB and alpha, as PNG.
 ///
 /// # Errors
 /// An error if the image cannot be stored as PNG, which is always possible for one with pixels.
-pub(crate) fn encode(image: &RgbImage) -> Result<Bytes, EncodingError> {
-    let mut rows = Rows::begin(image.width(), image.height())?;
-    rows.push(image.as_raw())?;
+pub(crate) fn encode(image: &DynamicImage) -> Result<Bytes, EncodingError> {
+    let mut rows = Rows::begin(image.width(), image.height(), image.color().has_alpha())?;
+    rows.push(image.as_bytes())?;
     rows.finish()
 }
 
@@ -33,14 +33,14 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// Begins an image of this many columns and rows.
+    /// Begins an image of this many columns and rows, with or without alpha.
     ///
     /// # Errors
     /// An error if there are none, or more than the format allows.
-    pub(crate) fn begin(width: u32, height: u32) -> Result<Self, EncodingError> {
+    pub(crate) fn begin(width: u32, height: u32, has_alpha: bool) -> Result<Self, EncodingError> {
         let sink = Sink::default();
         let mut encoder = Encoder::new(sink.clone(), width, height);
-        encoder.set_color(ColorType::Rgb);
+        encoder.set_color(if has_alpha { ColorType::Rgba } else { ColorType::Rgb });
         encoder.set_depth(BitDepth::Eight);
         encoder.set_compression(Compression::Fast);
         encoder.set_filter(Filter::Adaptive);
@@ -48,7 +48,7 @@ impl Rows {
         Ok(Self { writer, sink })
     }
 
-    /// Adds the RGB pixels of the next rows.
+    /// Adds the pixels of the next rows.
     ///
     /// # Errors
     /// An error if the image has fewer rows.
@@ -81,11 +81,11 @@ impl Write for Sink {
     }
 }
 
-/// Decodes the RGB pixels of a PNG.
+/// Decodes the pixels of a PNG: eight bits each of red, green and blue, and of alpha if it has that.
 ///
 /// # Errors
 /// The error of the decoder. A file of more than `most_pixels` is refused before anything is decoded.
-pub(crate) fn decode(png: &[u8], most_pixels: u64) -> ImageResult<RgbImage> {
+pub(crate) fn decode(png: &[u8], most_pixels: u64) -> ImageResult<DynamicImage> {
     let mut decoder = PngDecoder::new(Cursor::new(png))?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > most_pixels {
@@ -95,21 +95,27 @@ pub(crate) fn decode(png: &[u8], most_pixels: u64) -> ImageResult<RgbImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(most_pixels.saturating_mul(BYTES_A_PIXEL));
     decoder.set_limits(limits)?;
-    Ok(image::DynamicImage::from_decoder(decoder)?.into_rgb8())
+    let image = DynamicImage::from_decoder(decoder)?;
+    Ok(if image.color().has_alpha() { image.into_rgba8().into() } else { image.into_rgb8().into() })
 }
 
 #[cfg(test)]
 mod tests {
+    use image::{RgbImage, RgbaImage};
+
     use super::*;
 
     #[test]
     fn an_image_reads_back_up_to_the_limit_and_not_beyond() {
-        let image = RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
-        let png = encode(&image).unwrap();
-        assert_eq!(decode(&png, 15).unwrap(), image);
-        assert!(matches!(decode(&png, 14), Err(ImageError::Limits(_))));
-        for end in 0..png.len() - 12 {
-            assert!(decode(&png[..end], 15).is_err(), "{end} of {} bytes", png.len());
+        let opaque = RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        let clear = RgbaImage::from_fn(5, 3, |x, y| image::Rgba([x as u8, y as u8, 7, 60 * x as u8]));
+        for image in [DynamicImage::from(opaque), clear.into()] {
+            let png = encode(&image).unwrap();
+            assert_eq!(decode(&png, 15).unwrap(), image);
+            assert!(matches!(decode(&png, 14), Err(ImageError::Limits(_))));
+            for end in 0..png.len() - 12 {
+                assert!(decode(&png[..end], 15).is_err(), "{end} of {} bytes", png.len());
+            }
         }
     }
 
@@ -123,10 +129,10 @@ mod tests {
                     [x as u8, (y / 3) as u8, 9].map(|level: u8| level.wrapping_add(dice.u8(0..=noise))),
                 )
             });
-            let whole = encode(&image).unwrap();
-            assert_eq!(decode(&whole, u64::MAX >> 3).unwrap(), image);
+            let whole = encode(&image.clone().into()).unwrap();
+            assert_eq!(decode(&whole, u64::MAX >> 3).unwrap(), image.clone().into());
             for _ in 0..20 {
-                let mut rows = Rows::begin(301, 200).unwrap();
+                let mut rows = Rows::begin(301, 200, false).unwrap();
                 let mut rest = &image.as_raw()[..];
                 while !rest.is_empty() {
                     // The pieces need not be whole rows.
@@ -137,7 +143,7 @@ mod tests {
                 assert!(rows.finish().unwrap() == whole, "noise {noise}");
             }
         }
-        let mut short = Rows::begin(301, 200).unwrap();
+        let mut short = Rows::begin(301, 200, false).unwrap();
         short.push(&[0; 301 * 3 * 199]).unwrap();
         assert!(short.finish().is_err(), "a row is missing");
     }
@@ -145,7 +151,7 @@ mod tests {
     /// A file of a few bytes whose header says 4 gigapixels.
     #[test]
     fn a_picture_that_claims_to_be_huge_is_refused_by_its_header() {
-        let mut png = encode(&RgbImage::new(1, 1)).unwrap().to_vec();
+        let mut png = encode(&RgbImage::new(1, 1).into()).unwrap().to_vec();
         let header = png.windows(4).position(|bytes| bytes == b"IHDR").unwrap();
         png[header + 4..header + 12].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
         let sum = crc(&png[header..header + 17]);

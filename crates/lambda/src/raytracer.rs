@@ -25,6 +25,9 @@ use crate::{png, pool};
 const SUMS_BYTES: u64 = 56;
 const FIRST_BYTES: u64 = 9;
 
+/// The bytes per pixel of its light and its cover, and of its levels with alpha, in a scene without background.
+const CLEAR_BYTES: u64 = 20;
+
 /// No more strips are drawn after this share of the remaining time.
 const MEASURING_SHARE: f64 = 0.1;
 
@@ -106,7 +109,7 @@ impl Renderer for RayTracer {
         let (limits, file) = (self.limits, format!("{name}.txt"));
         run(name, move || {
             Ok(match Shot::read(&file, &script, part, &limits) {
-                Ok(shot) => PngJoining::begin(shot.size(), count),
+                Ok(shot) => PngJoining::begin(shot.size(), shot.scene.background.is_none(), count),
                 Err(other) => Err(no_single_frame(&file, other)),
             })
         })
@@ -190,7 +193,7 @@ impl Shot {
         let drawn = self.expose(&options, |picture| {
             let extent = self.extent(picture.margin());
             match self.judge(picture, &extent, time) {
-                Verdict::Whole => match picture.draw() {
+                Verdict::Whole => match picture.draw_picture() {
                     Err(RenderError::Cancelled) if time.left.is_some() => {
                         Ok(Err(time.judge_late(&extent, extent.height)))
                     }
@@ -223,7 +226,7 @@ impl Shot {
         if rows.is_empty() {
             return Ok(Err(Reason::new(format!("{file}: a frame of {height} rows has no band {band}"))));
         }
-        match self.expose(&options, |picture| picture.draw_rows(rows)) {
+        match self.expose(&options, |picture| picture.draw_picture_rows(rows)) {
             Ok(image) => match png::encode(&image) {
                 Ok(image) => Ok(Ok(image)),
                 Err(source) => {
@@ -240,11 +243,14 @@ impl Shot {
     fn extent(&self, margin: u32) -> Extent {
         let (width, height) = self.size();
         let samples = self.scene.samples;
-        let pixel_bytes = match samples.most() {
+        let of_samples = match samples.most() {
             1 => 0,
             _ if samples.error() > 0.0 => FIRST_BYTES + SUMS_BYTES,
             _ => SUMS_BYTES,
         };
+        // The cover is sampled as the colour is.
+        let is_clear = self.scene.background.is_none();
+        let pixel_bytes = if is_clear { CLEAR_BYTES + 2 * of_samples } else { of_samples };
         Extent { width, height, pixel_bytes, margin }
     }
 
@@ -344,14 +350,23 @@ mod tests {
 
     #[tokio::test]
     async fn bands_are_the_frame_byte_for_byte_whatever_the_samples() {
-        for samples in ["1", "4 0", "16 2"] {
+        for (samples, is_clear) in ["1", "4 0", "16 2"].into_iter().flat_map(|s| [(s, false), (s, true)]) {
             let script = script("70 400", samples);
+            let script = if is_clear { on_nothing(&script) } else { script };
             let Drawing::Frame(whole) = draw(&script, None).await else { panic!("{samples}") };
+            assert_eq!(png::decode(&whole, Limits::PIXELS).unwrap().color().has_alpha(), is_clear);
             for count in [2, 5] {
                 let joined = put_together(&script, NonZeroU64::new(count).unwrap()).await;
                 assert!(joined == whole, "{samples} samples in {count} bands");
             }
         }
+    }
+
+    /// Returns a script without its background and its floor.
+    fn on_nothing(script: &Bytes) -> Bytes {
+        let text = str::from_utf8(script).unwrap().replace("Background .5 .6 .8", "Background none");
+        let lines = text.lines().filter(|line| !line.starts_with("Plane"));
+        lines.map(|line| format!("{line}\n")).collect::<String>().into()
     }
 
     /// A frame of many rays: measured by strips before it is drawn.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use image::{GenericImageView, RgbImage};
+use image::DynamicImage;
 use png::{BitDepth, ColorType, Compression, EncodingError};
 use rayfold_gif::{Plays, Thinning};
 
@@ -25,7 +25,7 @@ pub(crate) struct Apng<W: Write> {
     /// How many frames there will be in the file, and how many there are.
     frames: u64,
     written: u64,
-    last: Option<RgbImage>,
+    last: Option<DynamicImage>,
 }
 
 impl<W: Write> Apng<W> {
@@ -34,7 +34,7 @@ impl<W: Write> Apng<W> {
     pub(crate) fn new(out: W, movie: Movie) -> io::Result<Self> {
         let (width, height) = movie.size;
         let mut file = png::Encoder::new(out, width, height);
-        file.set_color(ColorType::Rgb);
+        file.set_color(if movie.alpha { ColorType::Rgba } else { ColorType::Rgb });
         file.set_depth(BitDepth::Eight);
         file.set_compression(Compression::Balanced);
         let thinning = Thinning::new(movie.fps, MAX_FPS);
@@ -52,7 +52,7 @@ impl<W: Write> Apng<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub(crate) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    pub(crate) fn push(&mut self, frame: DynamicImage, seconds: Option<f64>) -> io::Result<()> {
         if seconds.is_some() && self.movie.fps > MAX_FPS {
             let message =
                 format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
@@ -61,7 +61,7 @@ impl<W: Write> Apng<W> {
         self.thinning.push(frame).map_or(Ok(()), |frame| self.write(frame, seconds))
     }
 
-    fn write(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    fn write(&mut self, frame: DynamicImage, seconds: Option<f64>) -> io::Result<()> {
         let (number, whole) = (self.written, (0, 0, frame.width(), frame.height()));
         self.written += 1;
         let (left, top, width, height) = self.last.as_ref().map_or(whole, |last| changed(last, &frame));
@@ -75,8 +75,8 @@ impl<W: Write> Apng<W> {
             self.file.set_frame_dimension(width, height).map_err(into_io)?;
             self.file.set_frame_position(left, top).map_err(into_io)?;
         }
-        let part = frame.view(left, top, width, height).to_image();
-        self.file.write_image_data(&part).map_err(into_io)?;
+        let part = frame.crop_imm(left, top, width, height);
+        self.file.write_image_data(part.as_bytes()).map_err(into_io)?;
         self.last = Some(frame);
         Ok(())
     }
@@ -122,9 +122,14 @@ fn in_parts(seconds: f64) -> (u16, u16) {
 }
 
 /// Column, row, width and height of what differs; a pixel if nothing does, because a frame must have one.
-pub(crate) fn changed(last: &RgbImage, frame: &RgbImage) -> (u32, u32, u32, u32) {
-    let differs = |x: u32, y: u32| last.get_pixel(x, y) != frame.get_pixel(x, y);
-    let (width, height) = frame.dimensions();
+pub(crate) fn changed(last: &DynamicImage, frame: &DynamicImage) -> (u32, u32, u32, u32) {
+    let (width, height) = (frame.width(), frame.height());
+    let (each, bytes) =
+        (usize::from(frame.color().bytes_per_pixel()), [last, frame].map(DynamicImage::as_bytes));
+    let differs = |x: u32, y: u32| {
+        let at = (y as usize * width as usize + x as usize) * each;
+        bytes[0][at..at + each] != bytes[1][at..at + each]
+    };
     let rows: Vec<u32> = (0..height).filter(|&y| (0..width).any(|x| differs(x, y))).collect();
     let (Some(&top), Some(&bottom)) = (rows.first(), rows.last()) else { return (0, 0, 1, 1) };
     let is_in = |x: &u32| rows.iter().any(|&y| differs(*x, y));
@@ -143,17 +148,21 @@ fn into_io(error: EncodingError) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgb;
+    use image::{Rgb, RgbImage};
 
     #[test]
     fn what_has_changed_is_a_rectangle() {
         let blank = RgbImage::new(9, 7);
-        assert_eq!(changed(&blank, &blank), (0, 0, 1, 1));
+        let between = |a: &RgbImage, b: &RgbImage| changed(&a.clone().into(), &b.clone().into());
+        assert_eq!(between(&blank, &blank), (0, 0, 1, 1));
         let mut frame = blank.clone();
         frame.put_pixel(2, 6, Rgb([0, 0, 1]));
-        assert_eq!(changed(&blank, &frame), (2, 6, 1, 1));
+        assert_eq!(between(&blank, &frame), (2, 6, 1, 1));
         frame.put_pixel(8, 3, Rgb([9, 0, 0]));
-        assert_eq!(changed(&blank, &frame), (2, 3, 7, 4));
+        assert_eq!(between(&blank, &frame), (2, 3, 7, 4));
+        let mut clear = image::RgbaImage::new(9, 7);
+        clear.put_pixel(4, 5, image::Rgba([0, 0, 0, 1]));
+        assert_eq!(changed(&image::RgbaImage::new(9, 7).into(), &clear.into()), (4, 5, 1, 1));
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod y4m;
 use std::io::{self, Write};
 use std::str::FromStr;
 
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
 pub use rayfold_gif::Plays;
 use rayfold_gif::{Encoder, Settings};
 
@@ -25,7 +25,7 @@ use y4m::Y4m;
 /// The file format of an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Container {
-    /// At most 256 colours a frame.
+    /// At most 256 colours a frame. Pixels are drawn or clear.
     Gif,
     /// Lossless; the number of frames must be known before the first.
     Apng,
@@ -91,6 +91,8 @@ pub struct Movie {
     pub last_delay_cs: Option<u16>,
     /// Whether a GIF keeps frames of at most 256 colours exactly, whatever that takes.
     pub exact: bool,
+    /// Whether frames may have alpha. An APNG or a WebP then has alpha in all frames.
+    pub alpha: bool,
 }
 
 /// The error of an [`Encoding`].
@@ -123,7 +125,10 @@ pub struct Finished {
 }
 
 /// Frames on their way into a file.
-pub struct Encoding<W: Write>(Kind<W>);
+pub struct Encoding<W: Write> {
+    kind: Kind<W>,
+    alpha: bool,
+}
 
 enum Kind<W: Write> {
     Gif(Box<Encoder<W>>),
@@ -144,23 +149,34 @@ impl<W: Write> Encoding<W> {
     /// # Errors
     /// Fails if the writer does, or if the animation is beyond the limits of the container.
     pub fn begin(out: W, container: Container, movie: Movie) -> Result<Self, Error> {
-        let Movie { size, fps, plays, last_delay_cs, exact, .. } = movie;
+        let Movie { size, fps, plays, last_delay_cs, exact, alpha, .. } = movie;
         let settings = Settings { fps, plays, last_delay_cs, exact, ..Settings::default() };
-        Ok(Self(match container {
+        let kind = match container {
             Container::Gif => Kind::Gif(Box::new(Encoder::new(out, settings)?)),
             Container::Apng => Kind::Apng(Box::new(Apng::new(out, movie)?)),
             Container::Webp => Kind::Webp(Box::new(WebP::new(out, movie)?)),
             Container::Y4m => Kind::Y4m(Y4m::new(out, size, fps)?),
-        }))
+        };
+        Ok(Self { kind, alpha })
     }
 
     /// Takes the next frame, and its duration in seconds if that differs from that of the others. A [`Container::Y4m`]
-    /// has no durations and ignores them.
+    /// has no durations and ignores them. Alpha that the file cannot hold, or that was not [announced](Movie::alpha), is put
+    /// [over black](over).
     ///
     /// # Errors
     /// Fails if the writer does, or if the frame is beyond the limits of the container.
-    pub fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> Result<(), Error> {
-        match (&mut self.0, seconds) {
+    pub fn push(&mut self, frame: impl Into<DynamicImage>, seconds: Option<f64>) -> Result<(), Error> {
+        let frame: DynamicImage = frame.into();
+        let frame = match (frame.color().has_alpha(), &self.kind) {
+            (true, Kind::Gif(_)) if self.alpha => frame.into_rgba8().into(),
+            (has_alpha, Kind::Apng(_) | Kind::Webp(_)) if self.alpha => match has_alpha {
+                true => frame.into_rgba8().into(),
+                false => opaque(frame.into_rgb8()),
+            },
+            _ => over(frame, [0; 3]).into(),
+        };
+        match (&mut self.kind, seconds) {
             (Kind::Gif(encoder), None) => Ok(encoder.push(frame)?),
             // The conversion saturates.
             (Kind::Gif(encoder), Some(seconds)) => {
@@ -168,7 +184,7 @@ impl<W: Write> Encoding<W> {
             }
             (Kind::Apng(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
             (Kind::Webp(encoder), seconds) => Ok(encoder.push(frame, seconds)?),
-            (Kind::Y4m(encoder), _) => Ok(encoder.push(&frame)?),
+            (Kind::Y4m(encoder), _) => Ok(encoder.push(&frame.into_rgb8())?),
         }
     }
 
@@ -177,7 +193,7 @@ impl<W: Write> Encoding<W> {
     /// # Errors
     /// Fails if the writer does, or if the file is beyond the limits of the container.
     pub fn finish(self) -> Result<Finished, Error> {
-        let (dropped, length) = match self.0 {
+        let (dropped, length) = match self.kind {
             Kind::Gif(encoder) => (encoder.finish()?.dropped, None),
             Kind::Apng(encoder) => (encoder.finish()?, None),
             Kind::Webp(encoder) => {
@@ -188,6 +204,26 @@ impl<W: Write> Encoding<W> {
         };
         Ok(Finished { dropped, length })
     }
+}
+
+/// Puts a picture over a colour, by its levels as they stand. Without alpha it stays as it is.
+#[must_use]
+pub fn over(picture: DynamicImage, matte: [u8; 3]) -> RgbImage {
+    if !picture.color().has_alpha() {
+        return picture.into_rgb8();
+    }
+    let picture = picture.into_rgba8();
+    RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
+        let [red, green, blue, alpha] = picture.get_pixel(x, y).0.map(u32::from);
+        let channels = [red, green, blue];
+        let mixed = |k: usize| (channels[k] * alpha + u32::from(matte[k]) * (255 - alpha) + 127) / 255;
+        image::Rgb([0, 1, 2].map(|k| mixed(k) as u8))
+    })
+}
+
+/// Adds the alpha of a picture that is covered everywhere.
+fn opaque(picture: RgbImage) -> DynamicImage {
+    DynamicImage::ImageRgba8(DynamicImage::ImageRgb8(picture).into_rgba8())
 }
 
 impl Finished {
@@ -221,6 +257,7 @@ mod tests {
             plays: Plays::Endless,
             last_delay_cs: None,
             exact: false,
+            alpha: false,
         };
         for container in Container::ALL {
             let mut bytes = Vec::new();

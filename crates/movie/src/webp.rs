@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 
-use image::{GenericImageView, RgbImage};
+use image::DynamicImage;
 use image_webp::{ColorType, WebPEncoder};
 use rayfold_gif::{Plays, Thinning};
 
@@ -20,6 +20,7 @@ const LENGTH_AT: u64 = 4;
 
 /// Flags of the canvas and of a frame.
 const ANIMATED: u8 = 1 << 1;
+const ALPHA: u8 = 1 << 4;
 const OVERWRITES: u8 = 1 << 1;
 
 /// An encoder of frames.
@@ -31,7 +32,7 @@ pub(crate) struct WebP<W: Write> {
     written: u64,
     bytes: u64,
     /// The previous frame and its chunk, whose duration is known when the next frame comes.
-    last: Option<(RgbImage, Chunk)>,
+    last: Option<(DynamicImage, Chunk)>,
 }
 
 /// A picture, with its place on the canvas and its duration.
@@ -59,7 +60,7 @@ impl<W: Write> WebP<W> {
         let mut webp = Self { out, movie, thinning, pushed: 0, written: 0, bytes: 0, last: None };
         webp.write(b"RIFF\0\0\0\0WEBP")?;
         webp.write(b"VP8X\x0a\0\0\0")?;
-        webp.write(&[ANIMATED, 0, 0, 0])?;
+        webp.write(&[if movie.alpha { ANIMATED | ALPHA } else { ANIMATED }, 0, 0, 0])?;
         webp.write(&[u24(width - 1), u24(height - 1)].concat())?;
         webp.write(b"ANIM\x06\0\0\0\0\0\0\0")?;
         let times: u16 = match movie.plays {
@@ -75,7 +76,7 @@ impl<W: Write> WebP<W> {
     ///
     /// # Errors
     /// The writer's errors.
-    pub(crate) fn push(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    pub(crate) fn push(&mut self, frame: DynamicImage, seconds: Option<f64>) -> io::Result<()> {
         if seconds.is_some() && self.movie.fps > MAX_FPS {
             let message =
                 format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
@@ -85,7 +86,7 @@ impl<W: Write> WebP<W> {
         self.thinning.push(frame).map_or(Ok(()), |frame| self.add(frame, seconds))
     }
 
-    fn add(&mut self, frame: RgbImage, seconds: Option<f64>) -> io::Result<()> {
+    fn add(&mut self, frame: DynamicImage, seconds: Option<f64>) -> io::Result<()> {
         let start = |number: u64| (number as f64 * 1_000.0 / self.thinning.fps()).round();
         let ms = seconds.map_or_else(|| start(self.written + 1) - start(self.written), |s| 1_000.0 * s);
         let last = self.last.take();
@@ -98,9 +99,10 @@ impl<W: Write> WebP<W> {
             }
         };
         let mut file = Vec::new();
-        let part = frame.view(left, top, width, height).to_image();
+        let part = frame.crop_imm(left, top, width, height);
+        let color = if self.movie.alpha { ColorType::Rgba8 } else { ColorType::Rgb8 };
         WebPEncoder::new(&mut file)
-            .encode(part.as_raw(), width, height, ColorType::Rgb8)
+            .encode(part.as_bytes(), width, height, color)
             .map_err(io::Error::other)?;
         // The only chunk starts after the header of the file.
         let picture = file.split_off(12);

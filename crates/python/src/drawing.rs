@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use image::{DynamicImage, ImageEncoder, RgbImage, RgbaImage};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes};
@@ -42,17 +42,26 @@ pub(crate) struct Image {
 
 /// The pixels of a frame, row by row from the top.
 pub(crate) enum Pixels {
-    Levels(RgbImage),
-    /// Light before it becomes levels: three channels of each pixel.
+    /// Eight bits per channel: three, or four with alpha.
+    Levels(DynamicImage),
+    /// Light before it becomes levels: three channels of each pixel, or four with its cover.
     Light((u32, u32), Vec<f32>),
 }
 
 #[pymethods]
 impl Image {
-    /// Makes an image of three bytes for each pixel, row by row from the top.
+    /// Makes an image of three bytes for each pixel, or of four with alpha, row by row from the top.
     #[new]
     fn new(width: u32, height: u32, levels: &Bound<'_, PyBytes>) -> PyResult<Self> {
-        let image = RgbImage::from_raw(width, height, levels.as_bytes().to_vec());
+        let bytes = levels.as_bytes().to_vec();
+        let has_alpha = bytes.len() as u64 == 4 * u64::from(width) * u64::from(height);
+        let image: Option<DynamicImage> = if has_alpha {
+            RgbaImage::from_raw(width, height, bytes).map(Into::into)
+        } else {
+            // The length need not be exact for the crate.
+            let is_whole = bytes.len() as u64 == 3 * u64::from(width) * u64::from(height);
+            RgbImage::from_raw(width, height, bytes).filter(|_| is_whole).map(Into::into)
+        };
         let image = image.ok_or_else(|| PyValueError::new_err("the bytes are not those of such an image"))?;
         Ok(Self { pixels: Pixels::Levels(image) })
     }
@@ -61,15 +70,26 @@ impl Image {
     #[getter]
     fn size(&self) -> (u32, u32) {
         match &self.pixels {
-            Pixels::Levels(image) => image.dimensions(),
+            Pixels::Levels(image) => (image.width(), image.height()),
             Pixels::Light(size, _) => *size,
+        }
+    }
+
+    /// The channels of each pixel: 3, or 4 if there is alpha.
+    #[getter]
+    fn channels(&self) -> usize {
+        match &self.pixels {
+            Pixels::Levels(image) => image.color().channel_count().into(),
+            Pixels::Light((width, height), light) => {
+                light.len() / (*width as usize * *height as usize).max(1)
+            }
         }
     }
 
     /// The bytes of the pixels: levels, or floats of 32 bits in the machine's order.
     fn data<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
         match &self.pixels {
-            Pixels::Levels(image) => PyByteArray::new(py, image.as_raw()),
+            Pixels::Levels(image) => PyByteArray::new(py, image.as_bytes()),
             Pixels::Light(_, light) => {
                 let bytes: Vec<u8> = light.iter().flat_map(|channel| channel.to_ne_bytes()).collect();
                 PyByteArray::new(py, &bytes)
@@ -85,7 +105,7 @@ impl Image {
         let encode = || {
             let mut file = Vec::new();
             PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
-                .write_image(image, image.width(), image.height(), ExtendedColorType::Rgb8)
+                .write_image(image.as_bytes(), image.width(), image.height(), image.color().into())
                 .map(|()| file)
         };
         let file = py.detach(|| guarded(encode))?;
@@ -209,7 +229,7 @@ fn draw(script: &Parsed, frame: usize, linear: bool, cancel: &AtomicBool) -> Dra
         let screen = script.frame(frame).ok_or_else(missing)?.screen;
         return Ok(Pixels::Light((screen.width(), screen.height()), light));
     }
-    rayfold_tracer::render_frame(script, frame, &options).ok_or_else(missing)?.map(Pixels::Levels)
+    rayfold_tracer::picture_of_frame(script, frame, &options).ok_or_else(missing)?.map(Pixels::Levels)
 }
 
 /// Returns the summary of the `Trace` of a frame, counted from 0.

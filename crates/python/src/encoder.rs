@@ -37,9 +37,9 @@ enum Destination {
 #[pymethods]
 impl Encoder {
     /// Makes an encoder of a `format` (`"gif"`, `"apng"`, `"webp"`). `frames` is the number of frames that will be pushed,
-    /// which an APNG needs. `loops` is the number of repetitions, 0 for endless, or -1 to show it once.
+    /// which an APNG needs, and `alpha` says whether any has alpha. `loops` is the number of repetitions, 0 for endless, or -1 to show it once.
     #[new]
-    #[pyo3(signature = (path, format, size, frames, fps, loops, last_seconds, exact))]
+    #[pyo3(signature = (path, format, size, frames, fps, loops, last_seconds, exact, alpha = false))]
     #[expect(clippy::too_many_arguments, reason = "the properties of an animation, which Python names")]
     fn new(
         path: Option<PathBuf>,
@@ -50,6 +50,7 @@ impl Encoder {
         loops: i32,
         last_seconds: Option<f64>,
         exact: bool,
+        alpha: bool,
     ) -> PyResult<Self> {
         let destination = match path {
             Some(path) => Destination::File(OutputFile::create(path).map_err(os_error)?),
@@ -65,7 +66,7 @@ impl Encoder {
         };
         // The conversion saturates.
         let last_delay_cs = last_seconds.map(|seconds| (100.0 * seconds).round() as u16);
-        let movie = Movie { size, frames, fps, plays, last_delay_cs, exact };
+        let movie = Movie { size, frames, fps, plays, last_delay_cs, exact, alpha };
         let out = BufWriter::with_capacity(BUFFER, sink.clone());
         let container: Container =
             format.parse().map_err(|_| PyValueError::new_err(format!("there is no format {format:?}")))?;

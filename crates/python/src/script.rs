@@ -460,6 +460,11 @@ impl Script {
         Ok(self.parsed(py)?.frame_count())
     }
 
+    /// Returns whether a frame has no background.
+    fn _has_clear_frames(&mut self, py: Python<'_>) -> PyResult<bool> {
+        Ok(self.parsed(py)?.shots().any(|shot| shot.is_clear))
+    }
+
     /// Returns the columns and rows of a frame, counted from 0, and the largest number of objects in it.
     fn _shape(&mut self, py: Python<'_>, frame: usize) -> PyResult<(u32, u32, usize)> {
         let script = self.parsed(py)?;

@@ -127,7 +127,7 @@ fn missing_parameters() {
             2 | Background 1 1 # red
               |               ^ expected `b` here
               |
-              = help: write `Background r g b [R G B]`"#]],
+              = help: write `Background r g b [R G B] or none`"#]],
     );
 }
 
@@ -232,7 +232,7 @@ fn signs_and_blanks_of_a_word_processor() {
             2 | Background −1 1 0 0,5 0
               |                        ^ expected `B` here
               |
-              = help: write `Background r g b [R G B]`"#]],
+              = help: write `Background r g b [R G B] or none`"#]],
     );
 }
 
@@ -719,7 +719,7 @@ fn a_comma_as_decimal_sign() {
             2 | Background 0,5 1 0
               |                   ^ expected `G` here
               |
-              = help: a comma separates numbers: if `0,5` is to be one, it is `0.5`; write `Background r g b [R G B]`"#]],
+              = help: a comma separates numbers: if `0,5` is to be one, it is `0.5`; write `Background r g b [R G B] or none`"#]],
     );
     check(
         "Screen 4 3\nSphere 1,5 0 0 -5 1 0 0 0 0 0 # as 1.5\nTrace",
@@ -760,6 +760,6 @@ fn commas_that_separate_are_no_decimal_signs() {
             3 | Background 0,5,1,0
               |                   ^ expected `G` here
               |
-              = help: write `Background r g b [R G B]`"#]],
+              = help: write `Background r g b [R G B] or none`"#]],
     );
 }

@@ -445,7 +445,7 @@ fn part_of_what_stands_whole_or_not_at_all() {
             2 | Background 1 1 1 0 0
               |                     ^ expected `B` here
               |
-              = help: write `Background r g b [R G B]`
+              = help: write `Background r g b [R G B] or none`
 
             error: `Look` takes 7 or 10 numbers, found 9
              --> a.txt:3:24

@@ -129,6 +129,7 @@ fn background() -> BoxedStrategy<Background> {
     prop_oneof![
         vector().prop_map(|color| Background::new(color).unwrap()),
         (vector(), vector()).prop_map(|(low, high)| Background::sky(low, high).unwrap()),
+        Just(Background::NONE),
     ]
     .boxed()
 }
@@ -245,6 +246,10 @@ fn replay(steps: &[Step]) -> (String, Vec<Scene>) {
             }
             Step::Background(background) => {
                 scene.background = *background;
+                if background.is_none() {
+                    text += "Background NONE\r\n";
+                    continue;
+                }
                 let (low, high) = background.colors();
                 let colour = |c: DVec3| format!(" {:e},{:e},{:e}", c.x, c.y, c.z);
                 format!("BACKGROUND{}{}", colour(low), high.map_or(String::new(), colour))

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use axum::body::Body;
-use image::{ImageFormat, RgbImage};
+use image::{DynamicImage, ImageFormat};
 use rayfold_movie::{Container, Encoding, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Scene, Screen, Script};
-use rayfold_tracer::{RenderOptions, render, render_frame};
+use rayfold_tracer::{Exposure, RenderOptions, picture_of_frame, render_picture};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -75,16 +75,17 @@ impl Job {
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
         report(OutputState::Running { done: 0, of });
         for (done, &(script, k)) in self.settings.shown(&frames).enumerate() {
-            let Some(frame) = render_frame(script, k, &options) else { break };
+            let Some(frame) = picture_of_frame(script, k, &options) else { break };
             let frame = frame.map_err(|error| failed(&error))?;
             if let Some(out) = out.take() {
                 let movie = Movie {
-                    size: frame.dimensions(),
+                    size: (frame.width(), frame.height()),
                     frames: Some(of as u64),
                     fps: self.settings.fps(),
                     plays: Plays::repeated(self.settings.loops()),
                     last_delay_cs: None,
                     exact: false,
+                    alpha: self.scripts.iter().any(|script| script.shots().any(|shot| shot.is_clear)),
                 };
                 encoding = Some(Encoding::begin(out, self.container, movie).map_err(|error| failed(&error))?);
             }
@@ -156,7 +157,7 @@ impl Outputs {
 /// # Errors
 /// Fails if the frame cannot be rendered.
 pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>, Error> {
-    let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
+    let Some(image) = picture_of_frame(script, frame, &RenderOptions::default()) else { return Ok(None) };
     png(&image.map_err(|error| no_picture(&error))?).map(Some)
 }
 
@@ -173,7 +174,8 @@ pub(crate) fn thumbnail(mut scene: Scene) -> Result<Option<Vec<u8>>, Error> {
     let scale = (THUMBNAIL / width.max(height)).min(1.0);
     let side = |side: f64| (side * scale).round().max(1.0) as u32;
     scene.screen = Screen::new(side(width), side(height)).map_err(|error| no_picture(&error))?;
-    let image = render(&scene, &RenderOptions::default()).map_err(|error| no_picture(&error))?;
+    let image = render_picture(Exposure::still(&scene), &RenderOptions::default())
+        .map_err(|error| no_picture(&error))?;
     png(&image).map(Some)
 }
 
@@ -181,7 +183,7 @@ pub(crate) fn thumbnail(mut scene: Scene) -> Result<Option<Vec<u8>>, Error> {
 ///
 /// # Errors
 /// Fails if the picture is beyond the limits of the format.
-pub(crate) fn png(image: &RgbImage) -> Result<Vec<u8>, Error> {
+pub(crate) fn png(image: &DynamicImage) -> Result<Vec<u8>, Error> {
     let mut file = io::Cursor::new(Vec::new());
     image.write_to(&mut file, ImageFormat::Png).map_err(|error| no_picture(&error))?;
     Ok(file.into_inner())
@@ -256,7 +258,13 @@ mod tests {
 
     #[test]
     fn an_animation_runs_back_and_shows_frames_for_times_of_their_own() {
-        let text = "Screen 16 12\nFrames 3\nSphere 2  (1:-2 3:2) 0 -9  1 .5 0  0 0 0\nTrace\n";
+        let ball = "Sphere 2  (1:-2 3:2) 0 -9  1 .5 0  0 0 0";
+        for background in ["", "Background none\n"] {
+            run_back(&format!("Screen 16 12\n{background}Frames 3\n{ball}\nTrace\n"), !background.is_empty());
+        }
+    }
+
+    fn run_back(text: &str, alpha: bool) {
         let script = Arc::new(parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap());
         let settings = AnimationSettings::new(None, 10.0, 0).unwrap().bouncing(true);
         let settings = settings.with_durations(BTreeMap::from([(2, 0.5)])).unwrap();
@@ -267,6 +275,7 @@ mod tests {
             plays: Plays::Endless,
             last_delay_cs: None,
             exact: false,
+            alpha,
         };
         for container in [Container::Gif, Container::Apng, Container::Webp] {
             let job = Job { container, scripts: vec![Arc::clone(&script)], settings: settings.clone() };
@@ -275,7 +284,8 @@ mod tests {
             let mut expected = Vec::new();
             let mut encoding = Encoding::begin(&mut expected, container, movie).unwrap();
             for (frame, seconds) in [(0, None), (1, Some(0.5)), (2, None), (1, Some(0.5))] {
-                let image = render_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap();
+                let image = picture_of_frame(&script, frame, &RenderOptions::default()).unwrap().unwrap();
+                assert_eq!(image.color().has_alpha(), alpha);
                 encoding.push(image, seconds).unwrap();
             }
             encoding.finish().unwrap().complete(&mut expected);

@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use image::RgbImage;
+use image::RgbaImage;
 
 /// The number of bytes before the pixels, which are little-endian numbers: the picture's number, width, height,
 /// rendering time in microseconds, and 1 if it is final or 0 if a finer one follows; then left, top, width and height
@@ -19,7 +19,7 @@ pub(crate) const HEADER: usize = 36;
 pub(crate) struct Picture {
     /// The number by which the page knows it.
     pub(crate) number: u32,
-    pub(crate) image: RgbImage,
+    pub(crate) image: RgbaImage,
     pub(crate) took: Duration,
     /// No finer picture follows.
     pub(crate) is_final: bool,
@@ -28,7 +28,7 @@ pub(crate) struct Picture {
 /// A packer of a sequence of pictures, all of which are shown.
 #[derive(Debug, Default)]
 pub(crate) struct Packer {
-    before: RgbImage,
+    before: RgbaImage,
 }
 
 /// A rectangle of a picture, in pixels.
@@ -42,7 +42,7 @@ struct Part {
 
 impl Packer {
     /// Returns the header of a picture and the part that differs from the previous picture, with four bytes per
-    /// pixel: red, green, blue, 255.
+    /// pixel: red, green, blue, alpha.
     pub(crate) fn pack(&mut self, picture: Picture) -> Vec<u8> {
         let Picture { number, image, took, is_final } = picture;
         let part = differing(&self.before, &image);
@@ -55,7 +55,7 @@ impl Packer {
         }
         for row in rows(&image).skip(part.top as usize).take(down) {
             let pixels = &row[part.left as usize..][..across];
-            bytes.extend(pixels.iter().flat_map(|&[r, g, b]| [r, g, b, 255]));
+            bytes.extend_from_slice(pixels.as_flattened());
         }
         self.before = image;
         bytes
@@ -63,12 +63,12 @@ impl Packer {
 }
 
 /// Returns the smallest part outside of which two pictures are equal: all of the second if their sizes differ.
-fn differing(before: &RgbImage, now: &RgbImage) -> Part {
+fn differing(before: &RgbaImage, now: &RgbaImage) -> Part {
     let (width, height) = now.dimensions();
     if before.dimensions() != (width, height) {
         return Part { left: 0, top: 0, width, height };
     }
-    let differ = |(a, b): (&[[u8; 3]], &[[u8; 3]])| a != b;
+    let differ = |(a, b): (&[[u8; 4]], &[[u8; 4]])| a != b;
     let pairs = || rows(before).zip(rows(now));
     let Some(top) = pairs().position(differ) else { return Part::default() };
     let below = pairs().rev().position(differ).unwrap_or(0);
@@ -85,19 +85,19 @@ fn differing(before: &RgbImage, now: &RgbImage) -> Part {
 }
 
 /// Returns the rows of pixels, from the top.
-fn rows(image: &RgbImage) -> impl DoubleEndedIterator<Item = &[[u8; 3]]> + ExactSizeIterator {
-    image.as_raw().as_chunks::<3>().0.chunks_exact(image.width().max(1) as usize)
+fn rows(image: &RgbaImage) -> impl DoubleEndedIterator<Item = &[[u8; 4]]> + ExactSizeIterator {
+    image.as_raw().as_chunks::<4>().0.chunks_exact(image.width().max(1) as usize)
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use image::Rgb;
+    use image::Rgba;
 
     use super::*;
 
     /// The picture that a page shows.
     #[derive(Debug, Default)]
-    pub(crate) struct Shown(pub(crate) RgbImage);
+    pub(crate) struct Shown(pub(crate) RgbaImage);
 
     impl Shown {
         /// Puts the received part in its place.
@@ -107,17 +107,16 @@ pub(crate) mod tests {
             let &[_, width, height, _, _, left, top, across, down] = head.as_slice() else { unreachable!() };
             assert_eq!(pixels.len() as u32, 4 * across * down);
             if self.0.dimensions() != (width, height) {
-                self.0 = RgbImage::new(width, height);
+                self.0 = RgbaImage::new(width, height);
             }
-            for (at, &[r, g, b, a]) in pixels.as_chunks().0.iter().enumerate() {
-                assert_eq!(a, 255);
+            for (at, &pixel) in pixels.as_chunks().0.iter().enumerate() {
                 let at = at as u32;
-                self.0.put_pixel(left + at % across, top + at / across, Rgb([r, g, b]));
+                self.0.put_pixel(left + at % across, top + at / across, Rgba(pixel));
             }
         }
     }
 
-    fn pack(packer: &mut Packer, image: &RgbImage) -> Vec<u8> {
+    fn pack(packer: &mut Packer, image: &RgbaImage) -> Vec<u8> {
         let (number, took) = (1, Duration::ZERO);
         packer.pack(Picture { number, image: image.clone(), took, is_final: true })
     }
@@ -135,14 +134,14 @@ pub(crate) mod tests {
             (state >> 33) as u32 % limit
         };
         let (mut packer, mut shown) = (Packer::default(), Shown::default());
-        let mut image = RgbImage::new(1, 1);
+        let mut image = RgbaImage::new(1, 1);
         for _ in 0..3000 {
             if below(20) == 0 {
-                image = RgbImage::new(1 + below(17), 1 + below(13));
+                image = RgbaImage::new(1 + below(17), 1 + below(13));
             }
             for _ in 0..below(4) {
                 let (x, y) = (below(image.width()), below(image.height()));
-                image.put_pixel(x, y, Rgb([below(3) as u8, below(3) as u8, below(3) as u8]));
+                image.put_pixel(x, y, Rgba([(); 4].map(|()| below(3) as u8)));
             }
             shown.put(&pack(&mut packer, &image));
             assert!(shown.0 == image);
@@ -152,13 +151,13 @@ pub(crate) mod tests {
     #[test]
     fn no_more_is_sent_than_differs() {
         let mut packer = Packer::default();
-        let mut image = RgbImage::new(100, 50);
+        let mut image = RgbaImage::new(100, 50);
         assert_eq!(pack(&mut packer, &image).len(), HEADER + 100 * 50 * 4, "the first one is whole");
         assert_eq!(pack(&mut packer, &image).len(), HEADER, "the same again is nothing");
-        image.put_pixel(20, 7, Rgb([1, 2, 3]));
-        image.put_pixel(29, 11, Rgb([1, 2, 3]));
+        image.put_pixel(20, 7, Rgba([1, 2, 3, 255]));
+        image.put_pixel(29, 11, Rgba([1, 2, 3, 255]));
         assert_eq!(pack(&mut packer, &image).len(), HEADER + 10 * 5 * 4);
-        let turned = RgbImage::new(50, 100);
+        let turned = RgbaImage::new(50, 100);
         assert_eq!(pack(&mut packer, &turned).len(), HEADER + 100 * 50 * 4, "another size is whole");
     }
 }

@@ -212,12 +212,14 @@ impl Shared {
         let begin = Instant::now();
         let image = drawing.draw_progressively(|image| {
             if self.another() {
+                let image = image.into_rgba8();
                 send(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false });
             }
         })?;
         if !is_sampled {
             pace.drawn(scene.screen, begin.elapsed());
         }
+        let image = image.into_rgba8();
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: true })
     }
 
@@ -231,7 +233,7 @@ impl Shared {
         let drawing = Drawing::new(&scene, &options)?;
         pace.prepared(start.elapsed());
         let begin = Instant::now();
-        let image = drawing.draw()?;
+        let image = drawing.draw_picture()?.into_rgba8();
         pace.drawn(scene.screen, begin.elapsed());
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false })
     }
@@ -286,7 +288,8 @@ fn smaller(screen: Screen, share: f64) -> Screen {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_tracer::{render, render_frame};
+    use image::DynamicImage;
+    use rayfold_tracer::{picture_of_frame, render, render_picture};
     use std::sync::mpsc;
 
     use super::*;
@@ -343,20 +346,28 @@ mod tests {
         assert_eq!((number(&picture), picture.len()), (7, HEADER + 64 * 48 * 4));
         let mut shown = Shown::default();
         shown.put(&picture);
-        assert_eq!(shown.0, expected);
+        assert_eq!(shown.0, DynamicImage::ImageRgb8(expected).into_rgba8());
         painter.close();
     }
 
     #[test]
     fn at_rest_a_picture_gets_finer_and_ends_as_the_tracers() {
+        let ball = "Sphere 1 (1:-3 9:3) 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
+        for background in [".2 .4 .9", "none"] {
+            ends_as_the_tracers(&format!(
+                "Samples 64 1\nShutter 0.8\nBackground {background}\nFrames 5 5\n{ball}"
+            ));
+        }
+    }
+
+    fn ends_as_the_tracers(moves: &str) {
         let (sender, pictures) = mpsc::channel();
         let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
-        let moves =
-            "Samples 64 1\nShutter 0.8\nFrames 5 5\nSphere 1 (1:-3 9:3) 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
         let request = pinhole(9, moves);
         let script = Arc::clone(&request.motion.as_ref().unwrap().script);
-        let expected = render_frame(&script, 0, &RenderOptions::default()).unwrap().unwrap();
-        assert_ne!(expected, render(&request.scene, &RenderOptions::default()).unwrap(), "it moves");
+        let expected = picture_of_frame(&script, 0, &RenderOptions::default()).unwrap().unwrap();
+        let still = Exposure::still(&request.scene);
+        assert_ne!(expected, render_picture(still, &RenderOptions::default()).unwrap(), "it moves");
         let seen = drawn(&painter, &pictures, request);
         let sizes: Vec<_> = seen.iter().map(|picture| [4, 8].map(|at| number_at(picture, at))).collect();
         assert_eq!(sizes[0], [12, 8], "the first one has few pixels, whatever the rest takes");
@@ -364,7 +375,7 @@ mod tests {
         assert!(seen.iter().all(|picture| number(picture) == 9));
         let mut shown = Shown::default();
         seen.iter().for_each(|picture| shown.put(picture));
-        assert_eq!(shown.0, expected);
+        assert_eq!(shown.0, expected.into_rgba8());
         painter.close();
     }
 
@@ -381,7 +392,7 @@ mod tests {
         assert_eq!(again.len(), 1);
         let mut shown = Shown::default();
         first.iter().chain(&again).for_each(|picture| shown.put(picture));
-        assert_eq!(shown.0, expected);
+        assert_eq!(shown.0, DynamicImage::ImageRgb8(expected).into_rgba8());
         painter.close();
     }
 

@@ -216,6 +216,7 @@ mod tests {
         assert_eq!(changed(&Line::new("Sphere 1 0 0 0 red"), 4, &[1.0], plain), None, "a name is no number");
         assert_eq!(after("Screen 4 3", 0, &[8.0], AUTO), "Screen 8 3", "it takes no curves");
         assert_eq!(after("Fog none # a", 0, &[1.0, 0.5, 0.0, 9.0], plain), "Fog 1 0.5 0 9 # a");
+        assert_eq!(after("Background none # a", 0, &[1.0, 0.5, 0.0], plain), "Background 1 0.5 0 # a");
         let red = "Sphere 1 0 0 0 #ff0000 1 1 1";
         assert_eq!(after(red, 5, &[1.0], AUTO), "Sphere 1 0 0 0 #ffff00 1 1 1", "a colour holds no curves");
     }

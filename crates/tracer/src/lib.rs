@@ -21,6 +21,7 @@
 //! ```
 
 mod camera;
+mod cover;
 mod cut_light;
 mod exposure;
 mod fast;
@@ -46,7 +47,7 @@ pub use nans::take as take_nans;
 use std::sync::atomic::AtomicBool;
 
 pub use fearless_simd::Level;
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
 pub use progress::Progress;
 use rayfold_scene::{Scene, Script};
 pub use sampling::Sampler;
@@ -92,6 +93,9 @@ pub struct RenderOptions<'a> {
     pub bounces: Option<u32>,
     /// The arrangement of samples.
     pub sampler: Sampler,
+    /// The levels of the colour behind the objects of a scene without background. Default: pictures have alpha, and
+    /// images show black.
+    pub matte: Option<[u8; 3]>,
 }
 
 impl RenderOptions<'_> {
@@ -146,6 +150,30 @@ pub fn render_exposed(exposure: Exposure, options: &RenderOptions) -> Result<Rgb
     Drawing::exposed(exposure, options)?.draw()
 }
 
+/// Draws a picture as [`render_exposed`] draws an image: of a scene without background with alpha
+/// ([`Drawing::draw_picture`]).
+///
+/// # Errors
+/// The errors of [`render`].
+pub fn render_picture(exposure: Exposure, options: &RenderOptions) -> Result<DynamicImage, RenderError> {
+    Drawing::exposed(exposure, options)?.draw_picture()
+}
+
+/// Draws frame `k` of a script as a picture, counted from 0, on the current rayon pool ([`Drawing::draw_picture`]). Returns
+/// `None` after the last frame.
+///
+/// # Errors
+/// The errors of [`render`].
+pub fn picture_of_frame(
+    script: &Script,
+    k: usize,
+    options: &RenderOptions,
+) -> Option<Result<DynamicImage, RenderError>> {
+    let scene = script.frame(k)?;
+    let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
+    Some(render_picture(Exposure::moving(&scene, &after), options))
+}
+
 /// Draws frame `k` of a script, counted from 0, on the current rayon pool. Returns `None` after the last frame.
 ///
 /// # Errors
@@ -160,8 +188,9 @@ pub fn render_frame(
     Some(render_exposed(Exposure::moving(&scene, &after), options))
 }
 
-/// Draws the light of frame `k` of a script, counted from 0, on the current rayon pool ([`Drawing::draw_light`]). Returns
-/// `None` after the last frame.
+/// Draws the light of frame `k` of a script, counted from 0, on the current rayon pool: three numbers for each pixel
+/// ([`Drawing::draw_light`]), or four if the frame has no background ([`Drawing::draw_light_and_cover`]). Returns `None` after
+/// the last frame.
 ///
 /// # Errors
 /// The errors of [`render`].
@@ -173,7 +202,11 @@ pub fn light_of_frame(
     let scene = script.frame(k)?;
     let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
     let exposure = Exposure::moving(&scene, &after);
-    Some(Drawing::exposed(exposure, options).and_then(|drawing| drawing.draw_light()))
+    let draw = |drawing: Drawing| match scene.background.is_none() {
+        true => drawing.draw_light_and_cover(),
+        false => drawing.draw_light(),
+    };
+    Some(Drawing::exposed(exposure, options).and_then(draw))
 }
 
 /// Draws a scene like [`render`] in single precision, by textbook formulas that ignore rounding errors. It is the

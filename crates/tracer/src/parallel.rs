@@ -34,42 +34,47 @@ pub(crate) fn bands<T>(
     scratch: impl Fn() -> T + Send + Sync,
     draw: impl Fn(&mut T, u32, &mut [u8]) + Sync,
 ) -> Result<RgbImage, RenderError> {
-    let mut rows_drawn = Ok(());
+    let size = (screen.width(), rows.end - rows.start);
+    let bytes = bands_of::<T, u8, CHANNELS>(screen, rows, side, options, scratch, draw)?;
+    // There are exactly as many bytes as these rows have.
+    Ok(RgbImage::from_raw(size.0, size.1, bytes).unwrap_or_default())
+}
+
+/// The same of pixels that are `EACH` values.
+pub(crate) fn bands_of<T, P: Copy + Default + Send, const EACH: usize>(
+    screen: Screen,
+    rows: Range<u32>,
+    side: u32,
+    options: &RenderOptions,
+    scratch: impl Fn() -> T + Send + Sync,
+    draw: impl Fn(&mut T, u32, &mut [P]) + Sync,
+) -> Result<Vec<P>, RenderError> {
     let whole = whole_bands(&rows, side, screen.height());
     if let Some(progress) = options.progress {
         progress.set(0, u64::from(screen.width()) * u64::from(whole.end - whole.start));
     }
-    let image = image((screen.width(), whole.end - whole.start), |buffer| {
-        let band = (screen.width() as usize).saturating_mul(side as usize).saturating_mul(CHANNELS);
-        rows_drawn =
-            buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
-                if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                    return Err(RenderError::Cancelled);
-                }
-                draw(scratch, whole.start + index as u32 * side, band);
-                if let Some(progress) = options.progress {
-                    progress.add((band.len() / CHANNELS) as u64);
-                }
-                Ok(())
-            });
+    let mut buffer = values::<P>((screen.width(), whole.end - whole.start), EACH)?;
+    let band = (screen.width() as usize).saturating_mul(side as usize).saturating_mul(EACH);
+    buffer.par_chunks_mut(band).enumerate().try_for_each_init(scratch, |scratch, (index, band)| {
+        if options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            return Err(RenderError::Cancelled);
+        }
+        draw(scratch, whole.start + index as u32 * side, band);
+        if let Some(progress) = options.progress {
+            progress.add((band.len() / EACH) as u64);
+        }
+        Ok(())
     })?;
-    rows_drawn.map(|()| cut(image, rows.start - whole.start..rows.end - whole.start))
+    // Those rows alone, in the same memory.
+    let place = |row: u32| (row - whole.start) as usize * screen.width() as usize * EACH;
+    buffer.truncate(place(rows.end));
+    buffer.drain(..place(rows.start));
+    Ok(buffer)
 }
 
 /// Returns the rows of all bands of `side` rows that contain any of these rows, in an image of `height` rows.
 pub(crate) fn whole_bands(rows: &Range<u32>, side: u32, height: u32) -> Range<u32> {
     rows.start / side * side..(rows.end.div_ceil(side).saturating_mul(side)).min(height)
-}
-
-/// Returns some rows of an image, in its memory.
-fn cut(image: RgbImage, rows: Range<u32>) -> RgbImage {
-    let width = image.width();
-    let place = |row: u32| row as usize * width as usize * CHANNELS;
-    let mut bytes = image.into_raw();
-    bytes.truncate(place(rows.end));
-    bytes.drain(..place(rows.start));
-    // There are exactly as many bytes as these rows have.
-    RgbImage::from_raw(width, rows.end - rows.start, bytes).unwrap_or_default()
 }
 
 /// Makes an image of this width and height, whose bytes `draw` fills.
@@ -80,12 +85,24 @@ pub(crate) fn image(
     (width, height): (u32, u32),
     draw: impl FnOnce(&mut [u8]),
 ) -> Result<RgbImage, RenderError> {
+    let mut buffer = values((width, height), CHANNELS)?;
+    draw(&mut buffer);
+    RgbImage::from_raw(width, height, buffer).ok_or(RenderError::TooLarge { width, height })
+}
+
+/// Makes the values of an image of this width and height, `each` per pixel.
+///
+/// # Errors
+/// If they do not fit into memory.
+pub(crate) fn values<P: Copy + Default>(
+    (width, height): (u32, u32),
+    each: usize,
+) -> Result<Vec<P>, RenderError> {
     let too_large = || RenderError::TooLarge { width, height };
     let pixels = usize::try_from(u64::from(width) * u64::from(height)).map_err(|_| too_large())?;
-    let bytes = pixels.checked_mul(CHANNELS).ok_or_else(too_large)?;
+    let count = pixels.checked_mul(each).ok_or_else(too_large)?;
     let mut buffer = Vec::new();
-    buffer.try_reserve_exact(bytes).map_err(|_| too_large())?;
-    buffer.resize(bytes, 0);
-    draw(&mut buffer);
-    RgbImage::from_raw(width, height, buffer).ok_or_else(too_large)
+    buffer.try_reserve_exact(count).map_err(|_| too_large())?;
+    buffer.resize(count, P::default());
+    Ok(buffer)
 }

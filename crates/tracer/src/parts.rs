@@ -57,6 +57,7 @@ parts! {
     // Lights that have an extent.
     extents, "extents", |scene| is_sampled(scene) && scene.lights.iter().any(has_extent);
     fogs, "fogs", |scene| scene.fog.get().is_some();
+    covers, "covers", |scene| scene.background.is_none();
 }
 
 /// Rejects a scene that uses a part which this build lacks.

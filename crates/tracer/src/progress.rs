@@ -83,7 +83,7 @@ mod tests {
             "{done} {total} {seen:?}"
         );
         let unwatched = RenderOptions::default();
-        assert_eq!(image, Drawing::new(&scene, &unwatched).unwrap().draw().unwrap());
+        assert_eq!(image, Drawing::new(&scene, &unwatched).unwrap().draw_picture().unwrap());
     }
 
     #[cfg(feature = "accuracy")]

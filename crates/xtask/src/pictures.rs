@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, bail, ensure};
-use image::{ImageFormat, RgbImage};
+use image::{DynamicImage, ImageFormat};
 use rayfold_scene::{Limits, Script, parse};
 
 use crate::manual::{Example, PAGE, PICTURES, examples};
@@ -72,8 +72,8 @@ fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     .context("rayfold could not be run")?;
     ensure!(status.success(), "it could not be drawn");
     // The frames of an animation are placed side by side.
-    let frame = |k: usize| Ok(image::open(folder.path().join(format!("{k}.png")))?.into_rgb8());
-    let frames: Vec<RgbImage> = (1..=script.frame_count()).map(frame).collect::<anyhow::Result<_>>()?;
+    let frame = |k: usize| Ok(image::open(folder.path().join(format!("{k}.png")))?);
+    let frames: Vec<DynamicImage> = (1..=script.frame_count()).map(frame).collect::<anyhow::Result<_>>()?;
     let mut png = std::io::Cursor::new(Vec::new());
     side_by_side(&frames)?.write_to(&mut png, ImageFormat::Png)?;
     Ok(png.into_inner())
@@ -92,10 +92,11 @@ fn script(example: &Example) -> anyhow::Result<Script> {
     parsed.script.with_context(faults)
 }
 
-/// Joins pictures of the same height from left to right.
-fn side_by_side(pictures: &[RgbImage]) -> anyhow::Result<RgbImage> {
-    let height = pictures.first().context("a script has a frame")?.height();
-    let mut strip = RgbImage::new(pictures.iter().map(RgbImage::width).sum(), height);
+/// Joins pictures of the same height, all with alpha or all without, from left to right.
+fn side_by_side(pictures: &[DynamicImage]) -> anyhow::Result<DynamicImage> {
+    let first = pictures.first().context("a script has a frame")?;
+    let width = pictures.iter().map(DynamicImage::width).sum();
+    let mut strip = DynamicImage::new(width, first.height(), first.color());
     let mut left = 0;
     for picture in pictures {
         image::imageops::replace(&mut strip, picture, left, 0);
@@ -128,7 +129,8 @@ fn remove_others(folder: &Path, examples: &[Example]) -> anyhow::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_tracer::{RenderOptions, render_frame};
+    use image::RgbImage;
+    use rayfold_tracer::{RenderOptions, picture_of_frame};
 
     use super::*;
 
@@ -146,9 +148,9 @@ mod tests {
             let is_drawn = if example.is_curve() {
                 fs::read_to_string(&path).unwrap() == plot::svg(&script).unwrap()
             } else {
-                let drawn = |k| render_frame(&script, k, &RenderOptions::default()).unwrap().unwrap();
-                let frames: Vec<RgbImage> = (0..script.frame_count()).map(drawn).collect();
-                are_alike(&image::open(&path).unwrap().into_rgb8(), &side_by_side(&frames).unwrap())
+                let drawn = |k| picture_of_frame(&script, k, &RenderOptions::default()).unwrap().unwrap();
+                let frames: Vec<DynamicImage> = (0..script.frame_count()).map(drawn).collect();
+                are_alike(&image::open(&path).unwrap(), &side_by_side(&frames).unwrap())
             };
             if !is_drawn {
                 stale.push(example.file());
@@ -157,18 +159,21 @@ mod tests {
         assert!(stale.is_empty(), "cargo xtask pictures: {}", stale.join(", "));
     }
 
-    fn are_alike(a: &RgbImage, b: &RgbImage) -> bool {
+    fn are_alike(a: &DynamicImage, b: &DynamicImage) -> bool {
         let near = |(a, b): (&u8, &u8)| a.abs_diff(*b) <= TOLERANCE;
-        a.dimensions() == b.dimensions() && a.as_raw().iter().zip(b.as_raw()).all(near)
+        let form = |image: &DynamicImage| (image.width(), image.height(), image.color());
+        form(a) == form(b) && a.as_bytes().iter().zip(b.as_bytes()).all(near)
     }
 
     #[test]
     fn another_picture_is_not_alike() {
         let grey = RgbImage::from_pixel(3, 2, image::Rgb([100; 3]));
         let mut other = grey.clone();
-        assert!(are_alike(&grey, &other));
+        let alike = |a: &RgbImage, b: &RgbImage| are_alike(&a.clone().into(), &b.clone().into());
+        assert!(alike(&grey, &other));
         other.put_pixel(2, 1, image::Rgb([100, 102, 100]));
-        assert!(!are_alike(&grey, &other));
-        assert!(!are_alike(&grey, &RgbImage::from_pixel(2, 3, image::Rgb([100; 3]))));
+        assert!(!alike(&grey, &other));
+        assert!(!alike(&grey, &RgbImage::from_pixel(2, 3, image::Rgb([100; 3]))));
+        assert!(!are_alike(&grey.clone().into(), &DynamicImage::from(grey).into_rgba8().into()));
     }
 }

@@ -242,6 +242,9 @@ fn picture(rng: &mut Rng, objects: Vec<Object>, eye: DVec3, target: DVec3) -> Re
     if dice.u8(0..5) == 0 {
         scene.fog = Fog::new(color(&mut dice), power(&mut dice, 0.0, 1.5))?;
     }
+    if dice.u8(0..6) == 0 {
+        scene.background = Background::NONE;
+    }
     Ok(scene)
 }
 

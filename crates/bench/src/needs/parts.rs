@@ -51,17 +51,30 @@ pub(super) const VERSION_2: &[&str] = &[
     "shutters",
     "extents",
     "fogs",
+    "covers",
 ];
 
 /// Halves of version 2, or less: whichever two of its parts are taken, there is one that has the first and not the second.
 /// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). One of the six is
 /// here in two, since its nine parts together cost a cylinder more than one part may (0.59 %), and neither half does.
 const OF_VERSION_2: [&[&str]; 7] = [
-    &["planes", "groups", "meshes", "highlights", "glass", "skies", "extents"],
-    &["planes", "discs", "capsules", "highlights", "patterns", "lenses", "fogs"],
+    &["planes", "groups", "meshes", "highlights", "glass", "skies", "extents", "covers"],
+    &["planes", "discs", "capsules", "highlights", "patterns", "lenses", "fogs", "covers"],
     &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb"],
     &["capsules", "turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents", "fogs"],
-    &["cones", "tori", "turned-boxes", "groups", "glass", "lamps", "skies", "srgb", "shutters", "fogs"],
+    &[
+        "cones",
+        "tori",
+        "turned-boxes",
+        "groups",
+        "glass",
+        "lamps",
+        "skies",
+        "srgb",
+        "shutters",
+        "fogs",
+        "covers",
+    ],
     &["discs", "cones", "tori", "highlights", "patterns", "lamps", "skies", "extents"],
     &["planes", "discs", "cones", "meshes", "glass", "srgb", "samples", "lenses", "shutters"],
 ];

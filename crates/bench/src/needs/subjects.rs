@@ -144,6 +144,13 @@ Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
 ",
     ),
     (
+        "balls before nothing",
+        "Background none
+Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2
+Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
         "balls in sRGB",
         "Tone srgb
 Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2

@@ -46,8 +46,13 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 /// Returns the colour at fractional pixel indices.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
     let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
-    let path = Path { start: Real::zero(), bounces: 0, weight: DVec3::ONE.into(), has_met_glass: false };
-    color_along(scene, &line, &path).to_dvec3()
+    seen_along(scene, &line, &Path::of_camera(scene)).color.to_dvec3()
+}
+
+/// Returns the cover of a pixel of a scene without background; 1 with one.
+pub fn cover(scene: &Scene, i: u32, j: u32) -> f64 {
+    let line = Line::of_pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
+    1.0 - seen_along(scene, &line, &Path::of_camera(scene)).clear
 }
 
 /// Returns the position of the object that a pixel shows, and its normal there.
@@ -89,28 +94,54 @@ struct Path {
     /// The product of the absolute values of all factors.
     weight: Vector,
     has_met_glass: bool,
+    /// The share of the pixel that stays clear if the ray hits nothing; `None` for rays that see what is around.
+    clear: Option<f64>,
 }
 
-fn color_along(scene: &Scene, line: &Line, path: &Path) -> Vector {
+impl Path {
+    fn of_camera(scene: &Scene) -> Self {
+        let clear = scene.background.is_none().then_some(1.0);
+        Self { start: Real::zero(), bounces: 0, weight: DVec3::ONE.into(), has_met_glass: false, clear }
+    }
+}
+
+/// What a ray brings: a colour, and the share of its pixel that it leaves clear.
+struct Seen {
+    color: Vector,
+    clear: f64,
+}
+
+impl From<Vector> for Seen {
+    fn from(color: Vector) -> Self {
+        Self { color, clear: 0.0 }
+    }
+}
+
+fn seen_along(scene: &Scene, line: &Line, path: &Path) -> Seen {
     let Some(hit) = nearest_on(&scene.objects, line, &path.start) else {
+        if let Some(clear) = path.clear {
+            return Seen { color: DVec3::ZERO.into(), clear };
+        }
         if let Some((fog, _)) = scene.fog.get() {
-            return fog.into();
+            return Vector::from(fog).into();
         }
         let (low, high) = scene.background.colors();
         let height = 0.5 + 0.5 * line.direction.unit().0[1].to_f64();
-        return (low + (high.unwrap_or(low) - low) * height).into();
+        return Vector::from(low + (high.unwrap_or(low) - low) * height).into();
     };
-    let Some((fog, distance)) = scene.fog.get() else { return color_at_hit(scene, line, path, &hit) };
+    let Some((fog, distance)) = scene.fog.get() else { return seen_at_hit(scene, line, path, &hit) };
     // The exponential has an error of some roundoffs.
     let length = &hit.t * &line.direction.dot(&line.direction).root();
-    let clear = (-length.over(&Real::from(distance)).to_f64()).exp();
-    let weight = path.weight.times(&DVec3::splat(clear).into());
-    let color = color_at_hit(scene, line, &Path { start: path.start.clone(), weight, ..*path }, &hit);
-    color.times(&DVec3::splat(clear).into()).plus(&Real::from(1.0 - clear), &fog.into())
+    let left = (-length.over(&Real::from(distance)).to_f64()).exp();
+    let weight = path.weight.times(&DVec3::splat(left).into());
+    let Seen { color, clear } =
+        seen_at_hit(scene, line, &Path { start: path.start.clone(), weight, ..*path }, &hit);
+    let color = color.times(&DVec3::splat(left).into()).plus(&Real::from(1.0 - left), &fog.into());
+    Seen { color, clear }
 }
 
-/// Returns the colour that a hit sends back along the line.
-fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
+/// Returns what a hit sends back along the line.
+fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
     let object = &scene.objects[hit.object];
     let material = object.material();
     let (place, face) = shapes::place(object, line, &hit.t);
@@ -159,11 +190,15 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
         mirrored = Vector(mirrored.0.map(|channel| &channel + &share));
         through = bent.map(|bent| {
             let factor = Vector::from(DVec3::ZERO).plus(&(&one - &share), &glass.color().into());
-            (factor, if shapes::has_inside(object) { bent } else { direction })
+            let mean = (glass.color().x + glass.color().y + glass.color().z) / 3.0;
+            let left = (1.0 - share.to_f64()) * mean.clamp(0.0, 1.0);
+            let clear = path.clear.map(|clear| left * clear);
+            (factor, if shapes::has_inside(object) { bent } else { direction }, clear)
         });
     }
-    let onwards = [Some((mirrored, reflected(&line.direction, &normal).unit())), through];
-    for (factor, direction) in onwards.into_iter().flatten() {
+    let onwards = [Some((mirrored, reflected(&line.direction, &normal).unit(), None)), through];
+    let mut left_clear = 0.0;
+    for (factor, direction, clear) in onwards.into_iter().flatten() {
         let weight = path.weight.times(&factor.magnitude());
         let has_met_glass = path.has_met_glass || glass.is_some();
         let least = match scene.tone {
@@ -174,11 +209,13 @@ fn color_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Vector {
             weight.0.iter().any(|w| if has_met_glass { *w >= Real::from(least) } else { w.sign() > 0 });
         if path.bounces < scene.depth.bounces() && counts {
             let next = Line { origin: point.clone(), direction };
-            let path = Path { start: start.clone(), bounces: path.bounces + 1, weight, has_met_glass };
-            color = color.plus(&one, &factor.times(&color_along(scene, &next, &path)));
+            let path = Path { start: start.clone(), bounces: path.bounces + 1, weight, has_met_glass, clear };
+            let seen = seen_along(scene, &next, &path);
+            color = color.plus(&one, &factor.times(&seen.color));
+            left_clear += seen.clear;
         }
     }
-    color
+    Seen { color, clear: left_clear }
 }
 
 /// Returns the normal at which a ray goes on: that of the face if a ray would leave on the wrong side of it.
@@ -192,4 +229,41 @@ fn onward_normal(line: &Line, normal: &Vector, hit: &Hit, object: &Object) -> Ve
     let (_, bent) = glass::refracted(&line.direction.unit(), normal, &index);
     let is_above = bent.is_some_and(|bent| bent.dot(&hit.normal).sign() >= 0);
     if is_above { hit.normal.clone() } else { normal.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Limits, parse};
+    use rayfold_tracer::{Exposure, RenderOptions, reference};
+
+    use super::*;
+
+    #[test]
+    fn the_plain_tracer_covers_what_the_oracle_covers() {
+        let objects = "Material pane glass .9 .7 .5 1.5\nMaterial soap glass 1 1 .8 1.1\nSphere 1 -.6 0 0 pane\n\
+                       Box .2 -.6 -1 1.3 .9 .4 soap\nDisc .7 .4 .3 1.4 0 .2 1 pane\nSphere .4 -.4 .2 -2 .2 .2 .2 .5 .5 .5\n\
+                       Torus .5 .15 1.2 -.8 .5 0 1 1 .1 .1 .1 .2 .2 .2 .4 .4 .4\nIlight .7 .7 .7 -1 -2 -1\n";
+        for settings in ["", "Tone srgb\nDepth 9\n", "Fog .4 .5 .6 8\n", "Depth 1\n"] {
+            let text =
+                format!("Screen 24 18\nLook .3 .4 5 0 0 0 40\nBackground none\n{settings}{objects}Trace\n");
+            let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+            let scene = parsed.script.and_then(|script| script.frame(0)).unwrap();
+            let plain =
+                reference::light_and_cover(Exposure::still(&scene), &RenderOptions::default()).unwrap();
+            let mut partial = 0;
+            for (k, pixel) in (0..).zip(plain.as_chunks::<4>().0) {
+                let (i, j) = (k % 24, 17 - k / 24);
+                let (color, cover) =
+                    (color(&scene, i, j).clamp(DVec3::ZERO, DVec3::ONE), cover(&scene, i, j));
+                let [red, green, blue, alpha] = pixel.map(f64::from);
+                let apart = (color - DVec3::new(red, green, blue)).abs().max_element();
+                assert!(
+                    apart < 1e-6 && (cover - alpha).abs() < 1e-6,
+                    "{settings} {i} {j}: {pixel:?} {cover}"
+                );
+                partial += usize::from((0.05..0.95).contains(&cover));
+            }
+            assert!(partial > 40, "{partial}");
+        }
+    }
 }

@@ -198,6 +198,11 @@ async fn fetch_frames(
     Ok(())
 }
 
+/// Converts an image to eight bits per channel, with alpha if it has that.
+fn levels(image: image::DynamicImage) -> image::DynamicImage {
+    if image.color().has_alpha() { image.into_rgba8().into() } else { image.into_rgb8().into() }
+}
+
 fn write_frame(frame: &FetchedFrame<'_>, pattern: &Pattern, format: Format) -> anyhow::Result<()> {
     let path = pattern.path(frame.number);
     match format {
@@ -205,7 +210,7 @@ fn write_frame(frame: &FetchedFrame<'_>, pattern: &Pattern, format: Format) -> a
         Format::Tiff => {
             let image = image::load_from_memory(&frame.png);
             let image = image.with_context(|| format!("{} is no image", frame.key))?;
-            OutputFile::write(path, &format.encode(&image.into_rgb8())?, false)?;
+            OutputFile::write(path, &format.encode(&levels(image))?, false)?;
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Files as frames: a picture is one frame, an animated file has all its frames, and a TIFF all its pages.
 //!
-//! The gamma, orientation and transparency of a file are applied as far as a GIF can show them.
+//! The gamma and the orientation of a file are applied. Its transparency is kept.
 
 use std::cell::Cell;
 use std::io::Read;
@@ -15,7 +15,7 @@ use image::codecs::png::PngDecoder;
 use image::codecs::tiff::TiffDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
-use image::{AnimationDecoder, DynamicImage, Frames, ImageDecoder, Limits, Rgb, RgbImage};
+use image::{AnimationDecoder, DynamicImage, Frames, ImageDecoder, Limits};
 
 use super::source::{Reader, Source};
 use super::tiff::{self, PageReader};
@@ -42,6 +42,8 @@ pub(super) struct Picture {
     source: Source,
     /// The number of frames; `None` for a video, where it is not known.
     pub(super) frames: Option<u64>,
+    /// Whether pixels may be transparent.
+    pub(super) has_alpha: bool,
     kind: Kind,
 }
 
@@ -63,7 +65,7 @@ enum Animated {
 }
 
 /// The function that takes the frames of a file in order, each with the seconds for which the file shows it.
-type Take<'a> = &'a mut dyn FnMut(RgbImage, Option<f64>) -> anyhow::Result<()>;
+type Take<'a> = &'a mut dyn FnMut(DynamicImage, Option<f64>) -> anyhow::Result<()>;
 
 impl Picture {
     /// Examines a file: its kind, and its number of frames.
@@ -101,14 +103,16 @@ impl Picture {
                 return Self::of(&source);
             }
             let video = Video::read(Box::new(SIGNATURE.as_slice().chain(std::io::stdin())))?;
-            Ok(vec![Self { source, frames: None, kind: Kind::Video(video) }])
+            Ok(vec![Self { source, frames: None, has_alpha: false, kind: Kind::Video(video) }])
         })
     }
 
     fn of(source: &Source) -> anyhow::Result<Vec<Self>> {
-        let of = |frames, kind| Self { source: source.clone(), frames: Some(frames), kind };
-        let animated = |frames, format, still, gamma| {
-            if frames > 1 { of(frames, Kind::Animated { format, gamma }) } else { of(1, still) }
+        let of =
+            |frames, has_alpha, kind| Self { source: source.clone(), frames: Some(frames), has_alpha, kind };
+        let animated = |frames, has_alpha, format, still, gamma| {
+            let kind = if frames > 1 { Kind::Animated { format, gamma } } else { still };
+            of(frames, has_alpha, kind)
         };
         let mut reader = source.open()?;
         // A shorter file has no picture.
@@ -118,26 +122,36 @@ impl Picture {
         Ok(if begins(PNG_SIGNATURE) {
             let reader = png::Decoder::new(reader).read_info()?;
             let gamma = gamma(reader.info());
-            let frames = reader.info().animation_control.map_or(1, |animation| animation.num_frames);
-            vec![animated(frames.into(), Animated::Png, Kind::Png { gamma }, gamma)]
+            let info = reader.info();
+            let has_alpha = info.trns.is_some()
+                || matches!(info.color_type, png::ColorType::Rgba | png::ColorType::GrayscaleAlpha);
+            let frames = info.animation_control.map_or(1, |animation| animation.num_frames.max(1));
+            vec![animated(frames.into(), has_alpha, Animated::Png, Kind::Png { gamma }, gamma)]
         } else if begins(JPEG_SIGNATURE) {
             JpegDecoder::new(reader)?;
-            vec![of(1, Kind::Jpeg)]
+            vec![of(1, false, Kind::Jpeg)]
         } else if begins(GIF_SIGNATURE) {
-            vec![of(count_of_gif(reader)?, Kind::Animated { format: Animated::Gif, gamma: None })]
+            // Frames of an animation leave pixels out, so that this is not known before they are decoded.
+            vec![of(count_of_gif(reader)?, true, Kind::Animated { format: Animated::Gif, gamma: None })]
         } else if begins(WEBP_SIGNATURE) {
             let decoder = image_webp::WebPDecoder::new(reader)?;
             let frames = if decoder.is_animated() { decoder.num_frames().into() } else { 1 };
-            vec![animated(frames, Animated::WebP, Kind::WebP, None)]
+            vec![animated(frames, decoder.has_alpha(), Animated::WebP, Kind::WebP, None)]
         } else if begins(SIGNATURE) {
             vec![Self {
                 source: source.clone(),
                 frames: None,
+                has_alpha: false,
                 kind: Kind::Video(Video::read(Box::new(reader))?),
             }]
         } else if tiff::is_tiff(&header) {
             let pages = tiff::pages(&mut reader)?;
-            pages.into_iter().map(|at| of(1, Kind::TiffPage { at })).collect()
+            let page = |at| {
+                let mut page = of(1, false, Kind::TiffPage { at });
+                page.has_alpha = page.tiff(at)?.color_type().has_alpha();
+                Ok(page)
+            };
+            pages.into_iter().map(page).collect::<anyhow::Result<_>>()?
         } else {
             bail!("it is no image: expected PNG, APNG, JPEG, GIF, WebP, TIFF or .y4m")
         })
@@ -177,7 +191,7 @@ impl Picture {
     ///
     /// # Errors
     /// When the picture cannot be decoded; the error names the file.
-    pub(super) fn decode(&self) -> anyhow::Result<Option<RgbImage>> {
+    pub(super) fn decode(&self) -> anyhow::Result<Option<DynamicImage>> {
         named(&self.name(), || {
             Ok(match &self.kind {
                 Kind::Animated { .. } | Kind::Video(_) => None,
@@ -199,7 +213,7 @@ impl Picture {
             Kind::Video(video) => {
                 let mut taken = Ok(());
                 let read = video.each(|image| {
-                    taken = take(image, None);
+                    taken = take(image.into(), None);
                     anyhow::ensure!(taken.is_ok());
                     Ok(())
                 });
@@ -219,7 +233,7 @@ impl Picture {
                 let seconds = f64::from(parts) / f64::from(whole.max(1)) / 1_000.0;
                 let mut image = DynamicImage::ImageRgba8(frame.into_buffer());
                 image.apply_orientation(orientation);
-                Ok((opaque(image, gamma), if seconds < LEAST_SECONDS { USUAL_SECONDS } else { seconds }))
+                Ok((levels(image, gamma), if seconds < LEAST_SECONDS { USUAL_SECONDS } else { seconds }))
             })?;
             take(next, Some(seconds))?;
         }
@@ -316,28 +330,21 @@ fn shown_size(mut decoder: impl ImageDecoder) -> anyhow::Result<(u32, u32)> {
     })
 }
 
-fn shown(mut decoder: impl ImageDecoder, gamma: Option<f64>) -> anyhow::Result<RgbImage> {
+fn shown(mut decoder: impl ImageDecoder, gamma: Option<f64>) -> anyhow::Result<DynamicImage> {
     let orientation = decoder.orientation()?;
     let mut image = DynamicImage::from_decoder(decoder)?;
     image.apply_orientation(orientation);
-    Ok(opaque(image, gamma))
+    Ok(levels(image, gamma))
 }
 
-/// Blends an image over black: a pixel of a GIF is either opaque or transparent.
-fn opaque(image: DynamicImage, gamma: Option<f64>) -> RgbImage {
+/// Converts an image to eight bits per channel, with alpha if it has that.
+fn levels(image: DynamicImage, gamma: Option<f64>) -> DynamicImage {
+    let has_alpha = image.color().has_alpha();
     let image = match gamma {
         Some(gamma) => with_gamma(image, gamma),
         None => image,
     };
-    if !image.color().has_alpha() {
-        return image.into_rgb8();
-    }
-    let image = image.into_rgba8();
-    RgbImage::from_fn(image.width(), image.height(), |x, y| {
-        let [r, g, b, alpha] = image.get_pixel(x, y).0;
-        let over = |level: u8| ((u32::from(level) * u32::from(alpha) + 127) / 255) as u8;
-        Rgb([over(r), over(g), over(b)])
-    })
+    if has_alpha { image.into_rgba8().into() } else { image.into_rgb8().into() }
 }
 
 /// Converts samples that were encoded by an exponent to sRGB (IEC 61966-2-1).
@@ -364,18 +371,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn transparent_pixels_are_over_black() {
+    fn transparent_pixels_stay_transparent() {
         let image =
             image::RgbaImage::from_fn(3, 1, |x, _| image::Rgba([200, 100, 50, [0, 128, 255][x as usize]]));
-        let shown = opaque(DynamicImage::ImageRgba8(image), None);
-        assert_eq!(shown.into_raw(), [0, 0, 0, 100, 50, 25, 200, 100, 50]);
+        let image = DynamicImage::ImageRgba8(image);
+        assert_eq!(levels(DynamicImage::ImageRgba16(image.to_rgba16()), None), image);
+        assert_eq!(levels(image.clone(), Some(1.0)).as_bytes()[3], 0);
     }
 
     #[test]
     fn linear_light_is_encoded() {
         let image =
             image::ImageBuffer::from_fn(4, 1, |x, _| image::Luma([[0_u16, 205, 14_030, 65_535][x as usize]]));
-        let shown = opaque(DynamicImage::ImageLuma16(image), Some(1.0));
+        let shown = levels(DynamicImage::ImageLuma16(image), Some(1.0)).into_rgb8();
         // 205 is on the straight part: 12.92 * 205 / 257; 14,030 is the light of sRGB's 127.5 or so.
         let levels: Vec<u8> = shown.pixels().map(|pixel| pixel.0[0]).collect();
         assert_eq!(levels, [0, 10, 128, 255]);

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, Write};
 
 use anyhow::Context;
-use image::RgbImage;
+use image::DynamicImage;
 use rayfold_movie::{Container, Movie};
 
 use super::movie::{self, Encoded, MovieError, Push, Written};
@@ -111,7 +111,7 @@ impl Store {
         Ok(Self { file: BufWriter::new(file), frames: Vec::new() })
     }
 
-    fn add(&mut self, frame: &RgbImage, seconds: Option<f64>) -> anyhow::Result<()> {
+    fn add(&mut self, frame: &DynamicImage, seconds: Option<f64>) -> anyhow::Result<()> {
         let file = Format::Png.encode(frame)?;
         self.file.write_all(&file).context("cannot write a temporary file")?;
         self.frames.push((file.len(), seconds));
@@ -120,7 +120,7 @@ impl Store {
 
     fn each(
         &mut self,
-        mut take: impl FnMut(RgbImage, Option<f64>) -> anyhow::Result<()>,
+        mut take: impl FnMut(DynamicImage, Option<f64>) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let cannot = "cannot read a temporary file";
         self.file.flush().context(cannot)?;
@@ -142,7 +142,7 @@ struct Rounding {
     /// The step from one level to the next, and the nearest level of each.
     step: f32,
     nearest: [u8; 256],
-    before: Option<RgbImage>,
+    before: Option<DynamicImage>,
 }
 
 impl Rounding {
@@ -152,17 +152,38 @@ impl Rounding {
         Self { step, nearest, before: None }
     }
 
-    fn apply(&mut self, mut frame: RgbImage) -> RgbImage {
+    /// Alpha is not rounded.
+    fn apply(&mut self, frame: DynamicImage) -> DynamicImage {
         let Self { step, nearest, before } = self;
-        match before.as_ref().filter(|before| before.dimensions() == frame.dimensions()) {
+        let channels = usize::from(frame.color().channel_count());
+        let is_like = |before: &&DynamicImage| {
+            (before.width(), before.height(), before.color())
+                == (frame.width(), frame.height(), frame.color())
+        };
+        let round = |levels: &mut [u8]| match before.as_ref().filter(is_like) {
             Some(before) => {
-                for (level, before) in frame.iter_mut().zip(before.iter()) {
+                let pixels = levels.chunks_exact_mut(channels).zip(before.as_bytes().chunks_exact(channels));
+                for (level, before) in pixels.flat_map(|(now, before)| now[..3].iter_mut().zip(before)) {
                     let is_kept = f32::from(level.abs_diff(*before)) <= KEPT * *step;
                     *level = if is_kept { *before } else { nearest[usize::from(*level)] };
                 }
             }
-            None => frame.iter_mut().for_each(|level| *level = nearest[usize::from(*level)]),
-        }
+            None => {
+                let pixels = levels.chunks_exact_mut(channels);
+                pixels
+                    .flat_map(|pixel| &mut pixel[..3])
+                    .for_each(|level| *level = nearest[usize::from(*level)]);
+            }
+        };
+        let frame = if channels == 4 {
+            let mut frame = frame.clone().into_rgba8();
+            round(&mut frame);
+            frame.into()
+        } else {
+            let mut frame = frame.clone().into_rgb8();
+            round(&mut frame);
+            DynamicImage::from(frame)
+        };
         *before = Some(frame.clone());
         frame
     }
@@ -177,13 +198,16 @@ mod tests {
         for levels in LEVELS {
             let mut rounding = Rounding::new(levels);
             assert_eq!((rounding.nearest[0], rounding.nearest[255]), (0, 255));
-            let image = |level: u8| RgbImage::from_pixel(1, 1, image::Rgb([level; 3]));
-            let shown = [100, 101, 99, 100, 250].map(|level| rounding.apply(image(level)).into_raw()[0]);
+            let image = |level: u8| image::RgbImage::from_pixel(1, 1, image::Rgb([level; 3])).into();
+            let shown = [100, 101, 99, 100, 250].map(|level| rounding.apply(image(level)).as_bytes()[0]);
             let off = |shown: u8, meant: u8| f32::from(shown.abs_diff(meant));
             assert!(
                 off(shown[3], 100) <= KEPT * rounding.step + 0.5
                     && off(shown[4], 250) <= 0.5 * rounding.step + 0.5
             );
+            let clear =
+                rounding.apply(image::RgbaImage::from_pixel(1, 1, image::Rgba([101, 0, 0, 77])).into());
+            assert_eq!(clear.as_bytes()[3], 77);
             assert!(levels > 52 || shown[..4].iter().all(|level| *level == shown[0]), "{levels}: {shown:?}");
         }
     }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Context;
 use clap::ValueEnum;
-use image::RgbImage;
+use image::DynamicImage;
 use rayfold_files::{OutputFile, probe};
 use rayfold_movie::{Container, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
@@ -82,6 +82,9 @@ pub(crate) struct Args {
     /// pixels) may be off by up to 4 levels of 255, in a file several times smaller
     #[arg(long)]
     exact: bool,
+    /// Colour behind the objects where a script says Background none, such as '#ffffff' [default: transparent; black in a .y4m]
+    #[arg(long, value_name = "#RRGGBB", value_parser = values::color)]
+    matte: Option<[u8; 3]>,
     /// Draw every frame in this size, such as 640x480, instead of that of its Screen
     #[arg(long, value_name = "WxH", value_parser = values::size, allow_negative_numbers = true)]
     size: Option<Screen>,
@@ -202,6 +205,11 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
         samples: args.samples,
         frames: args.frame.unwrap_or_default(),
         precision: args.precision.into(),
+        matte: match target {
+            // It has no alpha.
+            Target::Animation(Container::Y4m, _) => Some(args.matte.unwrap_or_default()),
+            _ => args.matte,
+        },
     };
     if args.no_clobber {
         match target {
@@ -235,6 +243,9 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     };
     if let Some(size) = args.size {
         warn_if_squashed(&plan, size, console)?;
+    }
+    if args.matte.is_some() && !plan.has_clear_frames() {
+        console.warn("--matte has no effect: no frame has `Background none`");
     }
     if !console.quiet
         && let Some(warning) = plan.light_cut_off()?
@@ -289,6 +300,7 @@ fn animation(
         plays: args.playback.plays(Plays::repeated(plan.settings.loops())),
         last_delay_cs: args.playback.last_delay_cs(),
         exact: args.exact,
+        alpha: plan.has_clear_frames() && plan.matte.is_none(),
     };
     let durations = plan.durations()?;
     if container == Container::Y4m && !durations.is_empty() {
@@ -410,22 +422,23 @@ fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
     let mut file = Vec::new();
     let read = rayfold_files::open(path).and_then(|mut from| from.read_to_end(&mut file));
     let image = read.ok().and_then(|_| format.decode(&file));
-    image.is_some_and(|image| image.dimensions() == (screen.width(), screen.height()))
+    image.is_some_and(|image| (image.width(), image.height()) == (screen.width(), screen.height()))
 }
 
 /// Draws a frame, unless the run is stopping. `progress` counts its work.
 ///
 /// # Errors
 /// When it was, and those of the renderer.
-pub(crate) fn draw(plan: &Plan, job: &Job, progress: Option<&Work>) -> anyhow::Result<RgbImage> {
+pub(crate) fn draw(plan: &Plan, job: &Job, progress: Option<&Work>) -> anyhow::Result<DynamicImage> {
     anyhow::ensure!(!interrupt::stopping(), "interrupted");
     let options = RenderOptions {
         cancel: Some(interrupt::flag()),
         progress,
         precision: plan.precision,
+        matte: plan.matte,
         ..Default::default()
     };
-    plan.expose(job, |exposure| rayfold_tracer::render_exposed(exposure, &options))?
+    plan.expose(job, |exposure| rayfold_tracer::render_picture(exposure, &options))?
         .with_context(|| format!("cannot render frame {} ({})", job.number, plan.name(job)))
 }
 

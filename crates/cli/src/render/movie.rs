@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::time::Duration;
 
-use image::RgbImage;
+use image::DynamicImage;
 use rayfold_files::OutputFile;
 use rayfold_movie::{Container, Encoding, Finished, MAX_FPS, Movie};
 
@@ -55,7 +55,7 @@ pub(crate) struct Written {
 }
 
 /// Takes the next frame, and how many seconds it is shown if not as long as the others.
-pub(crate) type Push<'a> = &'a mut (dyn FnMut(RgbImage, Option<f64>) -> Result<(), MovieError> + Send);
+pub(crate) type Push<'a> = &'a mut (dyn FnMut(DynamicImage, Option<f64>) -> Result<(), MovieError> + Send);
 
 /// Writes an animation of the frames that `fill` pushes, in their order. A file appears once it is whole.
 ///

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
+use image::{DynamicImage, ImageEncoder, ImageFormat};
 use rayfold_files::probe;
 use rayfold_movie::Container;
 
@@ -234,32 +234,33 @@ fn split(name: &str) -> Option<(&str, &str, &str)> {
 
 impl Format {
     /// Decodes the image in a file of this format; `None` when the file is not whole.
-    pub(crate) fn decode(self, file: &[u8]) -> Option<RgbImage> {
+    pub(crate) fn decode(self, file: &[u8]) -> Option<DynamicImage> {
         let format = match self {
             Self::Png => ImageFormat::Png,
             Self::Tiff => ImageFormat::Tiff,
         };
-        Some(image::load_from_memory_with_format(file, format).ok()?.into_rgb8())
+        let image = image::load_from_memory_with_format(file, format).ok()?;
+        Some(if image.color().has_alpha() { image.into_rgba8().into() } else { image.into_rgb8().into() })
     }
 
-    /// Encodes an image as a file of this format.
+    /// Encodes an image, with or without alpha, as a file of this format.
     ///
     /// # Errors
     /// When the image exceeds the limits of the format.
-    pub(crate) fn encode(self, image: &RgbImage) -> anyhow::Result<Vec<u8>> {
+    pub(crate) fn encode(self, image: &DynamicImage) -> anyhow::Result<Vec<u8>> {
         use image::codecs::{png, tiff};
         let mut file = Vec::new();
-        let (width, height) = image.dimensions();
-        let color = ExtendedColorType::Rgb8;
+        let (width, height) = (image.width(), image.height());
+        let (bytes, color) = (image.as_bytes(), image.color().into());
         match self {
             Self::Png => png::PngEncoder::new_with_quality(
                 &mut file,
                 png::CompressionType::Fast,
                 png::FilterType::Adaptive,
             )
-            .write_image(image, width, height, color),
+            .write_image(bytes, width, height, color),
             Self::Tiff => tiff::TiffEncoder::new(std::io::Cursor::new(&mut file))
-                .write_image(image, width, height, color),
+                .write_image(bytes, width, height, color),
         }
         .context("cannot encode the image")?;
         Ok(file)
@@ -371,11 +372,15 @@ mod tests {
 
     #[test]
     fn images_decode_to_what_they_were() {
-        let image = RgbImage::from_fn(7, 5, |x, y| image::Rgb([x as u8, y as u8, 200]));
-        for format in [Format::Png, Format::Tiff] {
-            let file = format.encode(&image).unwrap();
-            assert_eq!(format.decode(&file), Some(image.clone()), "{format:?}");
-            assert_eq!(format.decode(&file[..file.len() / 2]), None, "half a {format:?}");
+        let clear =
+            image::RgbaImage::from_fn(7, 5, |x, y| image::Rgba([x as u8, y as u8, 200, 30 * x as u8]));
+        let clear = DynamicImage::from(clear);
+        for image in [clear.to_rgb8().into(), clear] {
+            for format in [Format::Png, Format::Tiff] {
+                let file = format.encode(&image).unwrap();
+                assert_eq!(format.decode(&file), Some(image.clone()), "{format:?}");
+                assert_eq!(format.decode(&file[..file.len() / 2]), None, "half a {format:?}");
+            }
         }
     }
 }

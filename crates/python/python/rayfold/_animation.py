@@ -207,14 +207,24 @@ class Animation:
         times = self._times()
         if self._shown_length() is None and format == "apng":
             raise ValueError("an .apng begins with the number of its frames, which an iterator does not say: give frames=")
+        # Frames of a GIF have alpha or not, one by one. The other formats say before the first whether any has.
+        alpha = format == "gif" or (
+            isinstance(self._scenes, Sequence) and any(scene._has_clear_frames() for scene in self._scenes)
+        )
         encoder = None
         number = 0
         for image in self._drawn(progress):
             if encoder is None:
+                alpha = alpha or image.channels == 4
                 encoder = _rayfold.Encoder(
-                    path, format, image.size, self._shown_length(), self.fps, self.loop, None, exact
+                    path, format, image.size, self._shown_length(), self.fps, self.loop, None, exact, alpha
                 )
                 size = image.size
+            if image.channels == 4 and not alpha:
+                raise ValueError(
+                    f"frame {number + 1} has no background, but frame 1 has one: an .{format} says before its first frame"
+                    " whether any is transparent; give the scenes as a list"
+                )
             if image.size != size:
                 raise ValueError(
                     f"an animation has one size, but frame 1 is {size[0]} x {size[1]} and frame {number + 1} is"
@@ -373,7 +383,8 @@ def animation(scenes, frames=None, fps=10, *, loop=0, bounce=False, durations=No
 def gif(images, fps=10, path=None, *, loop=0, exact=False):
     """Encodes arrays of height x width x 3 (`uint8`) as a GIF. Returns its bytes, or writes them to `path`.
 
-    Arrays of height x width are greys. Frames are taken one by one: memory does not grow with their number.
+    Arrays of height x width x 4 have alpha, of which a GIF shows a pixel or does not: of pixels that are covered in part, a
+    pattern is shown. Arrays of height x width are greys. Frames are taken one by one: memory does not grow with their number.
     """
     images = _arguments.iterable("gif", "images", images, "a list or an iterator of arrays")
     fps = _arguments.number("gif", "fps", fps)
@@ -385,7 +396,7 @@ def gif(images, fps=10, path=None, *, loop=0, exact=False):
     for number, array in enumerate(images, 1):
         image = image_of(array, f"gif(): images: frame {number}")
         if encoder is None:
-            encoder = _rayfold.Encoder(path, "gif", image.size, None, fps, loop, None, exact)
+            encoder = _rayfold.Encoder(path, "gif", image.size, None, fps, loop, None, exact, True)
         encoder.push(image, None)
     if encoder is None:
         raise ValueError("gif(): images is empty: a GIF needs at least one frame")

@@ -55,7 +55,8 @@ class Scene(_rayfold.Script):
         """Draws a frame, counted from 1.
 
         Returns an array of height x width x 3: levels from 0 to 255 as `uint8`, or with `linear` the light before `tone` and
-        rounding, from 0 to 1, as `float32`.
+        rounding, from 0 to 1, as `float32`. A scene with `background("none")` has a fourth channel, alpha; `linear` light is
+        premultiplied by it.
         """
         linear = _arguments.flag("render", "linear", linear)
         return picture_of(self._draw("render", frame, linear), linear)

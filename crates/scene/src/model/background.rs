@@ -7,26 +7,30 @@ use glam::DVec3;
 use super::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 
-/// One colour, or a gradient between two by the height of the ray direction. Each channel is
+/// One colour, a gradient between two by the height of the ray direction, or none. Each channel is
 /// in 0..=1. Default: black.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Background {
     low: DVec3,
     high: Option<DVec3>,
+    is_none: bool,
 }
 
 impl Background {
+    /// No background: rays that reach nothing straight or through glass leave the picture transparent. All other rays see black.
+    pub const NONE: Self = Self { low: DVec3::ZERO, high: None, is_none: true };
+
     /// Makes a background of one colour. Clamps each channel to 0..=1, and makes zeros positive.
     ///
     /// # Errors
     /// Fails if a channel is not finite.
     pub fn new(color: DVec3) -> Result<Self, InvalidValue> {
-        Ok(Self { low: clamped(color)?, high: None })
+        Ok(Self { low: clamped(color)?, high: None, is_none: false })
     }
 
     /// Makes a background of a fog's colour, whose channels may be any finite numbers.
     pub(super) fn of_fog(color: DVec3) -> Self {
-        Self { low: color, high: None }
+        Self { low: color, high: None, is_none: false }
     }
 
     /// Makes a gradient from one colour, seen straight down, to another, seen straight up.
@@ -34,7 +38,12 @@ impl Background {
     /// # Errors
     /// Fails if a channel is not finite.
     pub fn sky(low: DVec3, high: DVec3) -> Result<Self, InvalidValue> {
-        Ok(Self { low: clamped(low)?, high: Some(clamped(high)?) })
+        Ok(Self { low: clamped(low)?, high: Some(clamped(high)?), is_none: false })
+    }
+
+    /// Returns whether there is none ([`Self::NONE`]).
+    pub fn is_none(self) -> bool {
+        self.is_none
     }
 
     /// Returns the colour of all rays, or `None` if it depends on their height.
@@ -69,9 +78,13 @@ impl Scripted for Background {
             Field::new(Parameter::Background, &["R", "G", "B"], Kind::Color, Values::Clamped)
                 .optional("the first colour"),
         ],
-    );
+    )
+    .or_word("none");
 
     fn read(numbers: &mut Numbers<'_>) -> Result<Self, Faults> {
+        if numbers.is_word() {
+            return Ok(Self::NONE);
+        }
         let low = numbers.vector();
         Ok(match numbers.optional_vector() {
             Some(high) => Self::sky(low, high)?,
@@ -80,7 +93,28 @@ impl Scripted for Background {
     }
 
     fn write(&self, line: &mut Line<'_, '_>) -> fmt::Result {
+        if self.is_none {
+            return line.word("none");
+        }
         line.vector(self.low)?;
         self.high.map_or(Ok(()), |high| line.vector(high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Limits, parse};
+
+    #[test]
+    fn none_lasts_until_a_colour_or_a_clear() {
+        let text = "Screen 4 3\nBackground none\nTrace\nBackground .1 .2 .3\nTrace\nBackground NONE\nTrace\nClear\nTrace\n";
+        let script = parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap();
+        let clear: Vec<bool> = (0..4).map(|k| script.frame(k).unwrap().background.is_none()).collect();
+        assert_eq!(clear, [true, false, true, false]);
+        let shots: Vec<bool> = script.shots().map(|shot| shot.is_clear).collect();
+        assert_eq!(shots, clear);
+        assert_eq!(parse("a.txt", script.to_string().as_bytes(), &Limits::default()).script, Some(script));
+        let wrong = parse("a.txt", b"Screen 4 3\nBackground nothing\nTrace\n", &Limits::default());
+        assert!(wrong.script.is_none());
     }
 }

@@ -55,6 +55,8 @@ pub struct ShotSummary {
     pub screen: Screen,
     /// Whether the camera is `Orthocamera`.
     pub is_orthographic: bool,
+    /// Whether there is no background ([`Background::NONE`]).
+    pub is_clear: bool,
     /// The largest number of objects that a frame draws.
     pub objects: usize,
 }
@@ -221,6 +223,7 @@ impl Script {
                 frame_count: shot.frame_count(),
                 screen: view.screen,
                 is_orthographic: view.camera == Value::Constant(Camera::Orthographic),
+                is_clear: view.background == Value::Constant(Background::NONE),
                 objects: shot.drawn,
             }
         })

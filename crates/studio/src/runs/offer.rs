@@ -9,7 +9,7 @@ use rayfold_client::cost::{Prices, Section, Workload, estimate, render_ms};
 use rayfold_client::{Content, File, Submission, settings_with_frames};
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_scene::{AnimationSettings, Screen, Script};
-use rayfold_tracer::{RenderOptions, render_frame};
+use rayfold_tracer::{RenderOptions, picture_of_frame};
 use serde::Serialize;
 
 use crate::error::words;
@@ -198,7 +198,7 @@ impl Ready {
                 break;
             }
             let start = Instant::now();
-            let Some(image) = render_frame(script, frame, &RenderOptions::default()) else { break };
+            let Some(image) = picture_of_frame(script, frame, &RenderOptions::default()) else { break };
             let image = image.map_err(|error| Refusal::of(&error))?;
             size = png(&image).map_err(|error| Refusal::of(&error))?.len();
             shortest = shortest.min(start.elapsed().as_secs_f64());

@@ -23,11 +23,12 @@ use core::ops::Range;
 use std::sync::atomic::Ordering;
 
 use fearless_simd::{Level, Simd};
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
 use rayfold_scene::Scene;
 
 use self::sampled::Sampled;
 use self::shapes::{Formulas, Shape};
+use crate::cover::{self, Lit};
 use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::arithmetic::rounding::MARGIN;
@@ -42,9 +43,11 @@ use crate::fast::placement::window::{Grid, Window};
 #[cfg(feature = "accuracy")]
 use crate::fast::shapes::naive;
 use crate::fast::shapes::shape::Robust;
-use crate::parallel::{CHANNELS, bands};
+use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::parts;
 use crate::{Exposure, Precision, RenderError, RenderOptions};
+
+pub(crate) use crate::fast::film::tone::encoded;
 
 /// The columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
@@ -105,12 +108,41 @@ impl<'a> Drawing<'a> {
         }))
     }
 
-    /// Draws the image, the second half. The result is the same each time.
+    /// Draws the picture: of a scene without background with alpha, unless there is a
+    /// [matte](crate::RenderOptions::matte).
+    ///
+    /// # Errors
+    /// The errors of [`crate::render`].
+    pub fn draw_picture(&self) -> Result<DynamicImage, RenderError> {
+        self.draw_picture_rows(0..self.scene().screen.height())
+    }
+
+    /// Draws some rows of the picture, as [`Self::draw_rows`] does of the image.
+    ///
+    /// # Errors
+    /// The errors of [`crate::render`].
+    pub fn draw_picture_rows(&self, rows: Range<u32>) -> Result<DynamicImage, RenderError> {
+        if !self.has_alpha() {
+            return self.draw_rows(rows).map(DynamicImage::ImageRgb8);
+        }
+        let rows = self.inside(rows);
+        let lit = self.lit_rows(rows.clone(), self.margin())?;
+        let size = (self.scene().screen.width(), rows.end - rows.start);
+        Ok(DynamicImage::ImageRgba8(cover::straight(size, self.scene().tone, &lit)))
+    }
+
+    /// Returns whether pictures have alpha.
+    fn has_alpha(&self) -> bool {
+        self.scene().background.is_none() && self.options().matte.is_none()
+    }
+
+    /// Draws the image, the second half. The result is the same each time. Where a scene has no background, it shows the
+    /// [matte](crate::RenderOptions::matte), or black.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
     pub fn draw(&self) -> Result<RgbImage, RenderError> {
-        self.draw_rows(0..self.height())
+        self.draw_rows(0..self.scene().screen.height())
     }
 
     /// Draws some rows of the image, counted from the top. The pixels are exactly those of the whole image. Takes the
@@ -142,16 +174,19 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws the image. `each` gets the picture after each pass over the image except the last. Each is an estimate of
-    /// the whole picture, the next one with more samples. With one sample per pixel there are none.
+    /// Draws the picture as [`Self::draw_picture`] does. `each` gets it after each pass over the image except the last. Each is
+    /// an estimate of the whole picture, the next one with more samples. With one sample per pixel there are none.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
-    pub fn draw_progressively(&self, mut each: impl FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+    pub fn draw_progressively(
+        &self,
+        mut each: impl FnMut(DynamicImage),
+    ) -> Result<DynamicImage, RenderError> {
         match &self.0 {
             Backend::SampledSingle(sampled) => sampled.draw_progressively(&mut each),
             Backend::SampledDouble(sampled) => sampled.draw_progressively(&mut each),
-            Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => self.draw(),
+            Backend::Single(_) | Backend::Double(_) | Backend::Reference(..) => self.draw_picture(),
         }
     }
 
@@ -171,11 +206,47 @@ impl<'a> Drawing<'a> {
         }
     }
 
+    /// Draws the light of the image as [`Self::draw_light`] does, and its cover: four numbers from 0 to 1 for each pixel. The
+    /// light is premultiplied by the cover. A scene with a background covers all.
+    ///
+    /// # Errors
+    /// The errors of [`crate::render`].
+    pub fn draw_light_and_cover(&self) -> Result<Vec<f32>, RenderError> {
+        let scene = self.scene();
+        let lit = if scene.background.is_none() {
+            self.lit_rows(0..scene.screen.height(), 0)?
+        } else {
+            self.draw_light()?
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&[red, green, blue]| [red, green, blue, 1.0])
+                .collect()
+        };
+        Ok(lit.into_flattened())
+    }
+
+    /// Draws rows of a scene without background.
+    fn lit_rows(&self, rows: Range<u32>, margin: u32) -> Result<Vec<Lit>, RenderError> {
+        match &self.0 {
+            Backend::Single(setup) => setup.lit_rows(rows),
+            Backend::Double(setup) => setup.lit_rows(rows),
+            Backend::SampledSingle(sampled) => sampled.lit_rows(rows, margin),
+            Backend::SampledDouble(sampled) => sampled.lit_rows(rows, margin),
+            Backend::Reference(exposure, options) => crate::reference::lit_rows(*exposure, rows, options),
+        }
+    }
+
     fn draw_within(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
-        let end = rows.end.min(self.height());
-        let rows = rows.start.min(end)..end;
+        let rows = self.inside(rows);
         if rows.is_empty() {
             return Ok(RgbImage::default());
+        }
+        let scene = self.scene();
+        if scene.background.is_none() {
+            let size = (scene.screen.width(), rows.end - rows.start);
+            let lit = self.lit_rows(rows, margin)?;
+            return Ok(cover::over(size, scene.tone, &lit, self.options().matte.unwrap_or_default()));
         }
         match &self.0 {
             Backend::Single(setup) => setup.draw::<Robust>(rows),
@@ -188,15 +259,30 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    fn height(&self) -> u32 {
-        let scene = match &self.0 {
+    /// Returns the part of some rows that is inside the image.
+    fn inside(&self, rows: Range<u32>) -> Range<u32> {
+        let end = rows.end.min(self.scene().screen.height());
+        rows.start.min(end)..end
+    }
+
+    fn scene(&self) -> &Scene {
+        match &self.0 {
             Backend::Single(setup) => setup.scene,
             Backend::Double(setup) => setup.scene,
             Backend::SampledSingle(sampled) => sampled.scene(),
             Backend::SampledDouble(sampled) => sampled.scene(),
             Backend::Reference(exposure, _) => exposure.scene(),
-        };
-        scene.screen.height()
+        }
+    }
+
+    fn options(&self) -> &RenderOptions<'_> {
+        match &self.0 {
+            Backend::Single(setup) => setup.options,
+            Backend::Double(setup) => setup.options,
+            Backend::SampledSingle(sampled) => sampled.options(),
+            Backend::SampledDouble(sampled) => sampled.options(),
+            Backend::Reference(_, options) => options,
+        }
     }
 }
 
@@ -217,7 +303,7 @@ impl Drawing<'_> {
     /// # Errors
     /// The errors of [`crate::render`].
     pub fn draw_means(&self) -> Result<Option<Means>, RenderError> {
-        let rows = 0..self.height();
+        let rows = 0..self.scene().screen.height();
         let film = match &self.0 {
             Backend::SampledSingle(sampled) => sampled.expose(rows, |_| Ok(()))?,
             Backend::SampledDouble(sampled) => sampled.expose(rows, |_| Ok(()))?,
@@ -337,27 +423,65 @@ impl<'a, E: Real> Setup<'a, E> {
 
     /// Draws bands of tiles in parallel, those that contain these rows.
     fn draw<By: Formulas<E>>(&self, rows: Range<u32>) -> Result<RgbImage, RenderError> {
-        let Self { scene, options, prepared, window, bodies, side } = self;
-        let size = (scene.screen.width(), scene.screen.height());
-        let background = FlatBackground::new::<E>(scene.surroundings().colors().0, scene.tone);
-        let level = options.level.unwrap_or_else(Level::new);
-        let bounces = options.bounces(scene);
-        // Boxed, because it is passed from band to band by value.
+        let Self { scene, options, side, .. } = self;
         let image = bands(
             scene.screen,
             rows,
             side.1,
             options,
-            || Box::new(Scratch::new(options.cancel)),
+            || self.scratch(),
             |scratch, row, bytes| {
-                let band = Band { bytes, size, background, tone: scene.tone };
-                let windows = (window, bodies.as_ref());
-                draw::<E, By>(&Job { prepared, windows, side: *side, row, bounces }, level, band, scratch);
+                let rows = bytes.len() / (scene.screen.width() as usize * CHANNELS);
+                self.draw_band::<By>(scratch, row, rows as u32, (bytes, &mut []));
             },
         )?;
-        // A tile with much glass stops halfway if the picture is cancelled.
-        let is_cancelled = || options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
-        if prepared.has_glass() && is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
+        if self.is_cut_short() { Err(RenderError::Cancelled) } else { Ok(image) }
+    }
+
+    /// Draws rows of a scene without background.
+    fn lit_rows(&self, rows: Range<u32>) -> Result<Vec<Lit>, RenderError> {
+        let Self { scene, options, side, .. } = self;
+        let lit = bands_of::<_, Lit, 1>(
+            scene.screen,
+            rows,
+            side.1,
+            options,
+            || self.scratch(),
+            |scratch, row, lit| {
+                let rows = lit.len() / scene.screen.width() as usize;
+                self.draw_band::<Robust>(scratch, row, rows as u32, (&mut [], lit));
+            },
+        )?;
+        if self.is_cut_short() { Err(RenderError::Cancelled) } else { Ok(lit) }
+    }
+
+    // Boxed, because it is passed from band to band by value.
+    fn scratch(&self) -> Box<Scratch<'_, E>> {
+        Box::new(Scratch::new(self.options.cancel))
+    }
+
+    /// Draws a band of so many rows from a row on, into bytes or into pixels.
+    fn draw_band<By: Formulas<E>>(
+        &self,
+        scratch: &mut Scratch<E>,
+        row: u32,
+        rows: u32,
+        (bytes, lit): (&mut [u8], &mut [Lit]),
+    ) {
+        let Self { scene, options, prepared, window, bodies, side } = self;
+        let size = (scene.screen.width(), scene.screen.height());
+        let backdrop = if prepared.is_clear() { glam::DVec3::ZERO } else { scene.surroundings().colors().0 };
+        let background = FlatBackground::new::<E>(backdrop, scene.tone);
+        let band = Band { bytes, lit, rows, size, background, tone: scene.tone };
+        let windows = (window, bodies.as_ref());
+        let job = Job { prepared, windows, side: *side, row, bounces: options.bounces(scene) };
+        draw::<E, By>(&job, options.level.unwrap_or_else(Level::new), band, scratch);
+    }
+
+    /// Returns whether a tile may have stopped halfway: with much glass it does if the picture is cancelled.
+    fn is_cut_short(&self) -> bool {
+        let is_cancelled = || self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        self.prepared.has_glass() && is_cancelled()
     }
 }
 
@@ -381,7 +505,7 @@ impl<E: Real> Job<'_, E> {
             #[inline(always)]
             || {
                 let (width, _) = band.size;
-                let height = (band.bytes.len() / (width as usize * CHANNELS)) as u32;
+                let height = band.rows;
                 for (column, left) in (0..width).step_by(self.side.0 as usize).enumerate() {
                     let place = (column, (self.row / self.side.1) as usize);
                     let tile = Tile {

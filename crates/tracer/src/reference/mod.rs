@@ -36,8 +36,8 @@ use rayfold_scene::{Object, Scene};
 pub(crate) use glass::onward_normal;
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
-pub use sampled::{Estimate, estimate, render_exposed};
-pub(crate) use sampled::{light, render_rows as render_exposed_rows};
+pub use sampled::{Estimate, estimate, light_and_cover, render_exposed};
+pub(crate) use sampled::{light, lit_rows, render_rows as render_exposed_rows};
 pub(crate) use shading::{FAINT, FAINT_LINEAR, clearness};
 pub use shapes::Surface;
 pub(crate) use shapes::{

@@ -7,13 +7,15 @@ use std::borrow::Cow;
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Camera, Light, Scene};
+use rayon::prelude::*;
 
-use super::shading::Shader;
+use super::shading::{Seen, Shader};
 use super::tone;
 use super::world::World;
 use crate::camera::Ray;
+use crate::cover::Lit;
 use crate::meshes::Expanded;
-use crate::parallel::{CHANNELS, bands};
+use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
 use crate::sampling::{Dimensions, coordinate, pixel_seed};
 use crate::{Exposure, RenderError, RenderOptions};
@@ -43,7 +45,7 @@ pub(crate) fn render_rows(
     if scene.samples.most() == 1 {
         return super::render_rows(scene, rows, options);
     }
-    let image = with_pixels(exposure, options, |color| {
+    let image = with_pixels(exposure, options, |seen| {
         bands(
             scene.screen,
             rows,
@@ -52,7 +54,7 @@ pub(crate) fn render_rows(
             || (),
             |(), row, band| {
                 for (pixel, column) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
-                    pixel.copy_from_slice(&tone::toned(scene.tone, color(column, row)));
+                    pixel.copy_from_slice(&tone::toned(scene.tone, seen(column, row).color));
                 }
             },
         )
@@ -66,26 +68,52 @@ pub(crate) fn render_rows(
 /// # Errors
 /// The errors of [`crate::render`].
 pub(crate) fn light(exposure: Exposure, options: &RenderOptions) -> Result<Vec<f32>, RenderError> {
-    use rayon::prelude::*;
+    let lit = lit_rows(exposure, 0..exposure.scene().screen.height(), options)?;
+    Ok(lit.into_par_iter().flat_map_iter(|[red, green, blue, _]| [red, green, blue]).collect())
+}
 
-    let screen = exposure.scene().screen;
-    let row = |color: &Color, row: u32| -> Vec<f32> {
-        let color = |column| if is_cancelled(options) { DVec3::ZERO } else { color(column, row) };
-        (0..screen.width())
-            .flat_map(|column| color(column).to_array().map(|channel| channel as f32))
-            .collect()
-    };
-    let rows = with_pixels(exposure, options, |color| {
-        (0..screen.height()).into_par_iter().flat_map_iter(|j| row(color, j)).collect()
-    });
+/// Returns the light of a scene, as [`crate::Drawing::draw_light_and_cover`] does, with the largest number of samples in
+/// every pixel.
+///
+/// # Errors
+/// The errors of [`crate::render`].
+pub fn light_and_cover(exposure: Exposure, options: &RenderOptions) -> Result<Vec<f32>, RenderError> {
+    Ok(lit_rows(exposure, 0..exposure.scene().screen.height(), options)?.into_flattened())
+}
+
+/// Returns the light and the cover of some rows of a scene, row by row from the top, as [`light`] does.
+///
+/// # Errors
+/// The errors of [`crate::render`].
+pub(crate) fn lit_rows(
+    exposure: Exposure,
+    rows: Range<u32>,
+    options: &RenderOptions,
+) -> Result<Vec<Lit>, RenderError> {
+    let rows = with_pixels(exposure, options, |seen| {
+        bands_of::<_, Lit, 1>(
+            exposure.scene().screen,
+            rows,
+            1,
+            options,
+            || (),
+            |(), row, band| {
+                for (pixel, column) in band.iter_mut().zip(0u32..) {
+                    let Seen { color, clear } = seen(column, row);
+                    let [red, green, blue] = color.to_array().map(|channel| channel as f32);
+                    *pixel = [red, green, blue, (1.0 - clear) as f32];
+                }
+            },
+        )
+    })?;
     if is_cancelled(options) { Err(RenderError::Cancelled) } else { Ok(rows) }
 }
 
-/// Returns the colour of a pixel, clamped. Columns count from the left, rows from the top.
-type Color<'a> = dyn Fn(u32, u32) -> DVec3 + Sync + 'a;
+/// Returns what a pixel shows, its colour clamped. Columns count from the left, rows from the top.
+type Mean<'a> = dyn Fn(u32, u32) -> Seen + Sync + 'a;
 
-/// Calls `draw` with a function that gives the mean colour of a pixel, with the largest number of samples.
-fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce(&Color) -> T) -> T {
+/// Calls `draw` with a function that gives the mean of a pixel, with the largest number of samples.
+fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce(&Mean) -> T) -> T {
     let scene = exposure.scene();
     let samples = scene.samples.most();
     let scenes = exposure.moments();
@@ -100,23 +128,25 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
         if samples == 1 {
             let world = &moments[0].world;
             let ray = world.rays.ray(f64::from(column), f64::from(scene.screen.height() - 1 - row));
-            return clamped(Shader { world, lights: &middles, cancel: options.cancel }.color(ray, bounces));
+            return clamped(Shader { world, lights: &middles, cancel: options.cancel }.seen(ray, bounces));
         }
         let seed = pixel_seed(column, row);
-        let mut sum = DVec3::ZERO;
+        let mut sum = Seen::BLACK;
         for sample in 0..samples {
             let number = |dimension| coordinate(seed, sample, dimension);
             let time = dimensions.time.map_or(0.0, number) * moments.len() as f64;
             let moment = &moments[time as usize];
-            sum += moment.color(scene, (column, row), number, options);
+            let seen = moment.seen(scene, (column, row), number, options);
+            sum = Seen { color: sum.color + seen.color, clear: sum.clear + seen.clear };
         }
-        sum / f64::from(samples)
+        let count = f64::from(samples);
+        Seen { color: sum.color / count, clear: sum.clear / count }
     })
 }
 
-/// Returns a colour in 0..1. A NaN is black.
-fn clamped(color: DVec3) -> DVec3 {
-    DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO)
+/// Returns what is seen with a colour in 0..1. A NaN is black.
+fn clamped(Seen { color, clear }: Seen) -> Seen {
+    Seen { color: DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO), clear }
 }
 
 fn is_cancelled(options: &RenderOptions) -> bool {
@@ -124,20 +154,20 @@ fn is_cancelled(options: &RenderOptions) -> bool {
 }
 
 impl Moment<'_> {
-    /// Returns the colour of a sample of a pixel, clamped. Rows count from the top. `number` gives its coordinates.
-    fn color(
+    /// Returns what a sample of a pixel shows, its colour clamped. Rows count from the top. `number` gives its coordinates.
+    fn seen(
         &self,
         scene: &Scene,
         (column, row): (u32, u32),
         number: impl Fn(usize) -> f64,
         options: &RenderOptions,
-    ) -> DVec3 {
+    ) -> Seen {
         let i = f64::from(column) + number(0) - 0.5;
         let j = f64::from(scene.screen.height() - 1 - row) + number(1) - 0.5;
         let ray = self.ray(i, j, &number);
         let lights = self.light_points(&number);
         let shader = Shader { world: &self.world, lights: &lights, cancel: options.cancel };
-        clamped(shader.color(ray, self.bounces))
+        clamped(shader.seen(ray, self.bounces))
     }
 
     /// Returns the ray from a point of the lens through the point where the eye's own ray is in focus.
@@ -190,8 +220,6 @@ pub struct Estimate {
 /// Estimates a picture by independent random samples, the same number in every pixel. Sampled pictures are tested
 /// against it. All pixels share the moment of a sample.
 pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
-    use rayon::prelude::*;
-
     let scene = exposure.scene();
     let (width, height) = (scene.screen.width(), scene.screen.height());
     let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); width as usize * height as usize];
@@ -213,7 +241,7 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
             let pixel = ((place % u64::from(width)) as u32, (place / u64::from(width)) as u32);
             for sample in first..first + batch {
                 let number = |dimension| independent(seed, place, sample.into(), dimension);
-                let color = moment.color(scene, pixel, number, &options);
+                let color = moment.seen(scene, pixel, number, &options).color;
                 *sum = (sum.0 + color, sum.1 + color * color);
             }
         });

@@ -41,32 +41,58 @@ struct Path {
     /// The absolute value of the product of all factors so far.
     weight: DVec3,
     has_met_glass: bool,
+    /// How much of the pixel stays clear if the ray reaches nothing; `None` for rays that see the surroundings.
+    clear: Option<f64>,
+}
+
+/// What a ray brings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Seen {
+    /// The colour, unclamped.
+    pub(super) color: DVec3,
+    /// The share of the ray that reaches nothing, straight or through glass, in a scene without background: 0 to 1.
+    pub(super) clear: f64,
+}
+
+impl Seen {
+    pub(super) const BLACK: Self = Self { color: DVec3::ZERO, clear: 0.0 };
 }
 
 impl Shader<'_> {
     /// Returns the colour along a ray from the camera, unclamped.
     pub(super) fn color(&self, ray: Ray, bounces: u32) -> DVec3 {
-        self.color_along(ray, Path { bounces, weight: DVec3::ONE, has_met_glass: false })
+        self.seen(ray, bounces).color
+    }
+
+    /// Returns what a ray from the camera brings.
+    pub(super) fn seen(&self, ray: Ray, bounces: u32) -> Seen {
+        let clear = self.world.scene.background.is_none().then_some(1.0);
+        self.seen_along(ray, Path { bounces, weight: DVec3::ONE, has_met_glass: false, clear })
     }
 
     pub(super) fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    fn color_along(&self, ray: Ray, path: Path) -> DVec3 {
+    fn seen_along(&self, ray: Ray, path: Path) -> Seen {
         if self.is_cancelled() {
-            return DVec3::ZERO;
+            return Seen::BLACK;
         }
         let world = self.world;
-        let Some(hit) = world.nearest(ray) else { return world.scene.surroundings().along(ray.direction) };
-        let Some((fog, distance)) = world.scene.fog.get() else { return self.color_at(ray, &hit, path) };
-        let clear = clearness(hit.distance, distance);
-        let color = self.color_at(ray, &hit, Path { weight: path.weight * clear, ..path });
-        held(clear * color + (1.0 - clear) * fog)
+        let Some(hit) = world.nearest(ray) else {
+            return match path.clear {
+                Some(clear) => Seen { clear, ..Seen::BLACK },
+                None => Seen { color: world.scene.surroundings().along(ray.direction), ..Seen::BLACK },
+            };
+        };
+        let Some((fog, distance)) = world.scene.fog.get() else { return self.seen_at(ray, &hit, path) };
+        let left = clearness(hit.distance, distance);
+        let Seen { color, clear } = self.seen_at(ray, &hit, Path { weight: path.weight * left, ..path });
+        Seen { color: held(left * color + (1.0 - left) * fog), clear }
     }
 
-    /// Returns the colour that a hit sends back along the ray.
-    fn color_at(&self, ray: Ray, hit: &Hit, path: Path) -> DVec3 {
+    /// Returns what a hit sends back along the ray.
+    fn seen_at(&self, ray: Ray, hit: &Hit, path: Path) -> Seen {
         let world = self.world;
         let (object, place, local_normal) = world.in_script(hit.object, &hit.surface);
         let coefficients = coefficients(object, place, local_normal, &hit.surface);
@@ -97,8 +123,9 @@ impl Shader<'_> {
                 color = held(color + light * shine.color() * part);
             }
         }
+        let mut clear = 0.0;
         if path.bounces == 0 {
-            return color;
+            return Seen { color, clear };
         }
 
         let normal = shading.map_or(face, |shading| shading.onward);
@@ -109,24 +136,27 @@ impl Shader<'_> {
             let Refraction { mirrored, direction } =
                 refract(glass, ray.direction, normal, within, !world.has_inside(hit.object, object));
             factor += mirrored;
-            refracted = Some(((1.0 - mirrored) * glass.color(), direction));
+            let share = (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
+            let clear = path.clear.map(|clear| clear * (1.0 - mirrored) * share);
+            refracted = Some(((1.0 - mirrored) * glass.color(), direction, clear));
         }
         let has_met_glass = path.has_met_glass || refracted.is_some();
         if let Some(path) = self.scattered(path, factor, has_met_glass) {
             // The normal faces the ray. If rounding has changed the sign, the ray grazes.
             let towards_surface = ray.direction.dot(normal).min(0.0);
             let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
-            let mirrored = self.color_along(Ray { origin: start, direction }, path);
-            color = held(color + factor * mirrored);
+            let mirrored = self.seen_along(Ray { origin: start, direction }, Path { clear: None, ..path });
+            color = held(color + factor * mirrored.color);
         }
-        if let Some((factor, direction)) = refracted
+        if let Some((factor, direction, share)) = refracted
             && let Some(path) = self.scattered(path, factor, has_met_glass)
         {
             let origin = hit.surface.point - hit.surface.offset * face;
-            let seen = self.color_along(Ray { origin, direction }, path);
-            color = held(color + factor * seen);
+            let seen = self.seen_along(Ray { origin, direction }, Path { clear: share, ..path });
+            color = held(color + factor * seen.color);
+            clear = seen.clear;
         }
-        color
+        Seen { color, clear }
     }
 
     /// Returns the path of a ray with this factor, or `None` if it is not followed.
@@ -137,7 +167,7 @@ impl Shader<'_> {
             Tone::Srgb => FAINT_LINEAR,
         };
         let is_followed = if has_met_glass { weight.max_element() >= faint } else { factor != DVec3::ZERO };
-        is_followed.then(|| Path { bounces: path.bounces - 1, weight, has_met_glass })
+        is_followed.then(|| Path { bounces: path.bounces - 1, weight, has_met_glass, clear: path.clear })
     }
 }
 

@@ -66,7 +66,7 @@ export function Viewport(): JSX.Element {
 
   useEffect(() => {
     const element = panel.current;
-    const context = canvas.current?.getContext("2d", { alpha: false });
+    const context = canvas.current?.getContext("2d");
     if (!element || !context) return;
     const size = (): void => {
       const box = element.getBoundingClientRect();

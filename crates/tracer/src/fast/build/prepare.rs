@@ -95,6 +95,8 @@ pub(crate) struct Prepared<E> {
     pub(crate) sights: Option<TileLists>,
     /// The background, unclamped, for reflected rays. For a sky, its first colour.
     pub(crate) background: [E; 3],
+    /// There is no background: what camera rays reach is counted as cover.
+    is_clear: bool,
     /// A background that depends on the ray's direction.
     sky: Option<Sky<E>>,
     /// The features of the scene.
@@ -199,6 +201,7 @@ impl<E: Real> Prepared<E> {
             row,
             needs,
             background: narrow(surroundings.colors().0),
+            is_clear: scene.background.is_none(),
             sky,
             tree,
             sights,
@@ -236,6 +239,18 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn is_plain(&self) -> bool {
         !self.needs.beyond || !BUILT.beyond
+    }
+
+    /// Returns whether it has no background, so that pixels have a cover.
+    #[inline(always)]
+    pub(crate) fn is_clear(&self) -> bool {
+        parts::BUILT.covers && self.is_clear
+    }
+
+    /// Returns the colour of camera rays that hit nothing; for a sky, its first colour.
+    #[inline(always)]
+    pub(crate) fn backdrop(&self) -> [E; 3] {
+        if self.is_clear() { [E::narrow(0.0); 3] } else { self.background }
     }
 
     /// Returns its background, if it depends on the ray's direction.

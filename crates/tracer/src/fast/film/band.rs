@@ -5,9 +5,10 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::Tone;
 
+use crate::cover::{Lit, NOTHING};
 use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
 use crate::fast::film::tone::{encoded, levels};
-use crate::fast::rays::bounce::{Columns, packet_shape};
+use crate::fast::rays::bounce::{Column, Columns, packet_shape};
 use crate::parallel::CHANNELS;
 
 /// A rectangle of the image, counted from its upper left corner.
@@ -30,6 +31,9 @@ pub(crate) struct Tile {
 /// The destination of a tile's pixels: the bytes of its rows, from the image's left edge.
 pub(crate) struct Band<'a> {
     pub(crate) bytes: &'a mut [u8],
+    /// The pixels of its rows, in place of the bytes, in scenes without background.
+    pub(crate) lit: &'a mut [Lit],
+    pub(crate) rows: u32,
     /// The columns and rows of the whole image.
     pub(crate) size: (u32, u32),
     /// The background colour, for pixels that show no object.
@@ -82,6 +86,9 @@ pub(crate) fn fill(tile: Tile, band: &mut Band) {
     for row in band.bytes.chunks_exact_mut(stride) {
         row[from..to].as_chunks_mut().0.fill(band.background.levels);
     }
+    for row in band.lit.chunks_exact_mut(band.size.0 as usize) {
+        row[tile.left as usize..(tile.left + tile.width) as usize].fill(NOTHING);
+    }
 }
 
 /// Writes colours to the bytes of the image.
@@ -125,17 +132,44 @@ pub(crate) fn write_pixels<S: Simd, E: Real>(simd: S, tile: Tile, colors: &Colum
 /// Writes colours to the bytes of the image, encoded by the sRGB curve.
 #[inline(never)]
 pub(crate) fn write_encoded<S: Simd, E: Real>(tile: Tile, colors: &Columns<E>, band: &mut Band) {
-    let (width, height) = packet_shape::<S, E>();
     let stride = band.size.0 as usize * CHANNELS;
+    each_pixel::<S, E>(tile, |(column, row), at| {
+        let from = row * stride + (tile.left as usize + column) * CHANNELS;
+        for (byte, channel) in band.bytes[from..from + CHANNELS].iter_mut().zip(colors) {
+            *byte = encoded(channel.0[at].widen());
+        }
+    });
+}
+
+/// Writes colours and covers to the pixels of a scene without background.
+#[inline(never)]
+pub(crate) fn write_lit<S: Simd, E: Real>(
+    tile: Tile,
+    colors: &Columns<E>,
+    cover: &Column<E>,
+    band: &mut Band,
+) {
+    let stride = band.size.0 as usize;
+    each_pixel::<S, E>(tile, |(column, row), at| {
+        let [red, green, blue] = colors.each_ref().map(|channel| {
+            let light = channel.0[at].widen();
+            // A NaN is black.
+            if light > 0.0 { light.min(1.0) as f32 } else { 0.0 }
+        });
+        let cover = cover.0[at].widen().clamp(0.0, 1.0) as f32;
+        band.lit[row * stride + tile.left as usize + column] = [red, green, blue, cover];
+    });
+}
+
+/// Calls `each` with the column and row of each pixel of a tile, and its place in the columns of its rays.
+#[inline(always)]
+fn each_pixel<S: Simd, E: Real>(tile: Tile, mut each: impl FnMut((usize, usize), usize)) {
+    let (width, height) = packet_shape::<S, E>();
     let packets_in_row = (tile.width as usize).div_ceil(width);
     for row in 0..tile.height as usize {
         for column in 0..tile.width as usize {
             let packet = row / height * packets_in_row + column / width;
-            let at = packet * (width * height) + row % height * width + column % width;
-            let from = row * stride + (tile.left as usize + column) * CHANNELS;
-            for (byte, channel) in band.bytes[from..from + CHANNELS].iter_mut().zip(colors) {
-                *byte = encoded(channel.0[at].widen());
-            }
+            each((column, row), packet * (width * height) + row % height * width + column % width);
         }
     }
 }

@@ -3,6 +3,7 @@
 //! In: a prepared scene and the place of a tile. Out: pixels of a band. Read [`tile`] first.
 
 pub(crate) mod band;
+pub(crate) mod cover;
 pub(crate) mod tile;
 pub(crate) mod tone;
 pub(crate) mod trace;

@@ -20,10 +20,11 @@ use crate::fast::bodies::ANY;
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{Anything, BUILT, Kernel, Variant, fitted};
 use crate::fast::build::prepare::Prepared;
-use crate::fast::film::band::{Band, Tile, fill, rays_of, write_encoded, write_pixels};
+use crate::fast::film::band::{Band, Tile, fill, rays_of, write_encoded, write_lit, write_pixels};
+use crate::fast::film::cover::{cover_hits, let_through};
 use crate::fast::film::trace::{aim_along_axis, trace_bodies, trace_primary, trace_queue};
 use crate::fast::materials::sky::show_sky;
-use crate::fast::rays::bounce::{Columns, Hits, RayBatch, columns};
+use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns};
 use crate::fast::rays::kind::ByKind;
 use crate::fast::rays::pixels::Rays;
 use crate::fast::transport::light::{Occluders, add_all_lights, add_sun_light};
@@ -43,6 +44,8 @@ pub(crate) struct Scratch<'a, E> {
     pub(crate) waiting: RayQueues<'a, E>,
     /// The sum of the contributions of the bounces to each pixel.
     pixels: Columns<E>,
+    /// The cover of each pixel, in scenes without background.
+    pub(crate) cover: Column<E>,
     pub(crate) occluders: Occluders,
     pub(crate) sights: Picked,
 }
@@ -56,6 +59,7 @@ impl<'a, E: Real> Scratch<'a, E> {
             next: RayBatch::new(),
             waiting: RayQueues::new(cancel),
             pixels: columns(),
+            cover: Column::new(),
             occluders: Occluders::default(),
             sights: Picked::default(),
         }
@@ -73,7 +77,7 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if tile.candidates == 0 && scene.shows_nothing(tile.bodies) {
         return fill(tile, band);
     }
-    let Scratch { queue, hits, next, waiting, pixels: _, occluders, sights } = &mut *scratch;
+    let Scratch { queue, hits, next, waiting, pixels: _, cover, occluders, sights } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
@@ -116,8 +120,14 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
         }
     }
+    if scene.is_clear() {
+        cover_hits(hits, rays_of::<S, E>((tile.width, tile.height)), Lanes::<S, E>::LEN, cover);
+    }
     scratch.follow::<S, N>(simd, scene, tile.bounces, None);
     let hits = &scratch.hits;
+    if scene.is_clear() {
+        return write_lit::<S, E>(tile, &hits.color, &scratch.cover, band);
+    }
     match band.tone {
         Tone::Plain => write_pixels::<S, E>(simd, tile, &hits.color, band),
         Tone::Srgb if parts::BUILT.srgb => write_encoded::<S, E>(tile, &hits.color, band),
@@ -138,7 +148,7 @@ impl<E: Real> Scratch<'_, E> {
         if scene.has_glass() {
             return follow_through_glass::<S, E, N>(simd, scene, soft, self);
         }
-        let Self { queue, hits, next, waiting, pixels, occluders, sights: _ } = self;
+        let Self { queue, hits, next, waiting, pixels, occluders, cover: _, sights: _ } = self;
         if !BUILT.mirrors || next.count == 0 {
             return;
         }
@@ -178,7 +188,7 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
     soft: Option<SoftLight<E>>,
     scratch: &mut Scratch<E>,
 ) {
-    let Scratch { queue, hits, waiting, pixels, occluders, .. } = scratch;
+    let Scratch { queue, hits, waiting, pixels, cover, occluders, .. } = scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     core::mem::swap(&mut hits.color, pixels);
     while waiting.take(queue) {
@@ -189,12 +199,18 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
         });
-        let waiting = &mut *waiting;
-        let met = HitBatch { kinds, bodies, background, queue, count, next: None, waiting, soft };
+        let met =
+            HitBatch { kinds, bodies, background, queue, count, next: None, waiting: &mut *waiting, soft };
         shade_more::<S, E, N, false>(simd, scene, met, hits, occluders);
+        if scene.is_clear() {
+            let_through(waiting, queue, hits, Lanes::<S, E>::LEN);
+        }
         waiting.add(queue, hits);
     }
     waiting.sum_up(pixels);
+    if scene.is_clear() {
+        waiting.uncover(cover, PIXELS);
+    }
     core::mem::swap(&mut hits.color, pixels);
 }
 

@@ -28,6 +28,8 @@ pub(crate) struct Glass<E> {
 pub(crate) struct Pane<E> {
     /// The transmitted share, per channel.
     pub(crate) color: [E; 3],
+    /// The mean of the channels, clamped to 0..=1: the share of what is behind that stays clear.
+    clearness: E,
     /// The index of refraction of the inside divided by that of the outside.
     ior: E,
     /// Whether it has no inside, so that rays go straight on.
@@ -92,9 +94,16 @@ impl<E: Real> Pane<E> {
         };
         Some(Self {
             color: glass.color().to_array().map(E::narrow),
+            clearness: E::narrow((glass.color().element_sum() / 3.0).clamp(0.0, 1.0)),
             ior: E::narrow(glass.ior()),
             is_flat: !is_filled && !reference::has_inside(shape),
         })
+    }
+
+    /// Returns the share of what is behind that stays clear where nothing is reflected.
+    #[inline(always)]
+    pub(crate) fn clearness(&self) -> E {
+        self.clearness
     }
 
     /// Refracts rays by Snell's law, and splits them by Fresnel's equations for unpolarised light, as the reference

@@ -13,14 +13,15 @@ use core::ops::Range;
 use std::borrow::Cow;
 
 use fearless_simd::{Level, Simd};
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
 use rayfold_scene::{Scene, Tone};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
 use self::scouts::Scouts;
-use self::tile::{Pass, SampledTile, Workspace};
+use self::tile::{Drawn, Pass, SampledTile, Workspace};
 use super::shapes::Shape;
+use crate::cover::{self, Lit};
 use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::build::features::{self, Kernel};
@@ -31,7 +32,8 @@ use crate::fast::placement::window::{Grid, Window};
 use crate::fast::rays::view::View;
 use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::soft_light::Extents;
-use crate::parallel::{CHANNELS, image, whole_bands};
+use crate::parallel::{CHANNELS, image, values, whole_bands};
+use crate::parts;
 use crate::sampling::film::{self, Band, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
@@ -102,23 +104,57 @@ impl<'a, E: Real> Sampled<'a, E> {
     }
 
     /// Draws all passes; `each` sees the picture so far after each but the last.
-    pub(super) fn draw_progressively(&self, each: &mut dyn FnMut(RgbImage)) -> Result<RgbImage, RenderError> {
+    pub(super) fn draw_progressively(
+        &self,
+        each: &mut dyn FnMut(DynamicImage),
+    ) -> Result<DynamicImage, RenderError> {
         let rows = 0..self.scene.screen.height();
+        let size = (self.scene.screen.width(), self.scene.screen.height());
+        let picture = |film: &Film| {
+            Ok(match (film.has_cover(), self.options.matte) {
+                (false, _) => DynamicImage::ImageRgb8(self.develop(film, 0, rows.clone())?),
+                (true, matte) => {
+                    let lit = self.develop_lit(film, 0, rows.clone())?;
+                    match matte {
+                        None => DynamicImage::ImageRgba8(cover::straight(size, self.scene.tone, &lit)),
+                        Some(matte) => {
+                            DynamicImage::ImageRgb8(cover::over(size, self.scene.tone, &lit, matte))
+                        }
+                    }
+                }
+            })
+        };
         let film = self.expose(rows.clone(), |film| {
-            each(self.develop(film, 0, rows.clone())?);
+            each(picture(film)?);
             Ok(())
         })?;
-        self.develop(&film, 0, rows)
+        picture(&film)
     }
 
     /// Draws rows of the image, which show what they show in the whole one if as many beside them as [`Self::margin`] says are
     /// drawn with them.
     pub(super) fn draw_rows(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
-        let height = self.scene.screen.height();
-        let drawn = rows.start.saturating_sub(margin)..rows.end.saturating_add(margin).min(height);
-        let drawn = whole_bands(&drawn, self.side.1, height);
+        let drawn = self.drawn_with(&rows, margin);
         let film = self.expose(drawn.clone(), |_| Ok(()))?;
         self.develop(&film, drawn.start, rows)
+    }
+
+    /// The same of a scene without background.
+    pub(super) fn lit_rows(&self, rows: Range<u32>, margin: u32) -> Result<Vec<Lit>, RenderError> {
+        let drawn = self.drawn_with(&rows, margin);
+        let film = self.expose(drawn.clone(), |_| Ok(()))?;
+        self.develop_lit(&film, drawn.start, rows)
+    }
+
+    /// The whole rows of tiles with rows of the image and so many beside them.
+    fn drawn_with(&self, rows: &Range<u32>, margin: u32) -> Range<u32> {
+        let height = self.scene.screen.height();
+        let drawn = rows.start.saturating_sub(margin)..rows.end.saturating_add(margin).min(height);
+        whole_bands(&drawn, self.side.1, height)
+    }
+
+    pub(super) fn options(&self) -> &RenderOptions<'a> {
+        &self.options
     }
 
     /// In the middle of its exposure.
@@ -163,7 +199,8 @@ impl<'a, E: Real> Sampled<'a, E> {
         let scene = &self.scene;
         let size = (scene.screen.width(), rows.end - rows.start);
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
-        Film::new(size, self.side, scene.samples, scene.tone, PASS).ok_or_else(too_large)
+        let has_cover = parts::BUILT.covers && scene.background.is_none();
+        Film::new(size, self.side, scene.samples, scene.tone, PASS, has_cover).ok_or_else(too_large)
     }
 
     /// The first samples of the pixels of some rows, which are whole rows of tiles.
@@ -224,6 +261,29 @@ impl<'a, E: Real> Sampled<'a, E> {
             });
         }
         Ok(light)
+    }
+
+    /// Light and cover of rows of the image, from a film with so many rows above it.
+    fn develop_lit(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<Vec<Lit>, RenderError> {
+        let width = self.scene.screen.width();
+        let first = (rows.start - above) as usize;
+        let mut lit = values::<Lit>((width, rows.end - rows.start), 1)?;
+        lit.par_chunks_exact_mut(width as usize).enumerate().for_each(|(row, lit)| {
+            let mut pixels = lit.iter_mut();
+            film.each_of_row(first + row, |color| {
+                if let Some(pixel) = pixels.next() {
+                    let [red, green, blue] = color.unit().to_array().map(|channel| channel as f32);
+                    *pixel = [red, green, blue, 1.0];
+                }
+            });
+            let mut pixels = lit.iter_mut();
+            film.each_cover_of_row(first + row, |cover| {
+                if let Some(pixel) = pixels.next() {
+                    pixel[3] = cover.unit().x as f32;
+                }
+            });
+        });
+        Ok(lit)
     }
 
     /// Levels of rows of the image, from a film with so many rows above it.
@@ -321,7 +381,13 @@ impl<E: Real> Job<'_, E> {
                         stride: width,
                     };
                     if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
-                        let drawn = (pixels, band.first.as_mut(), &mut band.unsettled);
+                        let cover = band.cover.as_mut().map(|cover| cover.of_tile(column));
+                        let drawn = Drawn {
+                            pixels,
+                            first: band.first.as_mut(),
+                            cover,
+                            unsettled: &mut band.unsettled,
+                        };
                         tile::draw::<S, E, N>(simd, &pass, &tile, drawn, workspace);
                     }
                 }

@@ -10,6 +10,7 @@ use super::Moment;
 use crate::fast::acceleration::candidates::Candidates;
 use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
 use crate::fast::build::features::{BUILT, Kernel, Variant, fitted};
+use crate::fast::film::cover::cover_hits;
 use crate::fast::film::tile::{HitBatch, Scratch, shade};
 use crate::fast::film::trace::trace_queue;
 use crate::fast::placement::lens::Aperture;
@@ -18,7 +19,7 @@ use crate::fast::rays::pixels::Rays;
 use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
 use crate::parts;
-use crate::sampling::film::{BitRows, FirstRows, PassTargets, Pixel, quantised};
+use crate::sampling::film::{BitRows, CoverTile, FirstRows, PassTargets, Pixel, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
 
@@ -102,8 +103,17 @@ impl<'a, E: Real> Workspace<'a, E> {
     }
 }
 
-/// What has been summed up of a tile, the first samples of its row of tiles, and who needs more there.
-type Drawn<'a, 'b> = (&'a mut Vec<Pixel>, Option<&'a mut FirstRows<'b>>, &'a mut BitRows<'b>);
+/// What has been drawn of a tile.
+pub(super) struct Drawn<'a, 'b> {
+    /// The sums of its pixels.
+    pub(super) pixels: &'a mut Vec<Pixel>,
+    /// The first samples of its row of tiles.
+    pub(super) first: Option<&'a mut FirstRows<'b>>,
+    /// The sums and the first samples of the cover, in scenes without background.
+    pub(super) cover: Option<CoverTile<'a, 'b>>,
+    /// Who needs more samples in its row of tiles.
+    pub(super) unsettled: &'a mut BitRows<'b>,
+}
 
 /// Draws the samples that a tile's pixels lack.
 #[inline(always)]
@@ -111,18 +121,21 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    (pixels, mut first, unsettled): Drawn,
+    Drawn { pixels, mut first, mut cover, unsettled }: Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
     items.clear();
     let still = if let [moment] = pass.moments { Some(moment) } else { None };
     let nothing = still.filter(|moment| moment.shows_nothing(tile));
-    let nothing = nothing.map(|moment| moment.prepared.background.map(|channel| quantised(channel.widen())));
+    let nothing = nothing.map(|moment| moment.prepared.backdrop().map(|channel| quantised(channel.widen())));
     if pass.wanted.is_first_look {
         match (nothing, &mut first) {
             (Some(color), Some(first)) => {
                 tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), color, NOTHING));
+                if let Some(CoverTile { first: Some(first), .. }) = &mut cover {
+                    tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), [0; CHANNELS], NOTHING));
+                }
             }
             _ => tile.each_pixel(|pixel| items.push(Item { moment: 0, sample: 0, pixel })),
         }
@@ -134,6 +147,16 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 pixel.add_equal(first.color(tile.in_rows(at)), 1);
             }
             let goal = pass.wanted.goal(pixel.count());
+            if let Some(cover) = &mut cover {
+                cover.begin(tile.side.0 * tile.side.1);
+                let covered = &mut cover.pixels[tile.in_tile(at)];
+                if let (0, Some(first)) = (covered.count(), &cover.first) {
+                    covered.add_equal(first.color(tile.in_rows(at)), 1);
+                }
+                if nothing.is_some() {
+                    covered.add_equal([0; CHANNELS], goal - covered.count());
+                }
+            }
             match nothing {
                 Some(color) => pixel.add_equal(color, goal - pixel.count()),
                 None => {
@@ -155,13 +178,20 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 }
                 Some(_) | None => add_up::<S, E>(simd, tile, batch, workspace, pixels),
             }
+            if let Some(cover) = &mut cover {
+                cover_batch(pass, tile, batch, workspace, cover);
+            }
         }
     }
     workspace.items = items;
     if first.is_some() && !pass.wanted.is_first_look {
         tile.each_wanted_pixel(pass.wanted, |at| {
             let (column, row) = (tile.left + at.0 as usize, at.1 as usize);
-            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)], (column, tile.top + row));
+            let place = (column, tile.top + row);
+            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)], place)
+                || cover
+                    .as_ref()
+                    .is_some_and(|cover| pass.wanted.is_unsettled(&cover.pixels[tile.in_tile(at)], place));
             unsettled.set(column, row, is_unsettled);
         });
     }
@@ -308,7 +338,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         .filter(|_| parts::BUILT.extents)
         .map(|extents| SoftLight { extents, points: lights });
     aim::<S, E>(simd, moment, &mut scratch.queue);
-    let Scratch { queue, hits, next, waiting, occluders, sights, .. } = &mut *scratch;
+    let Scratch { queue, hits, next, waiting, occluders, sights, cover, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     let candidates = match &scene.sights {
         Some(all) if BUILT.tree && all.gather(tile.place.0, tile.place.1, sights) => {
@@ -322,7 +352,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     if scene.has_glass() {
         waiting.begin(pass.bounces);
     }
-    let (kinds, background) = (candidates.kinds, scene.background);
+    let (kinds, background) = (candidates.kinds, scene.backdrop());
     let bodies = moment.bodies_in(tile);
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
@@ -341,6 +371,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     }
     if pass.wanted.is_first_look {
         note_objects(hits, Lanes::<S, E>::LEN, objects);
+    }
+    if scene.is_clear() {
+        cover_hits(hits, count, Lanes::<S, E>::LEN, cover);
     }
     scratch.follow::<S, N>(simd, scene, pass.bounces, soft);
 }
@@ -375,6 +408,26 @@ fn put_first<S: Simd, E: Real>(
             }
         },
     );
+}
+
+/// Notes or adds the cover of a batch.
+#[inline(never)]
+fn cover_batch<E: Real>(
+    pass: &Pass<E>,
+    tile: &SampledTile,
+    batch: &[Item],
+    workspace: &Workspace<E>,
+    cover: &mut CoverTile,
+) {
+    for (k, item) in batch.iter().enumerate() {
+        let level = [quantised(workspace.scratch.cover.0[k].widen()); CHANNELS];
+        match &mut cover.first {
+            Some(first) if pass.wanted.is_first_look => {
+                first.put(tile.in_rows(item.pixel), level, workspace.objects[k]);
+            }
+            Some(_) | None => cover.pixels[tile.in_tile(item.pixel)].add_equal(level, 1),
+        }
+    }
 }
 
 /// Adds the colours of a batch to its pixels.

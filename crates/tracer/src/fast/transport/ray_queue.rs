@@ -27,7 +27,7 @@ const MOST: usize = 2 * FULL;
 const ONE: f64 = (1u64 << 40) as f64;
 
 /// The number of values per queued ray: its origin, its direction, its weight in the pixel's colour, its pixel, and
-/// whether it has met glass.
+/// its mark.
 const NUMBERS: usize = 11;
 
 /// A packet of spawned rays.
@@ -42,9 +42,9 @@ pub(crate) struct SpawnedRays<S: Simd, E: Real> {
 
 impl<S: Simd, E: Real> SpawnedRays<S, E> {
     #[inline(always)]
-    fn numbers(self, pixel: Lanes<S, E>, has_met_glass: Lanes<S, E>) -> [Lanes<S, E>; NUMBERS] {
+    fn numbers(self, pixel: Lanes<S, E>, mark: Lanes<S, E>) -> [Lanes<S, E>; NUMBERS] {
         let [o, d, w] = [self.origin, self.direction, self.weight];
-        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pixel, has_met_glass]
+        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pixel, mark]
     }
 }
 
@@ -114,8 +114,11 @@ pub(crate) struct RayQueues<'a, E> {
     depth: u32,
     /// The largest number of bounces.
     most: u32,
-    /// 1 for the rays of the current batch that have met glass, 0 for the others.
-    have_met_glass: Column<E>,
+    /// For each ray of the current batch, 0 if it has not met glass. In scenes without background, the share of the pixel
+    /// that stays clear if the ray reaches nothing, if it has come through glass alone. 1 or -1 for the others.
+    marks: Column<E>,
+    /// The clear share of each pixel, in scenes without background.
+    clear: Vec<i128>,
 }
 
 impl<'a, E: Real> RayQueues<'a, E> {
@@ -126,7 +129,8 @@ impl<'a, E: Real> RayQueues<'a, E> {
             sums: [vec![], vec![], vec![]],
             depth: 0,
             most: 0,
-            have_met_glass: Column::new(),
+            marks: Column::new(),
+            clear: vec![],
         }
     }
 
@@ -134,11 +138,11 @@ impl<'a, E: Real> RayQueues<'a, E> {
     pub(crate) fn begin(&mut self, most: u32) {
         self.depth = 0;
         self.most = most;
-        self.have_met_glass.0.fill(E::narrow(0.0));
+        self.marks.0.fill(E::narrow(0.0));
         for line in self.bounces.as_flattened_mut() {
             (line.first, line.end) = (0, 0);
         }
-        for sums in &mut self.sums {
+        for sums in self.sums.iter_mut().chain([&mut self.clear]) {
             sums.clear();
             sums.resize(ROOM, 0);
         }
@@ -152,26 +156,37 @@ impl<'a, E: Real> RayQueues<'a, E> {
     /// Returns the rays of the packet at an index of the batch that have met glass.
     #[inline(always)]
     pub(crate) fn have_met_glass<S: Simd>(&self, simd: S, at: usize) -> Mask<S, E> {
-        let met = Lanes::<S, E>::from_slice(simd, &self.have_met_glass.0[at..at + Lanes::<S, E>::LEN]);
-        met.simd_ne(constant::<S, E>(simd, 0.0))
+        self.marks_of(simd, at).simd_ne(constant::<S, E>(simd, 0.0))
     }
 
-    /// Adds the reflected and the refracted rays of a packet.
+    /// Returns the share of their pixels that stays clear if the rays of the packet at an index of the batch reach nothing.
+    #[inline(always)]
+    pub(crate) fn clear<S: Simd>(&self, simd: S, at: usize) -> Lanes<S, E> {
+        if self.depth == 0 {
+            return constant::<S, E>(simd, 1.0);
+        }
+        self.marks_of(simd, at).max(constant::<S, E>(simd, 0.0))
+    }
+
+    #[inline(always)]
+    fn marks_of<S: Simd>(&self, simd: S, at: usize) -> Lanes<S, E> {
+        Lanes::<S, E>::from_slice(simd, &self.marks.0[at..at + Lanes::<S, E>::LEN])
+    }
+
+    /// Adds the reflected and the refracted rays of a packet, with their marks.
     #[inline(always)]
     pub(crate) fn push<S: Simd>(
         &mut self,
-        simd: S,
         pixel: Lanes<S, E>,
-        have_met_glass: Mask<S, E>,
+        marks: [Lanes<S, E>; 2],
         rays: [SpawnedRays<S, E>; 2],
     ) {
         let next = self.depth as usize;
         if self.bounces.len() == next {
             self.add_bounce();
         }
-        let glass = have_met_glass.select(constant::<S, E>(simd, 1.0), constant::<S, E>(simd, 0.0));
-        for (line, ray) in self.bounces[next].iter_mut().zip(rays) {
-            line.push::<S>(ray.numbers(pixel, glass), ray.lanes);
+        for ((line, ray), mark) in self.bounces[next].iter_mut().zip(rays).zip(marks) {
+            line.push::<S>(ray.numbers(pixel, mark), ray.lanes);
         }
     }
 
@@ -196,9 +211,25 @@ impl<'a, E: Real> RayQueues<'a, E> {
         let [ox, oy, oz] = &mut queue.origin;
         let [dx, dy, dz] = &mut queue.direction;
         let [wx, wy, wz] = &mut queue.weight;
-        let glass = &mut self.have_met_glass;
-        rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, &mut queue.pixel, glass]);
+        rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, &mut queue.pixel, &mut self.marks]);
         true
+    }
+
+    /// Counts a ray of the batch that has hit nothing as clear in its pixel if it has come through glass alone. Returns whether
+    /// it has.
+    pub(crate) fn lets_through(&mut self, ray: usize, pixel: usize) -> bool {
+        let clear = self.marks.0[ray].widen();
+        if clear > 0.0 {
+            self.clear[pixel] += i128::from((clear * ONE) as i64);
+        }
+        clear > 0.0
+    }
+
+    /// Takes the clear shares from the covers of the first `count` pixels.
+    pub(crate) fn uncover(&self, cover: &mut Column<E>, count: usize) {
+        for (cover, clear) in cover.0[..count].iter_mut().zip(&self.clear) {
+            *cover = E::narrow(cover.widen() - *clear as f64 / ONE);
+        }
     }
 
     /// Adds the colours of the rays in the batch to the sums.
@@ -244,7 +275,7 @@ mod tests {
             SpawnedRays { origin: one, direction: one, weight: one, lanes }
         });
         let pixel = constant::<S, f64>(simd, pixel as f64);
-        waiting.push(simd, pixel, pixel.simd_eq(pixel), rays);
+        waiting.push(pixel, [constant::<S, f64>(simd, 1.0); 2], rays);
     }
 
     /// Returns whether the first ray of the batch has met glass.

@@ -31,6 +31,7 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
             let zero = Vec3::zero(simd);
             let one = constant::<S, E>(simd, 1.0);
             let is_foggy = scene.fog().is_some();
+            let has_covers = scene.is_clear();
             for &(at, bits) in &hits.mirrors {
                 let met = HitPacket::<S, E>::new(simd, at, &hits.distance, &hits.order);
                 let origin = if EYE { zero } else { Vec3::load(simd, &queue.origin, at) };
@@ -59,6 +60,7 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                 let mut mirror = if PAINTED { Vec3::load(simd, &hits.mirror, at) } else { zero };
                 let (mut through, mut bent) = (zero, zero);
                 let mut of_glass = no_lane::<S, E>(simd);
+                let mut clear = zero.x;
                 let mut rest = bits;
                 while rest != 0 {
                     let lane = rest.trailing_zeros();
@@ -74,6 +76,10 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                     mirror = Vec3::select(same, weight.scale_add(mirrored, mirror), mirror);
                     through = Vec3::select(same, share, through);
                     bent = Vec3::select(same, direction, bent);
+                    if has_covers {
+                        let share = (one - mirrored) * pane.clearness();
+                        clear = same.select(share * waiting.clear(simd, at), clear);
+                    }
                 }
                 let mut sent = Mask::<S, E>::from_bitmask(simd, bits);
                 let pixel = if EYE {
@@ -97,7 +103,13 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                     weight: through,
                     lanes: sent & of_glass & glass.followed(simd, through, have_met_glass),
                 };
-                waiting.push(simd, pixel, have_met_glass, [mirrored, refracted]);
+                let met = have_met_glass.select(one, zero.x);
+                let marks = if has_covers {
+                    [zero.x - met, clear.simd_gt(zero.x).select(clear, zero.x - one)]
+                } else {
+                    [met; 2]
+                };
+                waiting.push(pixel, marks, [mirrored, refracted]);
             }
         },
     );

@@ -48,7 +48,7 @@ impl First {
     }
 
     /// Which pixels of some rows see another object than one beside them, or a channel that differs from it by more than
-    /// `limit`, in parts of [`ONE`] as they are shown: a bit each, in words.
+    /// `limit`, in parts of [`ONE`] as they are shown: a bit each, set in words.
     pub(super) fn contrasts(
         &self,
         width: usize,
@@ -88,7 +88,7 @@ impl First {
         let words = into.chunks_exact_mut(width.div_ceil(WORD));
         for (words, flags) in words.zip(flags[inner..].chunks_exact(width)) {
             for (word, flags) in words.iter_mut().zip(flags.chunks(WORD)) {
-                *word = packed(flags);
+                *word |= packed(flags);
             }
         }
     }

@@ -8,6 +8,7 @@
 
 mod bits;
 mod chain;
+mod cover;
 mod density;
 mod first;
 mod floors;
@@ -19,6 +20,8 @@ use rayfold_scene::{Samples, Tone};
 
 pub(crate) use self::bits::BitRows;
 use self::chain::SampleSchedule;
+pub(crate) use self::cover::CoverTile;
+use self::cover::{CoverRows, Layer};
 pub(crate) use self::first::{First, FirstRows};
 pub(crate) use self::floors::{Difference, Floors};
 use self::pixel::ONE;
@@ -41,6 +44,8 @@ pub(crate) struct Film {
     first: Option<First>,
     /// Tile by tile, row by row in each; a tile whose pixels have got but one sample has none, if there is a [`First`].
     tiles: Vec<Vec<Pixel>>,
+    /// The cover, in scenes without background.
+    cover: Option<Layer>,
     plan: Plan,
 }
 
@@ -50,6 +55,8 @@ pub(crate) struct Band<'a> {
     pub(crate) tiles: &'a mut [Vec<Pixel>],
     /// Row by row.
     pub(crate) first: Option<FirstRows<'a>>,
+    /// The cover, in scenes without background.
+    pub(crate) cover: Option<CoverRows<'a>>,
     /// Who needs more samples; told by whoever adds some.
     pub(crate) unsettled: BitRows<'a>,
 }
@@ -62,6 +69,7 @@ impl Film {
         samples: Samples,
         tone: Tone,
         step: u32,
+        has_cover: bool,
     ) -> Option<Self> {
         let size = (size.0 as usize, size.1 as usize);
         // No tile is larger than the image.
@@ -76,7 +84,15 @@ impl Film {
             None
         };
         let plan = Plan::new(size, SampleSchedule::new(samples, tone, step))?;
-        Some(Self { size, side, first, tiles, plan })
+        let cover = if has_cover {
+            Some(Layer {
+                first: first.as_ref().map_or(Some(None), |_| First::new(pixels).map(Some))?,
+                tiles: tiles.clone(),
+            })
+        } else {
+            None
+        };
+        Some(Self { size, side, first, tiles, cover, plan })
     }
 
     /// Gives pixels some number of samples in any case.
@@ -92,7 +108,8 @@ impl Film {
     /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
     /// between which it is.
     pub(crate) fn plan(&mut self) -> Option<(u32, u32)> {
-        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref()))
+        let cover = self.cover.as_ref().and_then(|cover| cover.first.as_ref());
+        self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), cover))
     }
 
     /// Returns the work of the pass that [`Self::plan`] planned, and of those after it.
@@ -103,15 +120,28 @@ impl Film {
     /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
     pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, PassTargets<'_>) {
         let (wanted, unsettled) = self.plan.split(self.side.1);
-        let tiles = self.tiles.chunks_mut(self.size.0.div_ceil(self.side.0)).zip(unsettled);
-        let bands = match &mut self.first {
-            None => tiles.map(|(tiles, unsettled)| Band { tiles, first: None, unsettled }).collect(),
+        let columns = self.size.0.div_ceil(self.side.0);
+        let tiles = self.tiles.chunks_mut(columns).zip(unsettled);
+        let mut bands: Vec<Band<'_>> = match &mut self.first {
+            None => {
+                tiles.map(|(tiles, unsettled)| Band { tiles, first: None, cover: None, unsettled }).collect()
+            }
             Some(first) => {
                 let first = first.bands(self.size.0 * self.side.1).map(Some);
-                tiles.zip(first).map(|((tiles, unsettled), first)| Band { tiles, first, unsettled }).collect()
+                let band = |((tiles, unsettled), first)| Band { tiles, first, cover: None, unsettled };
+                tiles.zip(first).map(band).collect()
             }
         };
+        if let Some(cover) = &mut self.cover {
+            let rows = cover.rows(columns, self.size.0 * self.side.1);
+            bands.iter_mut().zip(rows).for_each(|(band, rows)| band.cover = Some(rows));
+        }
         (bands, wanted)
+    }
+
+    /// Whether it has a cover.
+    pub(crate) fn has_cover(&self) -> bool {
+        self.cover.is_some()
     }
 
     /// Columns and rows of a tile.
@@ -121,13 +151,29 @@ impl Film {
 
     /// The colours of a row so far, from the left.
     #[inline(always)]
-    pub(crate) fn each_of_row(&self, row: usize, mut each: impl FnMut(Color)) {
+    pub(crate) fn each_of_row(&self, row: usize, each: impl FnMut(Color)) {
+        self.each_in_row((self.first.as_ref(), &self.tiles), row, each);
+    }
+
+    /// The covers of a row so far, from the left, in each channel of a colour; none where all is covered.
+    pub(crate) fn each_cover_of_row(&self, row: usize, each: impl FnMut(Color)) {
+        if let Some(Layer { first, tiles }) = &self.cover {
+            self.each_in_row((first.as_ref(), tiles), row, each);
+        }
+    }
+
+    #[inline(always)]
+    fn each_in_row(
+        &self,
+        (first, tiles): (Option<&First>, &[Vec<Pixel>]),
+        row: usize,
+        mut each: impl FnMut(Color),
+    ) {
         let (columns, (across, down)) = (self.size.0, self.side);
         let first_tile = row / down * columns.div_ceil(across);
-        for (left, tile) in (0..columns).step_by(across).zip(&self.tiles[first_tile..]) {
+        for (left, tile) in (0..columns).step_by(across).zip(&tiles[first_tile..]) {
             let right = (left + across).min(columns);
-            let samples =
-                self.first.as_ref().map(|first| first.run(row * columns + left..row * columns + right));
+            let samples = first.map(|first| first.run(row * columns + left..row * columns + right));
             let sums = if tile.is_empty() { &[] } else { &tile[row % down * across..][..right - left] };
             match samples {
                 None => sums.iter().for_each(|pixel| each(Color::Mean(pixel.mean()))),
@@ -198,7 +244,7 @@ mod tests {
     use crate::reference::encoded;
 
     fn film(most: u32, error: f64, step: u32) -> Film {
-        Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step).unwrap()
+        Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step, false).unwrap()
     }
 
     fn counts(film: &Film) -> Vec<u32> {
@@ -286,7 +332,7 @@ mod tests {
     #[test]
     fn a_sliver_is_found_along_its_length() {
         let samples = Samples::new(64, 1.0).unwrap();
-        let mut film = Film::new((64, 9), (16, 16), samples, Tone::Plain, 1024).unwrap();
+        let mut film = Film::new((64, 9), (16, 16), samples, Tone::Plain, 1024, false).unwrap();
         let mut dice = fastrand::Rng::with_seed(3);
         let mut seen = |place: usize, _| f64::from(u8::from(place / 64 == 4 && dice.f64() < 0.15));
         expose(&mut film, &mut seen);
@@ -301,7 +347,7 @@ mod tests {
     fn pixels_that_are_raised_get_what_they_are_raised_to() {
         for (floor, given) in [(16, 16), (100, 64), (1, 1)] {
             let mut film =
-                Film::new((70, 9), (16, 16), Samples::new(64, 1.0).unwrap(), Tone::Plain, 10).unwrap();
+                Film::new((70, 9), (16, 16), Samples::new(64, 1.0).unwrap(), Tone::Plain, 10, false).unwrap();
             let mut floors = Floors::new((70, 9), &[floor]).unwrap();
             floors.sets[0].1.put(66, 4);
             film.raise(floors);
@@ -342,7 +388,7 @@ mod tests {
             let side = (dice.u32(1..40), dice.u32(1..20));
             let (most, tone) = (dice.u32(2..70), [Tone::Plain, Tone::Srgb][dice.usize(..2)]);
             let samples = Samples::new(most, 1.0).unwrap();
-            let mut film = Film::new(size, side, samples, tone, 256).unwrap();
+            let mut film = Film::new(size, side, samples, tone, 256, false).unwrap();
             let width = size.0 as usize;
             let share = [5, 120, 230][dice.usize(..3)];
             let lively: Vec<f64> =

@@ -188,8 +188,9 @@ impl Plan {
         (end > 0).then_some((first, end))
     }
 
-    /// Plans what comes after all have what was planned for them; `None` once they need no more.
-    pub(super) fn next(&mut self, first: Option<&First>) -> Option<(u32, u32)> {
+    /// Plans what comes after all have what was planned for them; `None` once they need no more. `cover` has the first
+    /// samples of the cover, where there is one.
+    pub(super) fn next(&mut self, first: Option<&First>, cover: Option<&First>) -> Option<(u32, u32)> {
         self.done = 0;
         if self.stage == Stage::Begins {
             self.stage = Stage::First;
@@ -199,6 +200,9 @@ impl Plan {
         let first = first?;
         if self.stage == Stage::First {
             self.judge_first(first);
+            if let Some(cover) = cover {
+                self.judge_first(cover);
+            }
         } else {
             self.count()?;
             if self.density.is_none() {
@@ -214,7 +218,7 @@ impl Plan {
         self.want()
     }
 
-    /// Finds out who differs from a neighbour.
+    /// Finds out who differs from a neighbour, beside those who are known to.
     fn judge_first(&mut self, first: &First) {
         let tone = self.chain.tone();
         let limit = (CONTRAST * self.chain.error() / 255.0 * ONE).min(ONE) as u16;
