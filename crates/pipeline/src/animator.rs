@@ -1,4 +1,4 @@
-//! What makes a GIF of frames: the traits that whoever runs the assembler implements. Knows no bucket.
+//! The traits of a GIF encoder, which the program that runs the assembler implements. The module knows no bucket.
 
 use std::future::Future;
 
@@ -7,7 +7,7 @@ use rayfold_scene::AnimationSettings;
 
 use crate::manifest::Reason;
 
-/// What encodes. The assemble function brings a GIF encoder, the simulation something smaller.
+/// Makes encoders. The assemble function brings a GIF encoder, the simulation a smaller one.
 pub trait Animator: Send + Sync {
     /// An animation being encoded.
     type Encoding: Encoding;
@@ -26,7 +26,7 @@ pub trait Encoding: Send {
     ///
     /// # Errors
     ///
-    /// What is wrong with this frame, or with all of them together.
+    /// The problem of this frame, or of all frames together.
     fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
 
     /// Gives the rest of the file.
@@ -47,7 +47,7 @@ pub trait Encoding: Send {
 /// Why a frame cannot be added to an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unfit {
-    /// The frame is none: someone has put something else in its place. Drawn again it may be one.
+    /// The body is no frame: another writer has put something else in its place. Drawn again it may be one.
     Corrupt(Reason),
     /// The frame does not go with the others; it would be the same next time.
     Unlike(Reason),

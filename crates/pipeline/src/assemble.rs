@@ -3,8 +3,8 @@
 //! Each round reads the manifest, the GIF's version and generation, and lists, in this order; then it does what is due:
 //! commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of a set
 //! that is done and settled, removes the GIF of a set that can have none. It ends only on a round that wrote nothing,
-//! so that no GIF from an older listing stays, and no set that became whole while it worked is left. Whoever waits or builds
-//! holds the animation's lease; another assembler that finds it taken leaves all to its holder.
+//! so that no GIF from an older listing stays, and no set that became whole while it worked is left. An assembler
+//! that waits or builds holds the animation's lease; another assembler that finds it taken leaves all to its holder.
 //!
 //! A GIF that does not fit the time of one invocation is left to the next one where it stands (`build`).
 
@@ -25,18 +25,18 @@ use crate::{Clock, Error, Result, Timestamp};
 
 pub use crate::build::{GENERATION, MAX_PIECES, frame_key, generation_of, is_current};
 
-/// What an invocation of the assembler did.
+/// The result of an invocation of the assembler.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assembled {
-    /// The animation.
+    /// The animation that the claim names.
     pub animation: Animation,
-    /// Where it stood in the last round.
+    /// The animation's status in the last round.
     pub status: Status,
     /// Its generation in the last round.
     pub generation: Generation,
     /// Rounds, the last of which wrote nothing.
     pub rounds: u32,
-    /// GIFs written.
+    /// The number of GIFs that were written.
     pub built: u32,
     /// Frames of the last GIF that was written.
     pub frames: u64,
@@ -44,7 +44,7 @@ pub struct Assembled {
     pub left_after: Option<u64>,
     /// Waiting for uploads to settle.
     pub waited: Duration,
-    /// Building GIFs.
+    /// The time spent on building GIFs.
     pub building: Duration,
 }
 
@@ -65,7 +65,7 @@ pub async fn assemble<S: Store, C: Clock, A: Animator>(
     }
 }
 
-/// What is to be done about the GIF of a set.
+/// The action that is due for the GIF of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Due {
     /// It is as it should be, or more is to come.
@@ -76,7 +76,7 @@ pub(crate) enum Due {
     NoGif,
 }
 
-/// What is to be done about the GIF of a set that the manifest's head stands for.
+/// Returns the action that is due for the GIF of the set that the manifest's head stands for.
 pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
     match head.status {
         Status::Done if !is_current(head, gif) => Due::Gif,
@@ -87,13 +87,13 @@ pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
     }
 }
 
-/// The version of this set's GIF, if nobody has written it down.
+/// Returns the version of this set's GIF, if the manifest does not record it yet.
 pub(crate) fn new_gif(head: &Head, gif: Option<&ObjectInfo>) -> Option<ETag> {
     let is_new = head.status == Status::Done && head.gif_version().is_none() && is_current(head, gif);
     gif.filter(|_| is_new).map(|gif| gif.etag.clone())
 }
 
-/// How a round ended.
+/// The end of a round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Next {
     /// Something was written or waited for: look again.
@@ -124,7 +124,7 @@ struct Quiet {
     waited: Duration,
 }
 
-/// What the rounds of an invocation have come to.
+/// The sums of all rounds of an invocation.
 struct Tally {
     began: Timestamp,
     quiet: Quiet,
@@ -139,8 +139,8 @@ struct Tally {
 }
 
 impl Quiet {
-    /// How long to wait until the last change is a quiet period old. The clock that dated it may run ahead of this one,
-    /// so a period that was slept through counts as well.
+    /// Returns the time until the last change is a quiet period old. The clock that dated the change may run ahead of
+    /// this one, so a period that was slept through counts as well.
     fn left(&mut self, period: Duration, changed: Timestamp, now: Timestamp) -> Duration {
         if self.since != Some(changed) {
             *self = Quiet { since: Some(changed), waited: Duration::ZERO };
@@ -213,7 +213,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Due::Gif => self.make_gif(animator, &observation, &known, gif, &mut tally).await?,
             };
             if next == Next::End && tally.lease.is_none() && observation.has_lease {
-                // An earlier attempt at the same event died with it, or nobody has taken it up.
+                // An earlier attempt at the same event died with it, or no attempt has resumed it.
                 tally.lease = self.reclaim_lease(animation).await?;
                 if tally.lease.is_some_and(|held| held.has_checkpoint) {
                     // The GIF may have been another one when it was handed over, since this round looked.
@@ -229,8 +229,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     if self.breaks(Mutation::AssemblerDoesNotLookAgain) {
                         return Ok(tally.of(&observed.head));
                     }
-                    // Whoever found the lease taken was woken for a manifest that was written before, and may have deleted
-                    // the GIF before, which was there when this round looked.
+                    // The assembler that found the lease taken was woken for a manifest that was written before, and
+                    // may have deleted the GIF before, which was there when this round looked.
                     let etag = |info: Option<ObjectInfo>| info.map(|info| info.etag);
                     let manifest = etag(self.head(&animation.manifest()).await?);
                     if manifest == Some(known.etag) && etag(self.head(&animation.gif()).await?) == seen {
@@ -248,8 +248,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Of an animation that is gone, manifest and all, nothing is to stay, and nothing is to be written. Whether there was
-    /// something.
+    /// Deletes what is left of an animation that is gone, manifest and all, and writes nothing. Returns
+    /// whether anything was left.
     async fn clear(
         &self,
         animation: &Animation,
@@ -268,7 +268,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(true)
     }
 
-    /// Gives the lease back, and with it the GIF that nobody will go on with.
+    /// Gives the lease back, and with it the GIF that no assembler will go on with.
     async fn give_up_lease(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         self.abandon_checkpoint(head, held).await?;
         self.release_lease(&head.animation).await

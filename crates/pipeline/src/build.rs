@@ -21,17 +21,17 @@ use crate::{Clock, Error, Result, Timestamp};
 /// The name of the GIF's metadata that holds its generation.
 pub const GENERATION: &str = "generation";
 
-/// The most invocations that may build a GIF, one after the other. 15 minutes each are 22 hours and a half: after a day the
-/// bucket's rules remove the unfinished upload, and all would begin anew.
+/// The most invocations that may build a GIF, one after the other. 15 minutes each are 22 hours and a half: after a
+/// day the bucket's rules remove the unfinished upload, and all would start over.
 pub const MAX_PIECES: u32 = 90;
 
-/// How a build ended.
+/// The end of a build.
 pub(crate) enum Built<'a> {
     /// The GIF is put, as this version.
     Put(ETag),
     /// It is left after so many frames, for the next invocation to go on with.
     Left(u64),
-    /// A frame is gone, or someone else's GIF came first: look again.
+    /// A frame is gone, or another assembler's GIF came first: look again.
     Stale,
     /// This frame cannot be read.
     Corrupt(&'a Frame, Reason),
@@ -39,7 +39,7 @@ pub(crate) enum Built<'a> {
     Refused(Reason),
 }
 
-/// How far the encoder came.
+/// The encoder's progress at its end.
 enum Encoded<'a> {
     /// It has taken all frames.
     All,
@@ -149,7 +149,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             };
         }
         let finished = upload.finish().await;
-        // Whatever came of it, nobody goes on with this upload.
+        // Whatever the result was, no assembler goes on with this upload.
         self.drop_checkpoint(head, held).await?;
         match finished {
             Ok(etag) => Ok(Built::Put(etag)),
@@ -216,9 +216,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// What it means that an invocation has come to its end with its first frame. A set of which no frame fits the function's
-/// time is refused, but only by an invocation that had most of its time for that; one that spent more `before`, waiting and
-/// building other sets, leaves it to its next attempt.
+/// Returns the reason to refuse a set with whose first frame an invocation has come to its end. A set of which no
+/// frame fits the function's time is refused, but only by an invocation that had most of its time for that. An
+/// invocation that spent more `before`, waiting and building other sets, leaves the set to its next attempt.
 fn out_of_time(head: &Head, before: Duration, building: Duration) -> Result<Reason> {
     if before > building {
         let what = format!("{} became whole too late to assemble it", head.animation);
@@ -243,8 +243,8 @@ pub fn generation_of(gif: Option<&ObjectInfo>) -> Option<&str> {
     gif?.metadata.get(GENERATION).map(String::as_str)
 }
 
-/// Whether a GIF is the one that was made of this set: of its generation, and not replaced by someone who copied the
-/// metadata.
+/// Returns whether a GIF was made of this set: it is of the set's generation, and no other GIF has replaced it with a
+/// copy of its metadata.
 pub fn is_current(head: &Head, gif: Option<&ObjectInfo>) -> bool {
     let is_built = |gif: &ObjectInfo| head.gif_version().is_none_or(|built| gif.etag == *built);
     generation_of(gif) == Some(head.generation.as_str()) && gif.is_some_and(is_built)
@@ -257,7 +257,7 @@ mod tests {
     use crate::reconcile::{Results, Scripts, reconcile};
 
     #[test]
-    fn only_whoever_had_most_of_its_time_for_a_set_refuses_it() {
+    fn only_an_assembler_that_had_most_of_its_time_for_a_set_refuses_it() {
         let animation = Animation::new("film").unwrap();
         let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
         let head = Head { total: 9, ..manifest.head };

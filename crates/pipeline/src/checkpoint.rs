@@ -1,8 +1,9 @@
-//! How far a GIF is that does not fit the time of one invocation, written down for the next one.
+//! The progress of a GIF that does not fit the time of one invocation, written down for the next one.
 //!
-//! Only what makes the same bytes is taken up: the same set of frames, to replace the same GIF, by the same version of the
-//! encoder. Whatever else is found, damage too, costs a build anew. That there is a checkpoint the lease says, so that who
-//! builds in one piece asks for none; one that no lease speaks of is litter, and the bucket's rules clear it away.
+//! A checkpoint is resumed only if it makes the same bytes: the same set of frames, to replace the same GIF, by the
+//! same version of the encoder. Any other one, also a damaged one, costs a build from the start. The lease says that
+//! there is a checkpoint, so an assembler that builds in one piece asks for none; one that no lease speaks of is
+//! litter, and the bucket's rules clear it away.
 //!
 //! The object: a line with the hash of the rest, a line of JSON, what is not sent yet of the GIF, and the encoder's state.
 
@@ -29,18 +30,17 @@ const HASH: usize = 64;
 pub(crate) struct Checkpoint {
     pub(crate) head: CheckpointHead,
     pub(crate) upload: UnfinishedUpload,
-    /// The encoder's state.
     pub(crate) encoding: Bytes,
 }
 
-/// What a checkpoint is of.
+/// The identity of the GIF of which a checkpoint is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CheckpointHead {
     /// The set of frames.
     pub(crate) generation: Generation,
     /// The GIF that it is to replace.
     pub(crate) replaces: Option<ETag>,
-    /// How many frames the encoder has taken.
+    /// The number of frames that the encoder has taken.
     pub(crate) frames: u64,
     /// In how many invocations.
     pub(crate) pieces: u32,
@@ -159,7 +159,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
-    /// Removes what is written down and aborts its upload: nobody will go on with it.
+    /// Removes the checkpoint and aborts its upload: no assembler will go on with it.
     pub(crate) async fn abandon_checkpoint(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         if !held.has_checkpoint {
             return Ok(());

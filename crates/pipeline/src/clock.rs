@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Milliseconds since 1970-01-01T00:00:00Z.
+/// A moment in milliseconds since 1970-01-01T00:00:00Z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Timestamp(pub u64);
 
 impl Timestamp {
-    /// How long before `self` that `earlier` lies; zero when it does not.
+    /// Returns the time from `earlier` to `self`; zero if `earlier` is later.
     pub fn since(self, earlier: Timestamp) -> Duration {
         Duration::from_millis(self.0.saturating_sub(earlier.0))
     }
@@ -55,7 +55,7 @@ impl Clock for SystemClock {
 pub struct Randomness(AtomicU64);
 
 impl Randomness {
-    /// The same seed gives the same draws.
+    /// Returns a source whose draws depend on the seed alone.
     pub fn seeded(seed: u64) -> Self {
         Randomness(AtomicU64::new(seed))
     }
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_told_apart_in_milliseconds() {
+    fn times_differ_by_milliseconds() {
         let (early, late) = (Timestamp(1_000), Timestamp(3_500));
         assert_eq!(late.since(early), Duration::from_millis(2_500));
         assert_eq!(early.since(late), Duration::ZERO);

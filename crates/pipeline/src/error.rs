@@ -1,4 +1,4 @@
-//! What can go wrong in the pipeline, sorted by what the caller may do about it.
+//! The errors of the pipeline, sorted by the action that the caller may take.
 
 use std::error::Error as StdError;
 
@@ -8,31 +8,24 @@ pub type Cause = Box<dyn StdError + Send + Sync + 'static>;
 /// The pipeline's errors. Each names the object's key where there is one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages show what the fields hold")]
 pub enum Error {
     /// There is no such object (404). A conditional put answers so when the object that it should replace is gone.
     #[error("{key} does not exist")]
-    NotFound {
-        /// The object's key.
-        key: String,
-    },
-    /// The condition of a put does not hold (412): someone was first, possibly oneself, when an answer was lost.
+    NotFound { key: String },
+    /// The condition of a put does not hold (412): another write was first, possibly one's own, when
+    /// an answer was lost.
     #[error("{key} is not as the write expected it")]
-    PreconditionFailed {
-        /// The object's key.
-        key: String,
-    },
+    PreconditionFailed { key: String },
     /// Another write to the same object is under way (409): nothing was written, try again.
     #[error("{key} is being written by someone else")]
-    Conflict {
-        /// The object's key.
-        key: String,
-    },
+    Conflict { key: String },
     /// The store asks for patience (503, 429): nothing was done.
     #[error("the store is busy: {key}")]
     Throttled {
         /// The object's key or the listing's prefix.
         key: String,
-        /// What the store said.
+        /// The error of the store.
         source: Cause,
     },
     /// The answer was lost (timeout, broken connection, 500): the request may or may not have taken effect.
@@ -40,7 +33,7 @@ pub enum Error {
     Ambiguous {
         /// The object's key or the listing's prefix.
         key: String,
-        /// What the client saw.
+        /// The error of the client.
         source: Cause,
     },
     /// The store refuses for good: permissions, a missing bucket, a malformed request.
@@ -48,7 +41,7 @@ pub enum Error {
     Refused {
         /// The object's key or the listing's prefix.
         key: String,
-        /// What the store said.
+        /// The error of the store.
         source: Cause,
     },
     /// The environment does not say in which region the bucket is; nothing was asked of the store.
@@ -59,35 +52,33 @@ pub enum Error {
     Key {
         /// The key as it came.
         key: String,
-        /// What is wrong with it.
+        /// The rule that the value breaks.
         problem: &'static str,
     },
     /// An object of the pipeline's own that cannot be read back.
     #[error("{key} cannot be read")]
     Malformed {
-        /// The object's key.
         key: String,
-        /// What the decoder says.
+        /// The error of the decoder.
         source: Cause,
     },
     /// A manifest that breaks its own rules was about to be written; it was not.
     #[error("the manifest of {animation} would break the rule {rule}")]
     Invariant {
-        /// The animation.
         animation: String,
-        /// The rule's name.
+        /// The name of the rule in [`crate::invariants`].
         rule: &'static str,
     },
     /// The work was stopped before the invocation's deadline.
     #[error("out of time: {what}")]
     OutOfTime {
-        /// What was being done.
+        /// The action that failed.
         what: String,
     },
 }
 
 impl Error {
-    /// Someone else's write was first: read again, then decide anew.
+    /// Returns whether another write was first: read again, then decide again.
     pub fn is_conflict(&self) -> bool {
         matches!(self, Error::PreconditionFailed { .. } | Error::Conflict { .. })
     }
@@ -97,7 +88,7 @@ impl Error {
         matches!(self, Error::NotFound { .. })
     }
 
-    /// The same request may succeed later.
+    /// Returns whether the same request may succeed later.
     pub fn is_retryable(&self) -> bool {
         matches!(self, Error::Conflict { .. } | Error::Throttled { .. } | Error::Ambiguous { .. })
     }
@@ -117,14 +108,14 @@ impl Error {
     }
 }
 
-/// What the pipeline's functions return.
+/// The result of the pipeline's functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What is there, or `None`.
+/// Returns the answer, or `None` if the object does not exist.
 ///
 /// # Errors
 ///
-/// All but [`Error::NotFound`].
+/// All errors but [`Error::NotFound`].
 pub fn found<T>(answer: Result<T>) -> Result<Option<T>> {
     match answer {
         Ok(value) => Ok(Some(value)),

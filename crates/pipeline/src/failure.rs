@@ -1,4 +1,5 @@
-//! What the platform has given up: records of its on-failure destination, which the assemble function receives.
+//! Events that the platform has given up: the records of its on-failure destination, which
+//! the assemble function receives.
 //!
 //! A frame that timed out, or whose function died, in each attempt at one version would do so again: it gets an error
 //! receipt that says so. Other failures (a busy store, events too old) may pass: the frame is woken once more, a
@@ -17,25 +18,25 @@ use crate::render::bands::Bands;
 use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result};
 
-/// One failed event.
+/// An event that failed in each of its attempts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     /// The key that the event was about.
     pub key: String,
     /// The version of the object that the event was about, if it says so.
     pub version: Option<ETag>,
-    /// How often the function was tried; 0 when it was never started.
+    /// The number of attempts; 0 if the function was never started.
     pub attempts: u64,
-    /// What ended the last attempt.
+    /// The end of the last attempt.
     pub end: End,
     /// The event's, in all attempts.
     pub request_id: String,
 }
 
-/// What ended an invocation.
+/// The reason for which an invocation ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum End {
-    /// The deadline.
+    /// The invocation was ended at its deadline.
     TimedOut,
     /// The process died, most likely for lack of memory.
     Died,
@@ -45,14 +46,14 @@ pub enum End {
     Error(String),
 }
 
-/// What became of a failed event.
+/// The result of handling a failed event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recorded {
     /// There is a result, or nothing to render any more.
     Resolved(Folded),
     /// The frame was woken once more.
     Woken {
-        /// Which attempt this is.
+        /// The number of this attempt.
         attempt: u64,
     },
     /// The frame has an error receipt now.
@@ -151,7 +152,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let (attempts, begun) = self.attempts(&animation, &name, &version, part).await?;
         let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
         let tries = failure.attempts;
-        // Whoever is woken for a frame that is cut only wakes others.
+        // An invocation that is woken for a frame that is cut only wakes others.
         let is_cut = Bands::of(&receipts, part, self.policy.pixels).cut().is_some();
         let has_tried = tried.as_ref() == Some(&version) && (band.is_some() || !is_cut);
         let what = band.map_or(String::new(), |band| format!("band {} of {}: ", band.number(), band.of()));

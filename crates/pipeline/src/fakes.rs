@@ -22,14 +22,14 @@ use crate::keys::{Band, Part, ScriptName};
 use crate::manifest::Reason;
 use crate::render::{BandJoiner, Drawing, Renderer};
 
-/// What a script asks for.
+/// The request that a script makes to the fakes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Play {
-    /// One frame.
+    /// The script is a single frame.
     Frame,
     /// A script of this many frames.
     Split(NonZeroU64),
-    /// A fault.
+    /// The script has a fault.
     Bad,
     /// A drawing that never ends.
     Hang,
@@ -38,7 +38,7 @@ pub enum Play {
 }
 
 impl Play {
-    /// Reads a script.
+    /// Parses the text of a script.
     pub fn of(script: &[u8]) -> Play {
         let text = String::from_utf8_lossy(script);
         let mut words = text.strip_prefix(BIG).unwrap_or(&text).split(' ');
@@ -52,7 +52,7 @@ impl Play {
     }
 }
 
-/// What a script starts with whose frames are too big for one invocation.
+/// The first word of a script whose frames are too big for one invocation.
 pub const BIG: &str = "big ";
 
 /// Whether a script's frames are to be drawn in bands.
@@ -95,7 +95,7 @@ impl BandJoiner for Paste {
     }
 }
 
-/// What strangers put in the place of a frame.
+/// A body that a stranger puts in the place of a frame.
 pub const GARBLED: &str = "garbled";
 
 /// The picture of a frame.
@@ -117,9 +117,9 @@ fn lines(pictures: &[String]) -> String {
     pictures.iter().flat_map(|picture| [picture, "\n"]).collect()
 }
 
-/// Draws at once.
+/// A renderer that draws at once.
 pub struct InstantRenderer {
-    /// Of a frame that is too big: with one it is drawn whole.
+    /// The number of bands of a frame that is too big: with one it is drawn whole.
     pub bands: NonZeroU64,
 }
 
@@ -172,7 +172,7 @@ impl Renderer for InstantRenderer {
     }
 }
 
-/// What of it another process needs.
+/// The encoder's state, as another process needs it.
 #[derive(Serialize, Deserialize)]
 pub struct Listed {
     settings: (f64, u16),
@@ -186,12 +186,12 @@ impl Listed {
         Listed { settings: (settings.fps(), settings.loops()), is_begun: false, pictures: Vec::new() }
     }
 
-    /// Adds a frame.
+    /// Appends a frame to the list.
     pub fn push(&mut self, frame: &[u8]) {
         self.pictures.push(String::from_utf8_lossy(frame).into_owned());
     }
 
-    /// What has not gone out.
+    /// Takes the bytes that were not yet sent.
     pub fn take(&mut self) -> Bytes {
         let pictures = std::mem::take(&mut self.pictures);
         let mut text = lines(&pictures);
@@ -203,7 +203,7 @@ impl Listed {
 
     /// # Errors
     ///
-    /// Never, in fact.
+    /// Never fails, in fact.
     pub fn suspend(&self) -> Result<Bytes, Reason> {
         serde_json::to_vec(self).map(Bytes::from).map_err(|error| Reason::new(error.to_string()))
     }

@@ -43,7 +43,7 @@ use crate::{Clock, Error, Result, invariants};
 pub enum Folded {
     /// No result has come that a manifest shows: the manifest was not read.
     Untouched,
-    /// The manifest, someone else's, showed the fact: nothing was listed.
+    /// The manifest, by another writer, showed the fact: nothing was listed.
     Covered,
     /// Another frame is to come, and the invocation that draws it folds: nothing was listed.
     Awaited,
@@ -76,8 +76,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.fold_from(animation, fact, age, (glimpse, self.clock.now().since(start))).await
     }
 
-    /// Folds as [`fold`](Self::fold) does, from a read of the manifest that was made when the fact held already, and
-    /// took so long.
+    /// Folds as [`fold`](Self::fold) does, from a read of the manifest that was made when the fact held already, with
+    /// the duration of that read.
     pub(crate) async fn fold_from(
         &self,
         animation: &Animation,

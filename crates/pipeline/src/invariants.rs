@@ -1,4 +1,4 @@
-//! What no manifest may ever say, checked before each write of one. A broken rule is a bug here, not bad input: the
+//! The invariants of a manifest, checked before each write of one. A broken rule is a bug here, not bad input: the
 //! write is refused, the invocation fails, and the bucket stays as it was.
 
 use std::collections::BTreeSet;
@@ -9,7 +9,6 @@ use crate::{Error, Result};
 /// A rule's name, and whether a manifest keeps it over its predecessor.
 type Rule = (&'static str, fn(&Manifest, Option<&Manifest>) -> bool);
 
-/// The rules.
 const RULES: &[Rule] = &[
     ("the revision is the predecessor's plus one", revision_follows),
     ("the animation is the predecessor's", same_animation),
@@ -68,7 +67,7 @@ fn frames_are_unique(next: &Manifest, _: Option<&Manifest>) -> bool {
     next.frames.iter().all(|frame| seen.insert((&frame.script, frame.part)))
 }
 
-/// Of each script there is one frame without a number, or frames numbered from 1 without a gap.
+/// Each script has one frame without a number, or frames numbered from 1 without a gap.
 fn parts_are_whole(next: &Manifest, _: Option<&Manifest>) -> bool {
     next.frames.iter().enumerate().all(|(place, frame)| {
         let before = place.checked_sub(1).map(|place| &next.frames[place]);
@@ -103,12 +102,12 @@ fn status_follows(next: &Manifest, _: Option<&Manifest>) -> bool {
 }
 
 fn reasons_are_there(next: &Manifest, _: Option<&Manifest>) -> bool {
-    let told = |fault: &Fault| fault.reason.is_some();
+    let has_reason = |fault: &Fault| fault.reason.is_some();
     let frames = next.frames.iter().all(|frame| match &frame.state {
-        FrameState::Failed(fault) => told(fault),
+        FrameState::Failed(fault) => has_reason(fault),
         _ => true,
     });
-    !next.head.is_terminal() || (frames && next.head.refusal.as_ref().is_none_or(told))
+    !next.head.is_terminal() || (frames && next.head.refusal.as_ref().is_none_or(has_reason))
 }
 
 fn settings_are_either(next: &Manifest, _: Option<&Manifest>) -> bool {

@@ -1,4 +1,4 @@
-//! What a step is given: the store, the clock, chance, its own name, and how patient it is.
+//! The environment of a step: the store, the clock, chance, its own name, and its patience.
 //!
 //! Requests go through here so that a busy store and a lost answer are met in one way: whatever may be repeated
 //! without harm is repeated a few times with growing random pauses. Conditional writes of the manifest and the GIF are
@@ -20,46 +20,48 @@ use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 pub struct Policy {
     /// The renderer's pixel version, for the tags of what is drawn and woken.
     pub pixels: u32,
-    /// How old the newest script must be before a GIF is made, when `animation.json` does not say how many frames to
-    /// wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
+    /// The age that the newest script must have before a GIF is made, when `animation.json` does not say how many
+    /// frames to wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
     pub quiet: Duration,
     /// The longest pause before a listing, as so many times what a look at the manifest takes: with many finishers at once
     /// one listing serves them all, and where requests are fast it is made soon.
     pub pause_looks: u32,
     /// The longest pause whatever a look takes; with it the last finisher still claims within a second.
     pub pause_cap: Duration,
-    /// How old a manifest of one page of frames may be before it is written anew though nobody needs that but people.
+    /// The age that a manifest of one page of frames may have before it is written again though
+    /// only people need that.
     pub fresh: Duration,
-    /// How many bytes of a manifest are read to see whether it covers a result. 32 KiB: all of it up to some 300 frames.
+    /// The number of bytes of a manifest that are read to see whether it covers a result. 32 KiB: all of it up
+    /// to some 300 frames.
     pub glimpse: u64,
-    /// The most frames that an animation may have; with `None` any number. With more it is failed, and no more of them
-    /// are drawn. A bound on what whoever may upload makes others pay.
+    /// The most frames that an animation may have; with `None` any number. An animation with more is failed, and no
+    /// more of them are drawn. This bounds the cost that a user who may upload can cause for others.
     pub most_frames: Option<u64>,
-    /// How long nothing may happen before the sweep wakes pending frames; doubles with each attempt. 15 min: as long
-    /// as an invocation may run.
+    /// The time without any progress after which the sweep wakes pending frames; it doubles with each attempt. 15
+    /// min: as long as an invocation may run.
     pub stuck_after: Duration,
     /// After how many wakings a pending frame is given up.
     pub attempts: u64,
-    /// Whether the functions themselves have just been started anew: what was cut off with them was not tried, and a lease
-    /// of before has no holder.
+    /// Whether the functions themselves have just been restarted: an attempt that was cut off with them does not
+    /// count, and a lease of before has no holder.
     pub is_fresh_start: bool,
-    /// How old a superseded frame must be before the sweep deletes it. A week: a script that is changed back finds
-    /// its old frame.
+    /// The age of a superseded frame at which the sweep deletes it. A week: a script that is changed back
+    /// finds its old frame.
     pub superseded_after: Duration,
-    /// How often a harmless request is sent before its failure is the step's.
+    /// The number of times that a harmless request is sent before its failure is the step's.
     pub request_attempts: u32,
     /// The first pause before a request is repeated; doubles each time.
     pub request_pause: Duration,
-    /// How many requests of one kind run side by side.
+    /// The number of requests of one kind that run side by side.
     pub concurrency: usize,
-    /// How many frames are fetched ahead of the encoder.
+    /// The number of frames that are fetched ahead of the encoder.
     pub prefetch: usize,
-    /// How long before its deadline the assembler stops.
+    /// The time before its deadline at which the assembler stops.
     pub margin: Duration,
-    /// What it keeps free before that for one more frame, and for writing down where the GIF stands: so many times what the
-    /// longest frame has taken. To write it down takes about as long as 5 to 10 frames.
+    /// The time before the margin that the assembler keeps free for one more frame and for writing a checkpoint, as a
+    /// multiple of the longest time that a frame has taken. A checkpoint takes about as long as 5 to 10 frames.
     pub spare_frames: u32,
-    /// How long before its deadline a drawing is stopped: enough to say so.
+    /// The time before its deadline at which a drawing is stopped: enough to report it.
     pub draw_margin: Duration,
 }
 
@@ -111,7 +113,7 @@ pub struct ReplayState(std::sync::Mutex<Option<String>>);
 
 #[cfg(any(test, feature = "simulation"))]
 impl ReplayState {
-    /// What was said since the last call.
+    /// Takes the text reported since the last call.
     pub fn take(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take()
     }
@@ -128,7 +130,7 @@ pub enum Mutation {
     DropIfMatch,
     /// An invocation leaves when the manifest is covered by its own unfinished commit.
     LeaveOwnCommit,
-    /// Everyone who finds the set complete leaves the claim to someone else, also the revision's writer.
+    /// Each invocation that finds the set complete leaves the claim to another one, also the revision's writer.
     NeverClaim,
     /// The assembler leaves as soon as a frame is pending, though it has just written.
     AssemblerLeavesEarly,
@@ -145,7 +147,7 @@ pub enum Mutation {
 }
 
 impl Mutation {
-    /// All of them.
+    /// All mutations, in the order of their definition.
     pub const ALL: [Mutation; 11] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
@@ -164,12 +166,12 @@ impl Mutation {
 /// A manifest as it was read or written.
 #[derive(Debug, Clone)]
 pub(crate) struct Known {
-    /// Of one that cannot be read, a blank one, which agrees with none.
+    /// A blank one if the manifest cannot be read, which agrees with none.
     pub(crate) manifest: Manifest,
     pub(crate) etag: ETag,
     /// When it was written.
     pub(crate) modified: Timestamp,
-    /// The document, if it cannot be read: to be set aside when it is made anew.
+    /// The document, if it cannot be read: it is set aside when a new one is written.
     pub(crate) unreadable: Option<Bytes>,
 }
 
@@ -183,7 +185,7 @@ impl Known {
     }
 }
 
-/// What stands for a manifest that cannot be read.
+/// Returns the stand-in for a manifest that cannot be read.
 fn blank(animation: &Animation) -> Manifest {
     let nothing = (&Scripts::default(), &Results::default());
     let mut manifest = reconcile(animation, nothing.0, nothing.1, &Settings::absent());
@@ -192,14 +194,14 @@ fn blank(animation: &Animation) -> Manifest {
     manifest
 }
 
-/// What one small request shows of a manifest.
+/// The part of a manifest that one small request shows.
 #[derive(Debug)]
 pub(crate) enum ManifestPrefix {
-    /// There is none.
+    /// There is no manifest.
     Nothing,
     /// It cannot be read.
     Unreadable(Known),
-    /// All of it.
+    /// The request has read the whole manifest.
     Whole(Known),
     /// Its beginning; it is larger.
     Start { beginning: Beginning, info: ObjectInfo },
@@ -277,18 +279,18 @@ impl<'a, S, C> Invocation<'a, S, C> {
         self.request_id
     }
 
-    /// The same, which the platform will kill at `deadline`.
+    /// Sets the deadline at which the platform kills the invocation.
     pub fn until(self, deadline: Timestamp) -> Self {
         Invocation { deadline: Some(deadline), ..self }
     }
 
-    /// The same, breaking a rule.
+    /// Makes the invocation break a rule.
     #[cfg(any(test, feature = "simulation"))]
     pub fn breaking(self, mutation: Option<Mutation>) -> Self {
         Invocation { mutation, ..self }
     }
 
-    /// The same, leaving there what it goes on with.
+    /// Makes the invocation leave its replay state there.
     #[cfg(any(test, feature = "simulation"))]
     pub fn leaving(self, replay_state: &'a ReplayState) -> Self {
         Invocation { replay_state: Some(replay_state), ..self }
@@ -365,7 +367,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Removes an object.
     pub(crate) async fn delete(&self, key: &str) -> Result<()> {
         self.persist(|| self.store.delete(key)).await
     }
@@ -375,7 +376,6 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.persist(|| self.store.list(request.clone())).await
     }
 
-    /// Reads the manifest.
     pub(crate) async fn manifest(&self, animation: &Animation) -> Result<Option<Known>> {
         Ok(self.get(&animation.manifest()).await?.map(|object| Known::of(animation, object)))
     }
@@ -394,8 +394,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Whether the manifest shows the fact. Of a large one the lines are read that would; if it has been replaced since,
-    /// it does not.
+    /// Returns whether the manifest shows the fact. Of a large manifest the lines that would show it are read; if it
+    /// has been replaced since, it does not.
     pub(crate) async fn shows(
         &self,
         animation: &Animation,

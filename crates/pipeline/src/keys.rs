@@ -1,4 +1,4 @@
-//! What lies where in the bucket: every key that the pipeline reads or writes is parsed and formatted here, once.
+//! The layout of the bucket: every key that the pipeline reads or writes is parsed and formatted here, once.
 //!
 //! A key that parses is canonical: formatting it gives the same text back. `docs/pipeline.md` has the table.
 //!
@@ -32,16 +32,16 @@ pub use names::{Uploaded, goes_with, misplaced};
 /// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
 pub const LONGEST_SCRIPT_KEY: usize = 900;
 
-/// What the scripts' folder is called.
+/// The folder of the scripts.
 pub const SCRIPTS: &str = "scripts/";
-/// What the manifests' folder is called.
+/// The folder of the manifests.
 pub const MANIFESTS: &str = "manifests/";
 
-/// What a lease's file is called. No receipt ends like this.
+/// The name of a lease's file. No receipt ends like this.
 const LEASE_FILE: &str = "@assembler.json";
 const SWEEP_LEASE_FILE: &str = "@sweep.json";
 
-/// Where unfinished GIFs are written down, and what their names end in.
+/// The folder of unfinished GIFs, and the ending of their names.
 const CHECKPOINTS: &str = "checkpoints/";
 const CHECKPOINT_END: &str = ".state";
 
@@ -55,7 +55,7 @@ pub struct Animation(String);
 #[serde(try_from = "String", into = "String")]
 pub struct ScriptName(String);
 
-/// Which pixels: a script's version and the version of the renderer that draws them.
+/// The identity of a frame's pixels: a script's version and the version of the renderer that draws them.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Tag {
     /// The script's version, its entity tag.
@@ -67,189 +67,142 @@ pub struct Tag {
 /// The place of a frame in a script with several, counted from 1; `None` when the script is one frame.
 pub type Part = Option<NonZeroU64>;
 
-/// What a manifest, a claim and a GIF stand for: 32 hexadecimal digits.
+/// The identity of a set of frames and settings, for a manifest, a claim and a GIF: 32 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Generation(String);
 
 /// A key of the pipeline.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[expect(missing_docs, reason = "fields without a comment are named after their types")]
 pub enum Key {
     /// `scripts/<animation>/<name>.txt`
-    Script {
-        /// The animation.
-        animation: Animation,
-        /// The script.
-        name: ScriptName,
-    },
+    Script { animation: Animation, name: ScriptName },
     /// `scripts/<animation>/animation.json`
-    Settings {
-        /// The animation.
-        animation: Animation,
-    },
+    Settings { animation: Animation },
     /// `parts/<animation>/<name>@<tag>/<number>.json`
     Part {
-        /// The animation.
         animation: Animation,
-        /// The script.
         name: ScriptName,
-        /// The script's version.
         tag: Tag,
-        /// Which of its frames.
+        /// The number of the frame in its script.
         number: NonZeroU64,
     },
     /// `parts/<animation>/<name>@<tag>/<band>.band-<attempt>.json`, of a part
     /// `parts/<animation>/<name>@<tag>/<number>/<band>.band-<attempt>.json`
     Band {
-        /// The animation.
         animation: Animation,
-        /// The script.
         name: ScriptName,
         /// The script's version, and that of the renderer that cut the frame.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
-        /// Which rows of the frame.
+        /// The rows of the frame.
         band: Band,
-        /// The retry that woke it; 0 for whoever cut the frame.
+        /// The retry that woke the band; 0 if the invocation that cut the frame did.
         attempt: u64,
     },
     /// Below `frames/`: what came of a script, a part, or of the whole.
-    Receipt {
-        /// The animation.
-        animation: Animation,
-        /// Which receipt.
-        receipt: Receipt,
-    },
+    Receipt { animation: Animation, receipt: Receipt },
     /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
-    Lease {
-        /// The animation.
-        animation: Animation,
-    },
+    Lease { animation: Animation },
     /// `frames/<animation>/@sweep.json`: which sweep deletes what may have to be drawn again.
-    SweepLease {
-        /// The animation.
-        animation: Animation,
-    },
+    SweepLease { animation: Animation },
     /// `manifests/<animation>.json`
-    Manifest {
-        /// The animation.
-        animation: Animation,
-    },
-    /// `manifests/<animation>.json~<version>`: a manifest that could not be read, set aside when it was made anew.
+    Manifest { animation: Animation },
+    /// `manifests/<animation>.json~<version>`: a manifest that could not be read, set aside when a
+    /// new one was written.
     SetAside {
-        /// The animation.
         animation: Animation,
         /// The version that it had in its place.
         version: ETag,
     },
     /// `assemblies/<animation>/<revision>-<generation>.json`
     Claim {
-        /// The animation.
         animation: Animation,
         /// The manifest's revision that is claimed for.
         revision: u64,
-        /// Its generation.
+        /// The generation that the claim is for.
         generation: Generation,
     },
     /// `retries/<animation>/<name>@<tag>/<attempt>`, of a part `retries/<animation>/<name>@<tag>/<number>/<attempt>`
     Retry {
-        /// The animation.
         animation: Animation,
-        /// The script.
         name: ScriptName,
-        /// The script's version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
-        /// Counted from 1.
+        /// The number of the attempt, from 1.
         attempt: NonZeroU64,
     },
     /// `checkpoints/<animation>.state`: how far a GIF is that is made by several invocations, one after the other.
-    Checkpoint {
-        /// The animation.
-        animation: Animation,
-    },
+    Checkpoint { animation: Animation },
     /// `animations/<animation>.gif`
-    Gif {
-        /// The animation.
-        animation: Animation,
-    },
+    Gif { animation: Animation },
 }
 
 /// The part of a receipt's key below `frames/<animation>/`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[expect(missing_docs, reason = "fields without a comment are named after their types")]
 pub enum Receipt {
     /// `<name>@<tag>.png`, of a part `<name>@<tag>/<number>.png`
     Frame {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
     },
     /// `<name>@<tag>.error.json`, of a part `<name>@<tag>/<number>.error.json`
     Fault {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
     },
-    /// `<name>@<tag>.begun-<attempt>`, of a part `<name>@<tag>/<number>.begun-<attempt>`: an invocation has begun that a
-    /// retry woke.
+    /// `<name>@<tag>.begun-<attempt>`, of a part `<name>@<tag>/<number>.begun-<attempt>`: an invocation that a
+    /// retry woke has begun.
     Begun {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
-        /// The retry's.
+        /// The number of the retry's attempt.
         attempt: NonZeroU64,
     },
     /// `<name>@<tag>.split-<k>`
     Split {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// How many frames it is.
+        /// The number of frames in the script.
         count: NonZeroU64,
     },
     /// `<name>@<tag>.cut-<k>`, of a part `<name>@<tag>/<number>.cut-<k>`: the frame is drawn in bands.
     Cut {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
-        /// How many bands.
+        /// The number of bands of the cut.
         count: NonZeroU64,
     },
     /// `<name>@<tag>.<band>.band`, of a part `<name>@<tag>/<number>.<band>.band`: rows of a frame, as PNG.
     Band {
-        /// The script.
         name: ScriptName,
-        /// Its version.
         tag: Tag,
-        /// Which of its frames.
+        /// The frame in its script.
         part: Part,
-        /// Which rows of it.
+        /// The rows of the frame.
         band: Band,
     },
     /// `@<generation>.error.json`: this set of frames gives no GIF.
     Refusal {
-        /// The set.
+        /// The set that was refused.
         generation: Generation,
     },
 }
 
 impl Animation {
-    /// Checks a name.
+    /// Checks the name of an animation.
     pub fn new(name: &str) -> Result<Self> {
         for segment in name.split('/') {
             match segment {
@@ -265,52 +218,52 @@ impl Animation {
         Ok(Animation(name.to_owned()))
     }
 
-    /// The name.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// `scripts/<animation>/`
+    /// Returns the folder `scripts/<animation>/`.
     pub fn scripts(&self) -> String {
         format!("{SCRIPTS}{self}/")
     }
 
-    /// `frames/<animation>/`
+    /// Returns the folder `frames/<animation>/`.
     pub fn frames(&self) -> String {
         format!("frames/{self}/")
     }
 
-    /// `retries/<animation>/`
+    /// Returns the folder `retries/<animation>/`.
     pub fn retries(&self) -> String {
         format!("retries/{self}/")
     }
 
-    /// `parts/<animation>/`
+    /// Returns the folder `parts/<animation>/`.
     pub fn parts(&self) -> String {
         format!("parts/{self}/")
     }
 
-    /// `manifests/<animation>.json`
+    /// Returns the key `manifests/<animation>.json`.
     pub fn manifest(&self) -> String {
         format!("{MANIFESTS}{self}.json")
     }
 
-    /// `animations/<animation>.gif`
+    /// Returns the key `animations/<animation>.gif`.
     pub fn gif(&self) -> String {
         format!("animations/{self}.gif")
     }
 
-    /// `checkpoints/<animation>.state`
+    /// Returns the key `checkpoints/<animation>.state`.
     pub fn checkpoint(&self) -> String {
         format!("{CHECKPOINTS}{self}{CHECKPOINT_END}")
     }
 
-    /// `scripts/<animation>/animation.json`
+    /// Returns the key `scripts/<animation>/animation.json`.
     pub fn settings(&self) -> String {
         format!("{SCRIPTS}{self}/{SETTINGS_FILE}")
     }
 
-    /// `scripts/<animation>/<name>.txt`
+    /// Returns the key `scripts/<animation>/<name>.txt`.
     pub fn script(&self, name: &ScriptName) -> String {
         format!("{SCRIPTS}{self}/{name}.txt")
     }
@@ -322,7 +275,7 @@ impl Animation {
 }
 
 impl ScriptName {
-    /// Checks a name.
+    /// Checks the name of a script.
     pub fn new(name: &str) -> Result<Self> {
         if name.is_empty() {
             return Err(Error::key(name, "the script has no name before its ending"));
@@ -333,14 +286,14 @@ impl ScriptName {
         Ok(ScriptName(name.to_owned()))
     }
 
-    /// The name.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 }
 
 impl Tag {
-    /// What the receipts of a script's version start with, whatever drew it: `<name>@<version>-p`.
+    /// Returns the prefix of the receipts of a script's version, for all renderers: `<name>@<version>-p`.
     pub fn receipts_of(name: &ScriptName, version: &ETag) -> String {
         format!("{name}@{}-p", escape(version))
     }
@@ -366,7 +319,7 @@ impl Generation {
         Generation(digits)
     }
 
-    /// The digits.
+    /// Returns the hexadecimal digits.
     pub fn as_str(&self) -> &str {
         &self.0
     }

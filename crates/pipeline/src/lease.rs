@@ -41,7 +41,7 @@ struct Lease {
 /// The owner of the lease for the sweep that deletes results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SweepLease {
-    /// Another sweep.
+    /// The lease is another sweep's.
     Anothers,
     /// This sweep; there was no lease before.
     New,
@@ -135,7 +135,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ///
     /// # Errors
     ///
-    /// As [`Invocation::take_lease`].
+    /// The errors of [`Invocation::take_lease`].
     pub(crate) async fn take_sweep_lease(&self, animation: &Animation) -> Result<SweepLease> {
         let key = Key::SweepLease { animation: animation.clone() };
         // The holder does not check that it still has the lease, so the lease stays another's for a while after it has
@@ -179,8 +179,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.free_lease(animation, |holder| holder.assembler == request_id).await
     }
 
-    /// Releases a lease that expires before one taken now would. Its holder started earlier, and both have the same
-    /// time limit.
+    /// Releases a lease that expires before one taken now would. Its holder started earlier, and has
+    /// the same time limit.
     pub(crate) async fn release_stale_lease(&self, animation: &Animation) -> Result<()> {
         let own = self.own_lease(HeldLease::default());
         self.free_lease(animation, |holder| holder.until < own.until).await

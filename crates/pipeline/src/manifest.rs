@@ -24,7 +24,7 @@ pub(crate) use document::{Beginning, frames_of};
 /// The version of the document's form. Readers refuse a later one.
 pub const SCHEMA: u32 = 1;
 
-/// How many diagnostics of a script the manifest repeats; the receipt has more.
+/// The number of diagnostics of a script that the manifest repeats; the receipt has more.
 pub const DIAGNOSTICS_SHOWN: usize = 3;
 
 /// The largest `animation.json` that is read: thousands of times what its fields need.
@@ -39,32 +39,32 @@ pub struct Manifest {
     pub frames: Vec<Frame>,
 }
 
-/// What a manifest says in short.
+/// The summary of a manifest, which is its first line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// [`SCHEMA`].
+    /// The version of the format: [`SCHEMA`].
     pub schema: u32,
-    /// The animation's name.
+    /// The animation whose frames the manifest lists.
     pub animation: Animation,
     /// Grows by one with each write, from 1.
     pub revision: u64,
     /// The request id of the invocation that wrote this revision.
     pub writer: String,
-    /// Where the animation stands.
+    /// The progress of the animation.
     pub status: Status,
-    /// What this set of frames and settings is; a GIF of the same generation is up to date.
+    /// The identity of this set of frames and settings; a GIF of the same generation is up to date.
     pub generation: Generation,
     /// Scripts in the folder.
     pub scripts: u64,
     /// Frames known; a script that has not been read yet counts as one.
     pub total: u64,
-    /// Frames drawn.
+    /// The number of frames that are drawn.
     pub done: u64,
     /// Frames that are still to come.
     pub pending: u64,
     /// Frames that cannot be drawn.
     pub failed: u64,
-    /// `animation.json`.
+    /// The settings in `animation.json`.
     pub settings: Settings,
     /// Files that are meant as scripts but have a key that the pipeline cannot take.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -75,7 +75,7 @@ pub struct Head {
     /// Why this generation gives no GIF though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
-    /// That there are more frames than an animation may have.
+    /// The reason if there are more frames than an animation may have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excess: Option<Reason>,
     /// When a script was last found to be gone, by the clock of the function that found it.
@@ -92,13 +92,13 @@ pub struct Head {
 /// A GIF that was built.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Gif {
-    /// What it was made of.
+    /// The set that the GIF was made of.
     pub generation: Generation,
-    /// Its version.
+    /// The entity tag of the GIF.
     pub version: ETag,
 }
 
-/// Where an animation stands.
+/// The progress of an animation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
@@ -136,20 +136,20 @@ impl fmt::Display for Status {
 pub struct Frame {
     /// The script that draws it.
     pub script: ScriptName,
-    /// The script's version.
+    /// The entity tag of the script that the frame is drawn from.
     pub version: ETag,
-    /// Which of the script's frames it is; `None` when the script is one frame, or has not been read yet.
+    /// The frame's number in its script; `None` when the script is one frame, or has not been read yet.
     pub part: Part,
-    /// What came of it.
+    /// The result of drawing the frame.
     pub state: FrameState,
 }
 
-/// What came of a frame.
+/// The result of drawing a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrameState {
-    /// Nothing yet.
+    /// There is no result yet.
     Pending,
-    /// It is drawn.
+    /// The frame is drawn.
     Done {
         /// The renderer's pixel version that is used.
         pixels: u32,
@@ -161,9 +161,9 @@ pub enum FrameState {
 /// Why something cannot be had, and the receipt that says so.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
-    /// The receipt's version.
+    /// The entity tag of the receipt.
     pub receipt: ETag,
-    /// What the receipt says. Never missing in a manifest that is not rendering or waiting.
+    /// The content of the receipt. Never missing in a manifest that is not rendering or waiting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<Reason>,
 }
@@ -176,7 +176,7 @@ pub struct Reason {
     /// The script's diagnostics, or the first of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub diagnostics: Vec<Diagnostic>,
-    /// How many more diagnostics there are.
+    /// The number of diagnostics that are left out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub omitted: usize,
 }
@@ -184,9 +184,9 @@ pub struct Reason {
 /// A file that is meant as a script but cannot be one, or is not called as one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejected {
-    /// Its key.
+    /// The key of the object.
     pub key: String,
-    /// What is wrong with it.
+    /// The reason for which it is rejected.
     pub problem: String,
 }
 
@@ -199,12 +199,12 @@ pub struct Settings {
     /// The settings; `None` exactly when `fault` says why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<AnimationSettings>,
-    /// What is wrong with `animation.json`.
+    /// The error in `animation.json`, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<Reason>,
 }
 
-/// What an invocation wants the manifest to show before it may leave.
+/// A fact that an invocation wants the manifest to show before it may leave.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fact {
     /// Nothing in particular: fold in any case.
@@ -234,7 +234,7 @@ impl Head {
         self.gif.as_ref().filter(|gif| gif.generation == self.generation).map(|gif| &gif.version)
     }
 
-    /// How many frames are expected and not there yet.
+    /// Returns the number of frames that are expected and not there yet.
     pub fn missing(&self) -> u64 {
         let expected = self.settings.value.as_ref().and_then(AnimationSettings::frames).unwrap_or(0);
         self.pending + expected.saturating_sub(self.total)
@@ -242,7 +242,7 @@ impl Head {
 }
 
 impl Manifest {
-    /// Says the same as `other`, whoever wrote it and whatever reasons it repeats.
+    /// Returns whether both say the same, regardless of their writers and of the reasons that they repeat.
     pub fn agrees_with(&self, other: &Manifest) -> bool {
         let (a, b) = (&self.head, &other.head);
         let receipt = |fault: &Option<Fault>| fault.as_ref().map(|fault| fault.receipt.clone());
@@ -265,7 +265,7 @@ impl Manifest {
         Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
     }
 
-    /// The same where an animation may have at most so many frames: with more it is failed, and nothing is waited for.
+    /// Applies a limit on the number of frames: an animation with more is failed, and nothing is waited for.
     pub(crate) fn bounded(mut self, most: Option<u64>) -> Self {
         let total = self.head.total;
         if let Some(most) = most.filter(|most| total > *most) {
@@ -347,13 +347,13 @@ impl Settings {
         Settings { version: None, value: Some(AnimationSettings::default()), fault: None }
     }
 
-    /// Of an `animation.json` that is too large to be one.
+    /// Returns the settings for an `animation.json` that is too large to be one.
     pub fn too_large(version: ETag, size: u64) -> Self {
         let message = format!("{SETTINGS_FILE} has {size} bytes: expected at most {MAX_SETTINGS_BYTES}");
         Settings { version: Some(version), value: None, fault: Some(Reason::new(message)) }
     }
 
-    /// Reads `animation.json`.
+    /// Parses the body of `animation.json`.
     pub fn parse(version: ETag, body: &[u8]) -> Self {
         let parsed = parse_settings(SETTINGS_FILE, body);
         let fault = match &parsed.settings {
@@ -365,11 +365,11 @@ impl Settings {
 }
 
 impl Reason {
-    /// Of an error receipt that cannot be read. The sweep deletes it, and has the frame drawn again.
+    /// The text for an error receipt that cannot be read. The sweep deletes it, and has the frame drawn again.
     pub const UNREADABLE: &str =
         "the error receipt cannot be read: the frame is drawn again at the next sweep";
 
-    /// What an error receipt says.
+    /// Returns the reason in an error receipt.
     pub(crate) fn of_receipt(body: &[u8]) -> Self {
         serde_json::from_slice(body).unwrap_or_else(|_| Reason::new(Reason::UNREADABLE))
     }

@@ -14,10 +14,11 @@ use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, 
 use crate::store::{ETag, ListPage, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// How often an animation is listed whose receipts are replaced between the listing and their reading.
+/// The most listings of an animation whose receipts are replaced between the listing and their reading.
 const LOOKS: u32 = 8;
 
-/// How many rejected keys a manifest names: whoever may upload could else make it as large as they like.
+/// The number of rejected keys that a manifest names. Without this limit a user who may upload could make it as
+/// large as they like.
 const MAX_REJECTED: usize = 100;
 
 /// The receipts of an animation that a listing shows.
@@ -73,7 +74,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ///
     /// # Errors
     ///
-    /// Those of the store, and [`Error::Conflict`] for a receipt that is never the one that was listed.
+    /// The errors of the store, and [`Error::Conflict`] for a receipt that is never the one that was listed.
     pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
         let mut pause = self.policy.request_pause;
         for _ in 0..LOOKS {
@@ -89,8 +90,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key: animation.frames() })
     }
 
-    /// Observes the animation with receipts that have been listed already; `None` if one of them has been replaced
-    /// since.
+    /// Observes the animation with receipts that have been listed already. Returns `None` if one of them
+    /// has been replaced since.
     pub(crate) async fn observe_with(
         &self,
         animation: &Animation,
@@ -268,7 +269,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
-    /// Which parts of a split script have neither frame nor error yet.
+    /// Returns the parts of a split script that have neither frame nor error yet.
     pub(crate) async fn missing_parts(
         &self,
         animation: &Animation,
@@ -304,10 +305,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if !faulty {
             return Ok(true);
         }
-        let told: BTreeMap<&ETag, &Reason> =
+        let reasons: BTreeMap<&ETag, &Reason> =
             known.into_iter().flat_map(|known| faults(&known.manifest)).collect();
         for fault in faults_mut(manifest) {
-            fault.reason = told.get(&fault.receipt).map(|reason| (*reason).clone());
+            fault.reason = reasons.get(&fault.receipt).map(|reason| (*reason).clone());
         }
         if !manifest.head.is_terminal() {
             return Ok(true);
@@ -353,7 +354,7 @@ fn bounded(mut rejected: Vec<Rejected>, folder: String, which: &str) -> Vec<Reje
     rejected
 }
 
-/// What an object in a listing of the animation's frames is a receipt of.
+/// Returns the receipt that an object in a listing of the animation's frames is.
 fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
     match listed.key.parse() {
         Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {
@@ -390,7 +391,7 @@ pub(crate) fn is_result_of(found: &ReceiptFound, script: &ScriptName, version: &
     }
 }
 
-/// What has come of one script's version, from the receipts of one listing.
+/// Returns the result of one script's version, from the receipts of one listing.
 pub(crate) fn version_result(receipts: &[ReceiptFound], part: Part) -> Option<VersionResult> {
     let mut standing = None;
     for found in receipts {
@@ -407,18 +408,18 @@ pub(crate) fn version_result(receipts: &[ReceiptFound], part: Part) -> Option<Ve
     standing
 }
 
-/// What a script's version has come to, the stronger the later.
+/// The result of a script's version; a later variant overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum VersionResult {
-    /// An error receipt.
+    /// The version has an error receipt.
     Faulty(ETag),
     /// A frame of this pixel version.
     Drawn(u32),
-    /// Several frames.
+    /// The script has several frames.
     Split {
-        /// What the parts' keys have.
+        /// The tag in the parts' keys.
         tag: Tag,
-        /// How many frames.
+        /// The number of frames in the script.
         count: NonZeroU64,
     },
 }
@@ -439,7 +440,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if part.is_none() {
             return has_receipt.await;
         }
-        // Of parts only those of this renderer's pixels are looked for; where another one has drawn some it may be among them.
+        // Only parts of this renderer's pixels are looked for; if another one has drawn some, it may be among them.
         let frames = animation.frames();
         let own = Tag { version: version.clone(), pixels: self.policy.pixels };
         let own = format!("{frames}{name}@{own}/");
@@ -449,7 +450,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(has_receipt || level.prefixes.iter().any(|folder| *folder != own))
     }
 
-    /// What there is of a script's version, or of a part of it: one request, unless it is cut into very many bands.
+    /// Returns the receipts of a script's version, or of a part of it: one request, unless it is cut
+    /// into very many bands.
     pub(crate) async fn receipts_of(
         &self,
         animation: &Animation,

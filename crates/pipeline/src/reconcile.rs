@@ -13,7 +13,7 @@ use crate::keys::{Animation, Generation, Part, Receipt, ScriptName};
 use crate::manifest::{Fault, Frame, FrameState, Head, Manifest, Rejected, SCHEMA, Settings, Status};
 use crate::store::ETag;
 
-/// How many scripts lie between two of a manifest's marks: as many as a page of a listing shows.
+/// The number of scripts between two of a manifest's marks: as many as a page of a listing shows.
 pub const MARK_EVERY: usize = crate::store::PAGE;
 
 /// The most marks that a manifest holds.
@@ -24,24 +24,24 @@ const MAX_MARKS: usize = 200;
 pub struct Scripts {
     /// The scripts, each once.
     pub found: Vec<ScriptFound>,
-    /// What is meant as a script but cannot be one.
+    /// Objects that are meant as scripts but cannot be one.
     pub rejected: Vec<Rejected>,
-    /// What is not read because of its name.
+    /// Objects that are not read because of their names.
     pub warnings: Vec<Rejected>,
 }
 
 /// A script in a listing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScriptFound {
-    /// Its name.
+    /// The name of the script within its animation.
     pub name: ScriptName,
-    /// Its version.
+    /// The entity tag of the script.
     pub version: ETag,
     /// When it was uploaded.
     pub modified: Timestamp,
 }
 
-/// What has come of scripts, as a listing of `frames/<animation>/` shows it, in any order.
+/// The results of scripts, as a listing of `frames/<animation>/` shows them, in any order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Results {
     /// The receipts of current and superseded versions.
@@ -51,15 +51,15 @@ pub struct Results {
 /// A receipt in a listing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReceiptFound {
-    /// Which receipt.
+    /// The parsed key of the receipt.
     pub receipt: Receipt,
-    /// Its version.
+    /// The entity tag of the receipt.
     pub etag: ETag,
     /// When it was written.
     pub modified: Timestamp,
 }
 
-/// What a script or a part of one has come to.
+/// The result of a script or a part of one.
 #[derive(Debug, Clone, Default)]
 struct Resolution<'a> {
     split: Option<NonZeroU64>,
@@ -73,7 +73,8 @@ struct Outcome<'a> {
     fault: Option<(u32, &'a ETag)>,
 }
 
-/// Folds the listings of an animation into its manifest, with revision 0 and no writer: whoever commits it sets both.
+/// Folds the listings of an animation into its manifest, with revision 0 and no writer. The invocation that
+/// commits it sets both.
 ///
 /// Reasons are left out; the listings do not show them.
 pub fn reconcile(

@@ -29,12 +29,12 @@ use bands::{Bands, Woken};
 
 pub use bands::BandJoiner;
 
-/// What draws. The render function brings a ray tracer, the simulation something smaller.
+/// A renderer of scripts. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
     /// A frame being put together of its bands.
     type BandJoiner: BandJoiner;
 
-    /// How large a script may be. Of a larger one no more than the first bytes are read, one more than these.
+    /// Returns the largest size of a script in bytes. Of a larger script only these bytes and one more are read.
     fn most_bytes(&self) -> u64;
 
     /// Draws the script's one frame (`part` is `None`) or one of several, or says that it is too big: that drawing it takes
@@ -42,8 +42,8 @@ pub trait Renderer: Send + Sync {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfTime`] when it was stopped before the deadline. What is wrong with the script is no error but a
-    /// [`Drawing::Fault`].
+    /// [`Error::OutOfTime`] when it was stopped before the deadline. A fault of the script is no
+    /// error but a [`Drawing::Fault`].
     fn draw(
         &self,
         name: &ScriptName,
@@ -69,7 +69,7 @@ pub trait Renderer: Send + Sync {
     ///
     /// # Errors
     ///
-    /// What may pass.
+    /// Errors after which another attempt may succeed.
     fn join(
         &self,
         name: &ScriptName,
@@ -79,7 +79,7 @@ pub trait Renderer: Send + Sync {
     ) -> impl Future<Output = Result<Result<Self::BandJoiner, Reason>>> + Send;
 }
 
-/// What came of a script.
+/// The result of drawing a script.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawing {
     /// The frame, as PNG.
@@ -92,22 +92,22 @@ pub enum Drawing {
     Fault(Reason),
 }
 
-/// What an invocation of the render function did.
+/// The result of an invocation of the render function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rendered {
-    /// The animation.
+    /// The animation of the script.
     pub animation: Animation,
     /// The script; `None` for an event of `animation.json` or of a file that is not read.
     pub script: Option<ScriptName>,
-    /// What came of it.
+    /// The result of the event.
     pub outcome: Outcome,
-    /// How the fold ended.
+    /// The end of the fold.
     pub folded: Folded,
-    /// Where the time went.
+    /// The time that each stage took.
     pub stages: Stages,
 }
 
-/// What came of an event.
+/// The result of an event.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// The script is gone.
@@ -139,11 +139,11 @@ pub enum Outcome {
 pub struct Stages {
     /// Reading the script and looking for a result.
     pub read: Duration,
-    /// Drawing.
+    /// The time spent on drawing.
     pub draw: Duration,
-    /// Putting the result.
+    /// The time spent on writing the result.
     pub put: Duration,
-    /// Folding.
+    /// The time spent on folding.
     pub fold: Duration,
 }
 
@@ -170,13 +170,13 @@ pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
     }
 }
 
-/// Which frame an event is about.
+/// The frame that an event is about.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Subject {
     pub(crate) animation: Animation,
     pub(crate) name: ScriptName,
     pub(crate) part: Part,
-    /// Which rows of it, if not all.
+    /// The rows of it, if not all.
     woken: Option<Woken>,
     /// The version that a part or a band belongs to: of another one there is nothing to draw.
     only: Option<ETag>,
@@ -192,7 +192,7 @@ pub(crate) struct Script {
     pub(crate) body: Bytes,
 }
 
-/// What a script as it is now asks for.
+/// The work that a script as it is now asks for.
 #[derive(Debug, PartialEq)]
 enum Due {
     /// No result, only that the manifest shows this.
@@ -246,7 +246,7 @@ impl Subject {
 }
 
 impl Outcome {
-    /// How long the fact holds that the outcome stands for.
+    /// Returns the age of the fact that the outcome stands for.
     fn age(&self) -> Age {
         match self {
             Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
@@ -327,8 +327,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(self.read_prefix(animation).await?.head().is_some_and(|head| head.excess.is_some()))
     }
 
-    /// Works on a frame of which there is no result: on the band that the event is about, or on all of it. Whoever was woken
-    /// for a band by a renderer of other pixels looks at the frame anew.
+    /// Works on a frame of which there is no result: on the band that the event is about, or on all of it. An
+    /// invocation that a renderer of other pixels woke for a band looks at the frame again.
     async fn work_on<R: Renderer>(
         &self,
         renderer: &R,
@@ -391,7 +391,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.in_time(drawing, || format!("{name} is not drawn")).await
     }
 
-    /// How long a drawing may take from now on, if there is a deadline.
+    /// Returns the time that a drawing may take from now on, if there is a deadline.
     fn time_to_draw(&self) -> Option<Duration> {
         let deadline = self.deadline?;
         Some(deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin))
@@ -507,8 +507,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stream::iter(parts).map(Ok).try_for_each_concurrent(concurrency, |part| part).await
     }
 
-    /// The script is split already. Parts whose events came while another version was current have drawn nothing: those
-    /// that were put before this upload and have no result are woken anew.
+    /// The script is split already. Parts whose events came while another version was current have drawn nothing:
+    /// those that were put before this upload and have no result are woken again.
     async fn follow_split(
         &self,
         subject: Subject,

@@ -1,7 +1,7 @@
 //! Drawing again, on demand: what `rayfold retry` does to the bucket.
 //!
-//! Error receipts are deleted first, for a receipt is what makes an event find its work done; then the wakings that the
-//! sweep has counted; then each frame is woken anew. Everything after that is the render function's.
+//! Error receipts are deleted first, for a receipt is what makes an event find its work done; then the wakings that
+//! the sweep has counted; then each frame is woken again. Everything after that is the render function's.
 
 use std::collections::BTreeSet;
 
@@ -13,10 +13,10 @@ use crate::manifest::{Frame, FrameState};
 use crate::store::Store;
 use crate::{Clock, Result};
 
-/// Which frames to draw again.
+/// The frames to draw again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope<'a> {
-    /// Those that failed or are missing.
+    /// Frames that failed or are missing.
     Failed,
     /// All of them, also those that are drawn.
     All,
@@ -34,7 +34,7 @@ impl Scope<'_> {
     }
 }
 
-/// What a retry did.
+/// The result of a retry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Retried {
     /// Receipts that were deleted.
@@ -49,7 +49,7 @@ pub struct Retried {
 ///
 /// # Errors
 ///
-/// Those of the store.
+/// The errors of the store.
 pub async fn retry<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     animation: &Animation,
@@ -76,7 +76,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     doomed.push(animation.receipt(&found.receipt));
                     continue;
                 }
-                // Attempts are counted anew.
+                // Attempts are counted from the start.
                 Receipt::Begun { name, tag, part, .. } => {
                     if named.contains(&(name, &tag.version, *part)) {
                         counted.push(animation.receipt(&found.receipt));
@@ -115,7 +115,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stream::iter(wakings).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
         let reassembled = manifest.head.refusal.is_some();
         if deleted > 0 {
-            // Nobody else looks when only receipts go: the manifest must not stay as it was.
+            // No other invocation looks when only receipts go: the manifest must not stay as it was.
             crate::fold::fold(self, animation).await?;
         }
         Ok(Retried { deleted, woken: wanted.len() as u64, reassembled })

@@ -76,10 +76,10 @@ impl fmt::Display for ETag {
 /// User metadata of an object: lower-case ASCII names without prefix, ASCII values, 2 KB together.
 pub type Metadata = BTreeMap<String, String>;
 
-/// What a store says of an object without its body.
+/// The properties of an object without its body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectInfo {
-    /// Identifies the body.
+    /// The entity tag, which identifies the body.
     pub etag: ETag,
     /// Bytes of the whole body, also when only a range of it was read.
     pub size: u64,
@@ -110,14 +110,14 @@ pub enum Condition {
     IfMatch(ETag),
 }
 
-/// How to put an object.
+/// The options of a write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PutOptions {
-    /// When to.
+    /// The condition for the write.
     pub condition: Condition,
-    /// Its media type.
+    /// The media type of the body.
     pub content_type: &'static str,
-    /// Its user metadata.
+    /// The user metadata of the object.
     pub metadata: Metadata,
 }
 
@@ -141,12 +141,12 @@ impl PutOptions {
         PutOptions { condition: Condition::IfMatch(etag), ..Self::always() }
     }
 
-    /// The same with this media type.
+    /// Sets the media type of the body.
     pub fn content_type(self, content_type: &'static str) -> Self {
         PutOptions { content_type, ..self }
     }
 
-    /// The same with one more entry of metadata.
+    /// Adds an entry to the metadata.
     pub fn metadata(mut self, name: &str, value: &str) -> Self {
         self.metadata.insert(name.to_owned(), value.to_owned());
         self
@@ -181,9 +181,9 @@ impl ListRequest {
 /// An object in a listing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listed {
-    /// Its key.
+    /// The whole key of the object.
     pub key: String,
-    /// Identifies its body.
+    /// The entity tag, which identifies its body.
     pub etag: ETag,
     /// Bytes of its body.
     pub size: u64,
@@ -198,18 +198,18 @@ pub struct ListPage {
     pub objects: Vec<Listed>,
     /// Rolled-up prefixes with their closing `/`, in byte order.
     pub prefixes: Vec<String>,
-    /// Where the listing goes on; none at its end.
+    /// The position at which the listing continues; `None` at its end.
     pub next: Option<String>,
 }
 
-/// An upload that was left before its end: where it stands, for whoever takes it up.
+/// An upload that was left before its end, with its progress, for the invocation that resumes it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct UnfinishedUpload {
     /// The store's name for it; `None` before the first part.
     pub id: Option<String>,
     /// The entity tags of the parts that the store has, in order.
     pub parts: Vec<ETag>,
-    /// What follows them: less than a part.
+    /// The bytes after the last part: fewer than a part has.
     #[serde(skip)]
     pub tail: Bytes,
 }
@@ -219,11 +219,11 @@ pub trait Store: Send + Sync {
     /// An object being written piece by piece.
     type Upload: Upload;
 
-    /// Reads an object.
+    /// Reads a whole object.
     fn get(&self, key: &str) -> impl Future<Output = Result<Object>> + Send;
 
-    /// Reads the bytes `range` of an object; fewer when the object ends before. The range starts inside the object
-    /// or at 0.
+    /// Reads the bytes `range` of an object; fewer when the object ends before. The range starts inside the
+    /// object or at 0.
     fn get_range(&self, key: &str, range: Range<u64>) -> impl Future<Output = Result<Object>> + Send;
 
     /// Reads all but the body.
@@ -242,11 +242,12 @@ pub trait Store: Send + Sync {
     /// the condition is checked.
     fn upload(&self, key: &str, options: PutOptions) -> impl Future<Output = Result<Self::Upload>> + Send;
 
-    /// Goes on with an object that was [left](Upload::leave) by this process or another one. `options` are those that it
-    /// began with. No request: whether the upload is still there shows at the next one. One that is gone, because somebody
-    /// has finished or aborted it, is `NotFound` where a part is sent, and that or `Ambiguous` at its end.
+    /// Goes on with an object that was [left](Upload::leave) by this process or another one. `options` are those that
+    /// it began with. No request: whether the upload is still there shows at the next one. An upload that is gone,
+    /// because another process has finished or aborted it, is `NotFound` where a part is sent, and that or
+    /// `Ambiguous` at its end.
     ///
-    /// Who takes up the same upload twice and writes the same bytes does no harm.
+    /// A process that takes up the same upload twice and writes the same bytes does no harm.
     fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload;
 }
 

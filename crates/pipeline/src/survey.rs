@@ -212,7 +212,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(receipts.map(|receipts| Page { receipts, is_new: true }))
     }
 
-    /// Selects by lot one of the frames that the manifest shows as pending, other than that of the fact.
+    /// Selects at random one of the frames that the manifest shows as pending, other than that of the fact.
     fn drawn_by_lot<'f>(&self, fact: &Fact, revision: u64, frames: &'f [Frame]) -> Option<&'f Frame> {
         let is_other = |frame: &&Frame| {
             frame.state == FrameState::Pending && fact.subject() != Some((&frame.script, frame.part))

@@ -22,10 +22,10 @@ use crate::store::{ETag, ListRequest, Store};
 use crate::wake_count::WakeCount;
 use crate::{Clock, Result, Timestamp};
 
-/// How many animations are visited side by side.
+/// The number of animations that are visited side by side.
 const VISITS: usize = 8;
 
-/// What a sweep did.
+/// The result of a sweep.
 #[derive(Debug, Default)]
 pub struct Swept {
     /// Each animation with what was done for it, in the order of the visits.
@@ -38,7 +38,7 @@ pub struct Swept {
     pub unvisited: usize,
 }
 
-/// What a sweep did for one animation.
+/// The result of a sweep for one animation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Visit {
     /// Frames that were woken.
@@ -54,7 +54,7 @@ pub struct Visit {
 /// The pause between wakings doubles no more than so often.
 const MAX_DOUBLINGS: u64 = 6;
 
-/// Visits all animations.
+/// Visits each animation in the bucket.
 ///
 /// # Errors
 ///
@@ -63,11 +63,11 @@ pub async fn sweep<S: Store, C: Clock>(invocation: &Invocation<'_, S, C>) -> Res
     invocation.sweep().await
 }
 
-/// Visits one animation.
+/// Visits a single animation.
 ///
 /// # Errors
 ///
-/// Those of the store.
+/// The errors of the store.
 pub async fn visit<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     animation: &Animation,
@@ -141,7 +141,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let is_healed = self.heal_receipts(animation, &observation, &mut lease, &mut visit).await?;
         let head = &observation.manifest.head;
         let stands = known.as_ref().filter(|known| known.manifest.agrees_with(&observation.manifest));
-        // A GIF that nobody has named could be cut off unnoticed.
+        // A GIF that no manifest has named could be cut off unnoticed.
         let is_right = stands.map(|known| &known.manifest.head).is_some_and(|head| {
             due(head, gif.as_ref()) == Due::Nothing && new_gif(head, gif.as_ref()).is_none()
         });
@@ -170,7 +170,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(*lease != Some(SweepLease::Anothers))
     }
 
-    /// Whether what nobody needs any more is old enough to go.
+    /// Returns whether an object that is no longer needed is old enough to go.
     fn is_old(&self, modified: Timestamp) -> bool {
         self.clock.now().since(modified) >= self.policy.superseded_after
     }
@@ -202,7 +202,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let steps = pending.into_iter().map(|frame| {
             let waking = wakings.get(&(frame.script.clone(), frame.version.clone(), frame.part)).copied();
             let waking = waking.unwrap_or_default();
-            // Nobody has been woken since for what a sweep has deleted that died then.
+            // A sweep that died has deleted something, and no frame has been woken for it since.
             let is_swept = swept.is_some_and(|since| waking.last <= since);
             async move {
                 match is_swept || is_stuck {
@@ -386,7 +386,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     doomed.push(key);
                 }
             }
-            // The frames of a split script come after it was split: without what says that it is, nobody would look for them.
+            // The frames of a split script come after it was split: without the object that says that it is, no sweep
+            // would look for them.
             doomed.retain(|key| {
                 version_of(key)
                     .is_none_or(|(name, version)| !young.contains(&(name.clone(), version.clone())))
@@ -485,8 +486,8 @@ fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     }
 }
 
-/// Whether it says that there is something below a script's version, or below `parts/`, that a listing of the results does
-/// not show.
+/// Returns whether the key says that there is something below a script's version, or below `parts/`, that a listing
+/// of the results does not show.
 fn tells_of_parts(key: &Key) -> bool {
     matches!(key, Key::Receipt { receipt: Receipt::Split { .. } | Receipt::Cut { .. }, .. })
 }
@@ -501,7 +502,8 @@ fn banded_frame(found: &ReceiptFound) -> Option<(&ScriptName, &ETag, Part)> {
     }
 }
 
-/// What a claim names when no one commits: the revision that stands, and the generation that should.
+/// Returns the manifest that a claim names when no one commits: the revision that stands, and
+/// the generation that should.
 fn claimable(observed: &Manifest, known: Option<&Known>) -> Manifest {
     let mut head = observed.head.clone();
     head.revision = known.map_or(0, |known| known.manifest.head.revision);

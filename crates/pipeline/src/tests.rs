@@ -1,4 +1,5 @@
-//! Steps on a store in memory in which somebody meddles at the worst moment: one test for each rule that only then shows.
+//! Steps on a store in memory in which another client meddles at the worst moment: one test for each rule
+//! that only then shows.
 
 mod assemblies;
 mod bands;
@@ -38,7 +39,7 @@ use crate::{
     record_failure, render_frame,
 };
 
-/// Jumps to wherever someone waits for.
+/// Jumps to each moment that a task waits for.
 #[derive(Debug, Clone)]
 struct JumpingClock(Arc<AtomicU64>);
 
@@ -57,7 +58,7 @@ type Meddler = Box<dyn FnMut(&str, &mut Bucket, Timestamp) + Send>;
 /// Answers a request that is named like `put frames/…` with an error, and nothing is done.
 type Refuser = Box<dyn FnMut(&str) -> Option<Error> + Send>;
 
-/// A bucket in which somebody does something before a request that is named like `put frames/…`.
+/// A bucket in which another client acts before a request that is named like `put frames/…`.
 struct Meddled {
     bucket: Arc<Mutex<Bucket>>,
     clock: JumpingClock,
@@ -122,7 +123,7 @@ impl Store for Meddled {
 /// Bytes of a part of an upload.
 const PART: usize = 8;
 
-/// What is uploaded in pieces. Its requests are named `part`, `finish` and `abort`.
+/// An upload in pieces. Its requests are named `part`, `finish` and `abort`.
 struct Pieces {
     bucket: Arc<Mutex<Bucket>>,
     refuser: Arc<Mutex<Option<Refuser>>>,
@@ -179,19 +180,19 @@ impl Upload for Pieces {
     }
 }
 
-/// Of a frame that is too big.
+/// The bands of a frame that is too big.
 const BANDS: NonZeroU64 = NonZeroU64::new(3).unwrap();
 
 /// Lists frames, and takes its time.
 #[derive(Clone)]
 struct Joiner {
     clock: JumpingClock,
-    /// For each frame.
+    /// The time that each frame takes.
     takes: Duration,
     trouble: Option<Trouble>,
 }
 
-/// Where a set makes no animation.
+/// The step at which the encoder refuses a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trouble {
     Begin,

@@ -1,4 +1,4 @@
-//! How often frames were woken, as the objects below `retries/` and the receipts of those that began say.
+//! The number of times that frames were woken, by the objects below `retries/` and the receipts of those that began.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::observe::Observation;
 use crate::store::{ETag, ListRequest, Listed, Store};
 use crate::{Clock, Result, Timestamp};
 
-/// How often and when last a frame was woken.
+/// The number of times that a frame was woken, and the last of them.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct WakeCount {
     /// The last one's number.
@@ -19,7 +19,7 @@ pub(crate) struct WakeCount {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// How often each frame of an animation was woken.
+    /// Returns how often each frame of an animation was woken.
     pub(crate) async fn wakings(
         &self,
         animation: &Animation,

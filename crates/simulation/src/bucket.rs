@@ -1,6 +1,6 @@
 //! The simulated bucket: latency, faults, kills, and what the platform counts.
 //!
-//! A request takes effect at some moment between its start and its answer, whether or not whoever sent it still lives.
+//! A request takes effect at some moment between its start and its answer, whether or not its sender still lives.
 //! Listings are not atomic: each name is seen as it was at one of two moments within the request.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,10 +18,10 @@ use rayfold_pipeline::store::{
 };
 use rayfold_pipeline::{Clock, Error, Randomness, Result, Timestamp};
 
-/// How often things go wrong: once in so many; never when 0.
+/// The rates of faults: one in so many requests; never when 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Faults {
-    /// 503.
+    /// Answers of status 503.
     pub(super) busy: u64,
     /// 409 for a conditional put.
     pub(super) conflict: u64,
@@ -36,7 +36,7 @@ pub(super) struct Faults {
 /// Bytes of an upload's part; the simulated files are small.
 const PART: usize = 256;
 
-/// What S3 bears of one bucket, and how fast bytes come.
+/// The request rate that S3 bears of one bucket, and the speed of the bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Puts and deletes a second; more are answered with 503. S3 says 3,500 a prefix that it has set apart, and sets prefixes
@@ -53,7 +53,7 @@ impl Limits {
     pub const S3: Limits = Limits { writes: 3_500, reads: 5_500, bytes_a_microsecond: 80 };
 }
 
-/// How much of its limits a second has used up.
+/// The share of its limits that a second has used up.
 #[derive(Debug, Default)]
 struct Second {
     number: u64,
@@ -61,14 +61,12 @@ struct Second {
     reads: u64,
 }
 
-/// Who sends requests.
+/// The sender of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Actor {
-    /// Someone who uploads, or a command.
+    /// A user who uploads, or a command.
     User,
-    /// The render function.
     Render,
-    /// The assemble function.
     Assemble,
 }
 
@@ -77,22 +75,22 @@ pub(super) enum Actor {
 pub(super) enum Action {
     /// `s3:GetObject`: `get`, `get_range`, `head`.
     Get,
-    /// `s3:PutObject`: `put`, `upload`.
+    /// The permission `s3:PutObject`, for `put` and `upload`.
     Put,
-    /// `s3:DeleteObject`.
+    /// The permission `s3:DeleteObject`, for `delete`.
     Delete,
-    /// `s3:ListBucket`.
+    /// The permission `s3:ListBucket`, for `list`.
     List,
 }
 
-/// What happens to one invocation.
+/// The faults of one invocation.
 #[derive(Debug)]
 pub(super) struct Fate {
     /// Requests until it is killed; never when it starts at 0.
     countdown: AtomicU32,
     /// Whether the request that it is killed in is lost, too.
     lose_last: bool,
-    /// How much later the request lands otherwise.
+    /// The delay after which the request lands otherwise.
     delay_last: Duration,
     killed: AtomicBool,
     requests: AtomicU64,
@@ -136,11 +134,11 @@ pub(super) enum Moment {
     Building,
 }
 
-/// What the bucket tells the world after a change: who, which key, whether it is there now.
+/// The bucket's notice to the world after a change: the actor, the key, and whether the object is there now.
 pub(super) type Notify = dyn Fn(Actor, &str, bool, &Bucket) + Send + Sync;
 
-/// Is told of a moment at which a change is most awkward.
-pub(super) type Told = dyn Fn(Moment) + Send + Sync;
+/// Called at a moment at which a change is most awkward.
+pub(super) type MomentListener = dyn Fn(Moment) + Send + Sync;
 
 /// The bucket and everything around it.
 pub(super) struct SimEnvironment {
@@ -156,27 +154,27 @@ pub(super) struct SimEnvironment {
     pub(super) throttled: AtomicU64,
     pub(super) bucket: Mutex<Bucket>,
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
-    /// Told of the moments at which a change is most awkward.
-    pub(super) moments: Mutex<Option<Arc<Told>>>,
+    /// Called at the moments at which a change is most awkward.
+    pub(super) moments: Mutex<Option<Arc<MomentListener>>>,
     /// By GIF: the moment from which the oldest listing is that one was made from. Equal files are one GIF.
     gifs: Mutex<BTreeMap<ETag, u64>>,
     /// A GIF gave way to one from an older listing.
     pub(super) set_back: Mutex<Option<String>>,
-    /// Where some frames are too big for one invocation: by which lot.
+    /// The seed by which some frames are too big for one invocation, if any are.
     pub(super) big: Mutex<Option<u64>>,
-    /// What users have overwritten or deleted, and where.
+    /// The objects that users have overwritten or deleted, with their keys.
     pub(super) past: Mutex<Vec<(String, Option<String>)>>,
     /// A write took effect after its sender was killed.
     pub(super) late_writes: AtomicU64,
-    /// What each actor was seen doing, with the prefix up to the first slash.
+    /// The actions of each actor, with the prefix up to the first slash.
     pub(super) seen: Mutex<BTreeSet<(Actor, Action, String)>>,
-    /// Requests by actor.
+    /// The number of requests, by actor.
     pub(super) requests: [AtomicU64; 3],
     /// Requests of the functions by kind, in the order of [`Action`].
     pub(super) kinds: [AtomicU64; 4],
     /// Bytes of objects that were read, by actor.
     pub(super) bytes: [AtomicU64; 3],
-    /// What happened, line by line, for whoever replays a run.
+    /// The events of a run, line by line, for a reader of its replay.
     pub(super) log: Option<Mutex<Vec<String>>>,
 }
 
@@ -238,7 +236,7 @@ impl SimEnvironment {
         *used <= most
     }
 
-    /// How long a request's body is on its way.
+    /// Returns the time that a request's body is on its way.
     fn transfer(&self, limits: Limits, effect: &Effect) -> Duration {
         let bytes = match effect {
             Effect::Put(_, body, _) => body.len() as u64,
@@ -255,8 +253,8 @@ impl SimEnvironment {
 
     fn tell(&self, moment: Moment) {
         let moments = lock(&self.moments).clone();
-        if let Some(told) = moments {
-            told(moment);
+        if let Some(listen) = moments {
+            listen(moment);
         }
     }
 
@@ -285,45 +283,33 @@ impl SimEnvironment {
 pub(super) struct WorldStore {
     pub(super) env: Arc<SimEnvironment>,
     pub(super) actor: Actor,
-    /// The request id.
+    /// The id of the request.
     pub(super) name: String,
     pub(super) fate: Arc<Fate>,
     /// Ends the invocation that uses this.
     pub(super) die: Arc<dyn Fn() + Send + Sync>,
 }
 
-/// What a request answers.
+/// The answer to a request.
 enum Answer {
     Object(Object),
     ETag(ETag),
     Deleted,
     Page(ListPage),
-    /// Of an upload that has begun.
+    /// The id of an upload that has begun.
     Id(u64),
 }
 
-/// What a request does to the bucket.
+/// The effect of a request on the bucket.
 #[derive(Clone)]
 enum Effect {
     Get(String, Range<u64>),
     Put(String, Bytes, PutOptions),
     Delete(String),
     List(ListRequest),
-    /// Begins an upload.
     Begin(String),
-    Part {
-        key: String,
-        id: u64,
-        number: usize,
-        body: Bytes,
-    },
-    Complete {
-        key: String,
-        id: u64,
-        parts: Vec<ETag>,
-        tail: Bytes,
-        options: PutOptions,
-    },
+    Part { key: String, id: u64, number: usize, body: Bytes },
+    Complete { key: String, id: u64, parts: Vec<ETag>, tail: Bytes, options: PutOptions },
     Abort(String, u64),
 }
 
@@ -378,12 +364,13 @@ impl Effect {
     }
 }
 
-/// How often S3's client sends a request that the bucket cannot bear, and its first pause, which doubles.
+/// The number of times that S3's client sends a request that the bucket cannot bear, and its
+/// first pause, which doubles.
 const SENDINGS: u32 = 3;
 const RESENT_AFTER: Duration = Duration::from_secs(1);
 
 impl WorldStore {
-    /// Where the bucket has limits, the client repeats what it cannot bear, as that of `S3Store` does.
+    /// If the bucket has limits, the client repeats a request that the bucket cannot bear, as that of `S3Store` does.
     async fn request(&self, effect: Effect) -> Result<Answer> {
         let sendings = if lock(&self.env.limits).is_some() { SENDINGS } else { 1 };
         let mut pause = RESENT_AFTER;

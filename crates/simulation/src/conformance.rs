@@ -19,7 +19,7 @@ pub async fn check<S: Store>(store: &S, prefix: &str) {
     objects_come_back_as_they_were_put(store, prefix).await;
     keys_may_hold_any_text(store, prefix).await;
     ranges_are_parts_of_the_body(store, prefix).await;
-    missing_objects_are_told_apart(store, prefix).await;
+    missing_objects_have_an_error_of_their_own(store, prefix).await;
     equal_bodies_have_equal_tags(store, prefix).await;
     if_absent_never_replaces(store, prefix).await;
     if_match_replaces_only_that_version(store, prefix).await;
@@ -32,7 +32,7 @@ pub async fn check<S: Store>(store: &S, prefix: &str) {
     uploads_keep_their_condition(store, prefix).await;
     uploads_are_left_and_taken_up(store, prefix).await;
     uploads_are_taken_up_twice_without_harm(store, prefix).await;
-    uploads_that_are_gone_are_told_apart(store, prefix).await;
+    uploads_that_are_gone_have_an_error_of_their_own(store, prefix).await;
 }
 
 /// Body, size, tag and metadata, by `get` and by `head`; a later put replaces them; a delete removes them.
@@ -82,7 +82,7 @@ pub async fn ranges_are_parts_of_the_body<S: Store>(store: &S, prefix: &str) {
 }
 
 /// 404, not another error, for get, range, head and a put with `If-Match`.
-pub async fn missing_objects_are_told_apart<S: Store>(store: &S, prefix: &str) {
+pub async fn missing_objects_have_an_error_of_their_own<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/missing");
     let is_missing = |error: Error| matches!(error, Error::NotFound { key: named } if named == key);
     assert!(is_missing(store.get(&key).await.unwrap_err()));
@@ -339,8 +339,8 @@ pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix
     assert!(store.get(&key).await.unwrap().body == [piece(1), piece(2)].concat());
 }
 
-/// Aborted by whoever took it up; the other one learns that at its next part, or at its end.
-pub async fn uploads_that_are_gone_are_told_apart<S: Store>(store: &S, prefix: &str) {
+/// The upload is aborted by the writer that resumed it. The other writer learns that at its next part, or at its end.
+pub async fn uploads_that_are_gone_have_an_error_of_their_own<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-gone");
     let piece = || Bytes::from(vec![1; 9_000_000]);
     let mut upload = store.upload(&key, PutOptions::always()).await.unwrap();

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use rayfold_pipeline::{Clock, Timestamp};
 
-/// Names a task.
+/// The name of a task.
 pub(super) type TaskId = u64;
 
 type Task = Pin<Box<dyn Future<Output = ()> + Send>>;
@@ -88,7 +88,7 @@ impl Engine {
         drop((tasks, actions));
     }
 
-    /// Waits.
+    /// Waits for a time of the simulated clock.
     pub(super) fn sleep(&self, duration: Duration) -> Sleep {
         let until_us = self.now_us() + micros(duration);
         Sleep { engine: self.clone(), until_us, waker: None }
@@ -179,11 +179,11 @@ pub(super) struct WorldClock {
     pub(super) skew: Duration,
 }
 
-/// What the world's clock shows at the beginning; clocks that are slow still show a time.
+/// The time of the world's clock at the beginning; clocks that are slow still show a time.
 const EPOCH: Timestamp = Timestamp(1_000_000_000_000);
 
 impl WorldClock {
-    /// The store's time.
+    /// Returns a clock that shows the store's time.
     pub(super) fn exact(engine: &Engine) -> Self {
         WorldClock { engine: engine.clone(), skew: Duration::ZERO }
     }

@@ -1,5 +1,5 @@
-//! What a bucket must hold once everything has come to rest, worked out from its scripts alone; and what may follow on a
-//! manifest.
+//! The contents that a bucket must have once everything has come to rest, worked out from its scripts alone, and the
+//! manifests that may follow one another.
 
 use std::num::NonZeroU64;
 
@@ -10,9 +10,9 @@ use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
 use rayfold_pipeline::manifest::{FrameState, Head, Manifest, Status};
 use rayfold_pipeline::store::{Bucket, ETag, Object};
 
-/// What an animation must have come to.
+/// The state that an animation must have reached.
 pub(super) struct Expected {
-    /// Frames in order.
+    /// The frames of the animation, in order.
     frames: Vec<Shot>,
     settings: Option<AnimationSettings>,
 }
@@ -88,7 +88,7 @@ impl Expected {
         refused + manifest.frames.iter().filter(|frame| failed(&frame.state) && good(&frame.script)).count()
     }
 
-    /// Says what differs.
+    /// Returns an error that says what differs.
     pub(super) fn check(&self, bucket: &Bucket, animation: &Animation) -> Result<(), String> {
         let manifest = match bucket.get(&animation.manifest()) {
             Ok(object) => Some(Manifest::decode(animation, &object.body).map_err(|error| error.to_string())?),

@@ -10,7 +10,7 @@
 //! - that holds **without** a sweep, unless something happened that by design only the sweep heals;
 //! - manifests' revisions grow by one, no function writes below `scripts/`, every GIF has its frames in order.
 //!
-//! What the scripts give is worked out here, apart from [`rayfold_pipeline::reconcile()`].
+//! The expected results of the scripts are worked out here, apart from [`rayfold_pipeline::reconcile()`].
 //!
 //! ```
 //! rayfold_simulation::run(1, None).expect("the protocol holds");
@@ -44,13 +44,13 @@ const PIXELS: u32 = 1;
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("seed {seed}: {what}\nreplay it with RAYFOLD_SEED={seed}")]
 pub struct Violation {
-    /// The run.
+    /// The seed of the run.
     pub seed: u64,
-    /// What was found.
+    /// The guarantee that does not hold.
     pub what: String,
 }
 
-/// What a run was like, for reports.
+/// The statistics of a run, for reports.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
     /// Requests to the bucket.
@@ -65,7 +65,7 @@ pub struct Run {
     pub left: u64,
     /// Writes that landed after their writer was killed.
     pub late_writes: u64,
-    /// Who was seen doing what below which prefix, as `function action prefix`.
+    /// The actions of each function below each prefix, as `function action prefix`.
     pub permissions: Vec<String>,
 }
 
@@ -82,7 +82,7 @@ pub fn run(seed: u64, mutation: Option<Mutation>) -> Result<Run, Violation> {
 ///
 /// # Errors
 ///
-/// As [`run`].
+/// The errors of [`run`].
 pub fn replay(seed: u64, mutation: Option<Mutation>, log: &mut Vec<String>) -> Result<Run, Violation> {
     story::run(seed, mutation, Some(log)).map_err(|what| Violation { seed, what })
 }

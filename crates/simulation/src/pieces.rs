@@ -1,4 +1,5 @@
-//! A GIF that takes several invocations, one after the other, while somebody changes its scripts and invocations are killed.
+//! A GIF that takes several invocations, one after the other, while a user changes its scripts
+//! and invocations are killed.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,10 +15,10 @@ use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::store::Bucket;
 use rayfold_pipeline::{Mutation, Policy};
 
-/// How long an invocation may run. With the margin of 5 s and what is kept free it has time for two frames.
+/// The time limit of an invocation. With the margin of 5 s and the spare time it has time for two frames.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// How long a frame takes.
+/// The time that a frame takes.
 const PUSH: Duration = Duration::from_secs(4);
 
 /// By when all must have come to rest.
@@ -26,7 +27,7 @@ const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 /// An animation that is assembled in pieces.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pieces {
-    /// Its frames.
+    /// The number of frames in the animation.
     pub frames: u64,
     /// The first script is overwritten when so many checkpoints have been put, counted from 1.
     pub overwritten_at: Option<u64>,
@@ -36,14 +37,14 @@ pub struct Pieces {
     pub kill: u64,
     /// A rule that is broken.
     pub mutation: Option<Mutation>,
-    /// Decides everything else.
+    /// The seed of everything else.
     pub seed: u64,
 }
 
-/// What came of it.
+/// The result of an assembly in pieces.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PiecesReport {
-    /// How often a GIF was left unfinished to the next invocation.
+    /// The number of times that a GIF was left unfinished to the next invocation.
     pub left: u64,
     /// GIFs that were put.
     pub gifs: u64,
@@ -51,7 +52,7 @@ pub struct PiecesReport {
     pub checkpoints: u64,
     /// The most invocations of the assemble function at once.
     pub at_once: u64,
-    /// Uploads that nobody has finished or aborted.
+    /// The uploads that were neither finished nor aborted.
     pub unfinished: usize,
 }
 
@@ -59,7 +60,7 @@ pub struct PiecesReport {
 ///
 /// # Errors
 ///
-/// What the bucket holds in the end, when that is not the animation, or a lease or a checkpoint.
+/// The final contents of the bucket, if they are not the animation, or include a lease or a checkpoint.
 pub fn in_pieces(pieces: Pieces) -> Result<PiecesReport, String> {
     let engine = Engine::default();
     let env = SimEnvironment::new(engine.clone(), pieces.seed, false);

@@ -20,7 +20,7 @@ use rayfold_pipeline::{
     render_frame, sweep,
 };
 
-/// How often the platform fails its users: once in so many, never when 0.
+/// The rates at which the platform fails its users: one in so many, never when 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Chaos {
     /// An event is lost.
@@ -33,22 +33,22 @@ pub(super) struct Chaos {
     pub(super) too_old: u64,
     /// The longest delay of an event, in milliseconds.
     pub(super) delay_ms: u64,
-    /// How far a function's clock is ahead of the bucket's, at most, in milliseconds.
+    /// The largest time by which a function's clock is ahead of the bucket's, in milliseconds.
     pub(super) skew_ms: u64,
 }
 
-/// What an invocation works on.
+/// The event that an invocation works on.
 #[derive(Debug, Clone)]
 pub(super) enum Work {
     /// An object event of the render function.
     Render(String, Option<ETag>),
-    /// A claim.
+    /// The key of a claim.
     Assemble(String),
-    /// The schedule.
+    /// A tick of the schedule.
     Sweep,
-    /// An on-failure record.
+    /// A record of the on-failure destination.
     Record(Failure),
-    /// `rayfold retry`.
+    /// A call of `rayfold retry`.
     Retry(rayfold_pipeline::keys::Animation),
 }
 
@@ -61,7 +61,7 @@ struct Job {
     queued_us: u64,
 }
 
-/// What happened, for the predicates.
+/// The history of a run, for the predicates.
 #[derive(Debug, Default)]
 pub(super) struct Diary {
     /// Something that by design only the sweep can heal.
@@ -70,7 +70,7 @@ pub(super) struct Diary {
     pub(super) given_up: u64,
     /// GIFs that an invocation left unfinished to the next one.
     pub(super) left: u64,
-    /// What the last sweep did.
+    /// The visits of the last sweep.
     pub(super) last_sweep: Vec<Visit>,
     /// An error that no invocation should have.
     pub(super) bug: Option<String>,
@@ -121,7 +121,6 @@ struct State {
     tokens: u64,
 }
 
-/// The platform.
 pub(super) struct Platform {
     pub(super) env: Arc<SimEnvironment>,
     pub(super) policy: Arc<Policy>,
@@ -216,7 +215,7 @@ impl Platform {
         }
     }
 
-    /// How many invocations may run now.
+    /// Returns the number of invocations that may run now.
     fn places(&self) -> usize {
         let tens = usize::try_from(self.env.engine.now_us() / 10_000_000).unwrap_or(usize::MAX);
         let ramp = lock(&self.ramp).map_or(usize::MAX, |step| step.saturating_mul(tens.saturating_add(1)));
@@ -339,7 +338,7 @@ impl Platform {
         Ok(())
     }
 
-    /// How the platform sees an error; `None` for one that a retry cannot mend.
+    /// Returns the end that the platform sees for an error; `None` for one that a retry cannot mend.
     fn end_of(&self, error: &Error) -> Option<End> {
         match error {
             Error::Key { .. } => None,

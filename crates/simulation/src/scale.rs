@@ -1,5 +1,5 @@
-//! How many requests a frame costs, how soon the claim follows the last result and the GIF the first upload, who waits for a
-//! free place, and what the bucket refuses, for animations of any size and number.
+//! Measurements for animations of any size and number: requests per frame, the time from the last result to the claim
+//! and from the first upload to the GIF, the waits for a free place, and the requests that the bucket refuses.
 //!
 //! No faults here but the bucket's limits, if they are asked for: the requests' latencies (GET 10-25 ms, PUT 25-60 ms, LIST
 //! 20-40 ms a page, and the time of the bodies), the platform's concurrency and the drawing times are all there is.
@@ -20,10 +20,10 @@ use rayfold_pipeline::keys::{Animation, Key, Receipt};
 use rayfold_pipeline::store::{Bucket, PutOptions};
 use rayfold_pipeline::{Clock, Policy, Randomness};
 
-/// How long an invocation may run: as long as Lambda lets one.
+/// The time limit of an invocation: Lambda's maximum.
 const TIMEOUT: Duration = Duration::from_secs(900);
 
-/// What to measure.
+/// The parameters of a measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
     /// Frames of each animation.
@@ -35,13 +35,13 @@ pub struct Scale {
     /// With limits the bucket and the platform have those of AWS: a bucket's requests a second, the time of large bodies, and
     /// 1,000 more invocations every 10 s.
     pub limits: Option<Limits>,
-    /// How long the assembler takes for a frame.
+    /// The time that the assembler takes for a frame.
     pub push: Duration,
     /// Milliseconds that a frame takes, from and to.
     pub draw_ms: (u64, u64),
     /// Milliseconds over which the scripts are uploaded.
     pub upload_ms: u64,
-    /// Decides everything.
+    /// The seed of everything.
     pub seed: u64,
 }
 
@@ -64,10 +64,10 @@ impl Scale {
 /// Bytes of a part that the store for S3 sends.
 const PART_OF_S3: usize = 8 << 20;
 
-/// What Lambda adds to its places every 10 seconds.
+/// The number of places that Lambda adds every 10 seconds.
 const RAMP: usize = 1_000;
 
-/// What was measured.
+/// The results of a measurement.
 #[derive(Debug, Clone, Default)]
 pub struct ScaleReport {
     /// Requests of the render function's invocations, divided by the frames.
@@ -96,7 +96,8 @@ pub struct ScaleReport {
     pub drawing: Duration,
     /// Time of the assemble function's invocations, all together.
     pub assembling_time: Duration,
-    /// How long events waited for a free place, on the average and at most: the render function's, the assemble function's.
+    /// The average and the longest time that events waited for a free place: the render
+    /// function's, the assemble function's.
     pub waits: [[Duration; 2]; 2],
     /// Invocations of the render and of the assemble function.
     pub invocations: [u64; 2],
@@ -106,7 +107,7 @@ pub struct ScaleReport {
     pub throttled: f64,
     /// Bytes of the largest manifest.
     pub manifest: u64,
-    /// How often an assembler left a GIF unfinished to the next one.
+    /// The number of times that an assembler left a GIF unfinished to the next one.
     pub left: u64,
 }
 
@@ -125,7 +126,7 @@ struct Moments {
 ///
 /// # Errors
 ///
-/// What the bucket holds in the end, when that is not the animations.
+/// The final contents of the bucket, if they are not the animations.
 pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let engine = Engine::default();
     let random = Randomness::seeded(scale.seed);

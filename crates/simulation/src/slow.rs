@@ -1,5 +1,5 @@
-//! What a slow upload costs, or a slow removal: scripts that come or go one by one, with `animation.json` saying nothing of
-//! how many there will be.
+//! The cost of a slow upload or a slow removal: scripts come or go one by one, and `animation.json` does not say how
+//! many there will be.
 //!
 //! No faults here. Each finished moment is claimed for; what counts is what the assemblers make of the claims.
 
@@ -18,7 +18,7 @@ use rayfold_pipeline::Policy;
 use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::store::Bucket;
 
-/// How long an invocation may run: as long as Lambda lets one.
+/// The time limit of an invocation: Lambda's maximum.
 const TIMEOUT: Duration = Duration::from_secs(900);
 
 /// A slow change of a set.
@@ -28,15 +28,15 @@ pub struct Slow {
     pub scripts: u64,
     /// Milliseconds between two of them.
     pub apart_ms: u64,
-    /// How many of them go again, as slowly, once all are done.
+    /// The number of scripts that go again, as slowly, once all are done.
     pub removed: u64,
-    /// How long an invocation may run.
+    /// The time limit of an invocation.
     pub timeout: Option<Duration>,
-    /// Decides everything else.
+    /// The seed of everything else.
     pub seed: u64,
 }
 
-/// What it cost.
+/// The cost of a slow upload or removal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SlowReport {
     /// GIFs that were built.
@@ -59,7 +59,7 @@ pub struct SlowReport {
 ///
 /// # Errors
 ///
-/// What the bucket holds in the end, when that is not the animation.
+/// The final contents of the bucket, if they are not the animation.
 pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
     let engine = Engine::default();
     let env = SimEnvironment::new(engine.clone(), slow.seed, false);

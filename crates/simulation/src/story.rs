@@ -23,7 +23,7 @@ use rayfold_pipeline::{Clock, Mutation, Policy, Randomness};
 /// By when a run must have come to rest.
 const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 
-/// How long an invocation may run.
+/// The time limit of an invocation.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// For how long things happen and go wrong.
@@ -37,10 +37,10 @@ const BIG_FRAMES: u64 = 0x0062_6967;
 /// Sets apart how little time the assembler has.
 const HURRY: u64 = 0x0068_7572_7279;
 
-/// How many sweeps a run may need.
+/// The number of sweeps that a run may need.
 const MAX_SWEEPS: u32 = 24;
 
-/// How often `retry` is asked for, at most.
+/// The largest number of calls of `retry`.
 const MAX_RETRIES: u32 = 4;
 
 /// Bytes of an upload's part where GIFs are built in pieces: two or three frames.
@@ -120,7 +120,7 @@ fn policy(random: &Randomness) -> Policy {
         superseded_after: Duration::from_secs([1, 1_000, 7 * 24 * 3600][pick(random, 3)]),
         pause_cap: Duration::from_millis([1, 50, 500][pick(random, 3)]),
         pause_looks: [0, 1, 8][pick(random, 3)],
-        // Of most manifests here 800 bytes are the head and some of the frames.
+        // The first 800 bytes of most manifests here are the head and some of the frames.
         glimpse: [64, 800, 32 * 1024][pick(random, 3)],
         ..Policy::new(PIXELS)
     }
@@ -131,7 +131,7 @@ fn rate(random: &Randomness, rates: [u64; 4]) -> u64 {
     rates[pick(random, 4)]
 }
 
-/// How the platform fails.
+/// Returns the faults of the platform.
 fn chaos(random: &Randomness) -> Chaos {
     Chaos {
         drop: rate(random, [0, 0, 0, 8]),
@@ -143,7 +143,7 @@ fn chaos(random: &Randomness) -> Chaos {
     }
 }
 
-/// How the bucket fails.
+/// Returns the faults of the bucket.
 fn faults(random: &Randomness) -> Faults {
     Faults {
         busy: rate(random, [0, 0, 20, 60]),
@@ -154,7 +154,7 @@ fn faults(random: &Randomness) -> Faults {
     }
 }
 
-/// Has every change of the bucket watched, and told to the platform.
+/// Has every change of the bucket watched, and sent to the platform.
 fn watch(env: &SimEnvironment, platform: &Arc<Platform>) -> Shared<Watch> {
     let watch: Shared<Watch> = Shared::default();
     let (platform, watched) = (Arc::downgrade(platform), watch.clone());
@@ -172,7 +172,7 @@ fn pick(random: &Randomness, of: usize) -> usize {
     usize::try_from(random.below(of as u64)).unwrap_or(0)
 }
 
-/// What users do, and when.
+/// Writes the acts of users and their times.
 fn write_story(
     random: &Randomness,
     env: &Arc<SimEnvironment>,
@@ -306,7 +306,7 @@ fn perhaps_big(world: &SimEnvironment, key: &str, text: String) -> String {
     text
 }
 
-/// What must hold at every moment.
+/// The invariants that hold at every moment.
 #[derive(Default)]
 struct Watch {
     manifest: Option<Manifest>,
@@ -359,7 +359,7 @@ fn is_image(key: &str) -> bool {
     key.ends_with(".png") || key.ends_with(".band")
 }
 
-/// Where a picture belongs: the number that its script's name starts with, the name, the part.
+/// Returns the place of a picture: the number that its script's name starts with, the name, the part.
 fn place_of(picture: &str) -> Option<(u64, String, u64)> {
     let mut fields = picture.split(':');
     let name = fields.next()?;
@@ -377,7 +377,7 @@ struct Judge {
 }
 
 impl Judge {
-    /// Someone overwrites the manifest, a frame or the GIF with what is none. No function is woken by that.
+    /// A user overwrites the manifest, a frame or the GIF with garbage. No function is woken by that.
     fn garble(&self, random: &Randomness) {
         let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
         match random.below(3) {
@@ -390,7 +390,7 @@ impl Judge {
         self.platform.only_the_sweep_heals("the manifest was garbled");
     }
 
-    /// Someone overwrites a frame, or a band of one, with what is none.
+    /// A user overwrites a frame, or a band of one, with garbage.
     fn garble_a_frame(&self, lot: u64, delay: Duration) {
         let (world, platform) = (self.env.clone(), self.platform.clone());
         self.engine.after(delay, move || {
@@ -404,7 +404,7 @@ impl Judge {
         });
     }
 
-    /// Someone puts half of the GIF in its place, with its metadata, once the manifest says which one it is.
+    /// A user puts half of the GIF in its place, with its metadata, once the manifest says which one it is.
     fn cut_off_the_gif(&self, delay: Duration) {
         let (world, platform, animation) = (self.env.clone(), self.platform.clone(), self.animation.clone());
         self.engine.after(delay, move || {

@@ -7,7 +7,7 @@ use rayfold_pipeline::store::MemoryStore;
 
 use super::*;
 
-/// How many seeds every `cargo test` runs.
+/// The number of seeds that every `cargo test` runs.
 const SEEDS: u64 = 1_000;
 
 #[tokio::test]
@@ -50,8 +50,8 @@ fn broken_rules_are_noticed_by_seeds() {
     }
 }
 
-/// Frames in bands, cut anew by whoever looks before the cut is written down, while events are lost, doubled and late,
-/// invocations are killed, answers lost and scripts overwritten.
+/// Frames in bands are cut again by invocations that look before the cut is written down, while events are lost,
+/// doubled and late, invocations are killed, answers lost and scripts overwritten.
 #[test]
 fn frames_in_bands_are_put_together_whatever_happens() {
     let mut put_together = 0;
@@ -72,7 +72,7 @@ fn a_seed_gives_the_same_run() {
     assert!(first.len() > 50 && first == second);
 }
 
-/// What `docs/pipeline.md` says that each function does, besides what only superseded parts lead to.
+/// `docs/pipeline.md` lists the actions of each function, besides those that only superseded parts lead to.
 #[test]
 fn functions_do_only_what_their_permissions_say() {
     let mut seen = std::collections::BTreeSet::new();
@@ -154,7 +154,7 @@ fn a_gif_that_takes_a_day_is_refused() {
     assert_eq!(refused, "the manifest is Refused, not Done");
 }
 
-/// Begun anew, and the upload of what was begun before is given up.
+/// The build starts over, and the upload of the earlier build is aborted.
 #[test]
 fn a_set_that_changes_between_two_pieces_is_begun_anew() {
     let mut noticed = 0;
@@ -173,7 +173,7 @@ fn a_set_that_changes_between_two_pieces_is_begun_anew() {
     assert!(noticed > 1, "the rule that keeps them apart is broken unnoticed");
 }
 
-/// What a killed assembler leaves costs time, never the GIF.
+/// The leftovers of a killed assembler cost time, never the GIF.
 #[test]
 fn assemblers_of_pieces_may_be_killed_at_any_moment() {
     let (mut left, mut unhealed) = (0, 0);

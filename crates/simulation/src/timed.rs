@@ -30,7 +30,7 @@ impl TimedRenderer {
         self.env.engine.sleep(self.env.between_ms(self.draw_ms.0..self.draw_ms.1)).await;
     }
 
-    /// Measured anew it is not always cut the same, and a frame at the edge is drawn after all.
+    /// A frame that is measured again is not always cut the same, and a frame at the edge is drawn after all.
     fn drawer(&self, script: &[u8]) -> InstantRenderer {
         let bands = if is_big(script) { self.env.random.below(6) } else { 1 };
         InstantRenderer { bands: NonZeroU64::new(bands).unwrap_or(NonZeroU64::MIN) }

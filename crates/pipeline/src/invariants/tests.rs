@@ -94,7 +94,7 @@ fn each_count_is_that_of_the_frames() {
 
 #[test]
 fn no_frame_comes_twice() {
-    // Of the third script another frame without a number, so that the counts are right.
+    // The third script has another frame without a number, so that the counts are right.
     let rule = broken_by(|next| {
         next.frames[3].script = ScriptName::new("1").unwrap();
         next.head.scripts = 2;
@@ -119,7 +119,7 @@ fn parts_are_numbered_from_one_without_a_gap() {
     assert_eq!(rule, Some("a split script's parts are all there, in order"));
 }
 
-/// What a status goes with.
+/// The properties of a manifest that go with a status.
 #[derive(Clone, Copy, Default)]
 struct Stand {
     announced: Option<u64>,

@@ -1,4 +1,5 @@
-//! Which rows of a frame: the second of five bands is `2-of-5`. How high a frame is, is its script's to say.
+//! The rows of a frame that are one band: the second of five bands is `2-of-5`. The script
+//! determines the frame's height.
 
 use std::fmt;
 use std::num::NonZeroU64;
@@ -30,7 +31,7 @@ impl Band {
         self.number
     }
 
-    /// How many bands there are.
+    /// Returns the number of bands of the frame.
     pub fn of(self) -> NonZeroU64 {
         self.of
     }

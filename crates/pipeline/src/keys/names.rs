@@ -12,13 +12,14 @@ pub enum Uploaded {
     Script(Animation, ScriptName),
     /// The settings of an animation.
     Settings(Animation),
-    /// What is meant as a script of an animation but has a key that the pipeline cannot take: the animation fails.
+    /// An object that is meant as a script of an animation but has a key that the pipeline cannot
+    /// take: the animation fails.
     Rejected(Animation, &'static str),
-    /// What is not called as scripts and settings are: it is not read, and the manifest warns of it.
+    /// An object that is not named as scripts and settings are: it is not read, and the manifest warns of it.
     NearMiss(Animation, &'static str),
-    /// What belongs to no animation although it is meant as a part of one.
+    /// An object that belongs to no animation although it is meant as a part of one.
     Misplaced(&'static str),
-    /// What counts for nothing: what systems leave in folders, and files that are no scripts.
+    /// An object without meaning: a leftover of a system in a folder, or a file that is no script.
     Nothing,
 }
 
@@ -73,8 +74,8 @@ fn with(animation: Result<Animation>, class: impl FnOnce(Animation) -> Uploaded)
     }
 }
 
-/// What is wrong with the place of an object that is meant as a part of an animation but belongs to none, wherever it lies
-/// in the bucket.
+/// Returns the problem with the place of an object that is meant as a part of an animation but belongs to none,
+/// wherever it lies in the bucket.
 pub fn misplaced(key: &str, bytes: u64) -> Option<&'static str> {
     if key.starts_with(SCRIPTS) {
         return match Uploaded::of(key, bytes) {
@@ -99,7 +100,7 @@ pub fn goes_with(animation: &Animation, key: &str, others: &[Animation]) -> bool
     let Some((folders, file)) = path.rsplit_once('/') else {
         return path.is_empty() || Name::of(path) != Name::Other;
     };
-    // Where what is ignored begins: its own name, or a folder's.
+    // The beginning of an ignored path: its own name, or a folder's.
     let mut owner = animation.as_str().to_owned();
     let mut is_ignored = file.is_empty() || Name::of(file) == Name::Ignored;
     for segment in folders.split('/') {

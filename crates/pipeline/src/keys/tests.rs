@@ -125,7 +125,7 @@ fn leases_are_no_receipts() {
 }
 
 #[test]
-fn manifests_that_are_set_aside_are_told_from_manifests() {
+fn manifests_that_are_set_aside_are_no_manifests() {
     let version = ETag::new("d41.8~c");
     check("manifests/a.json~d41~2e8~7ec", Key::SetAside { animation: animation("a"), version });
     check("manifests/a.json~x.json", Key::Manifest { animation: animation("a.json~x") });

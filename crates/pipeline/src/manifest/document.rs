@@ -1,8 +1,8 @@
 //! The manifest as bytes: what its first line holds, and where a frame's line is, so that neither needs all of it.
 //!
-//! The first line is the [`Head`] and the `places`: at which byte after the second line's end the lines about a script
-//! begin, for a script every so many bytes. Whoever asks about one frame reads the beginning, and then the few lines
-//! between two places.
+//! The first line is the [`Head`] and the `places`: for a script every so many bytes, the byte after the second
+//! line's end at which the lines about it begin. A reader that needs one frame reads the beginning, and then the few
+//! lines between two places.
 
 use std::ops::Range;
 
@@ -16,8 +16,8 @@ use crate::{Error, Result};
 /// The second line, after which the frames follow.
 const FRAMES: &str = "\"frames\":[\n";
 
-/// The most frames to come that a large manifest tells at its beginning, if they take no more than an eighth of what a
-/// reader begins with.
+/// The most frames to come that a large manifest lists at its beginning, if they take no more than an eighth of the
+/// bytes that a reader begins with.
 const MAX_AWAITED: usize = 32;
 
 /// The most places that a manifest tells: with them its head does not grow with the number of frames.
@@ -26,7 +26,7 @@ const MAX_PLACES: usize = 200;
 /// The last revision that every reader of JSON counts to. At a thousand a second it is 285,000 years away.
 const LAST_REVISION: u64 = 1 << 53;
 
-/// Where the lines of a frame begin.
+/// The offset at which the lines of a frame begin.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Place {
     script: ScriptName,
@@ -35,7 +35,7 @@ struct Place {
     at: u64,
 }
 
-/// What the first bytes of a document tell.
+/// The content of the first bytes of a document.
 #[derive(Debug, Clone)]
 pub(crate) struct Beginning {
     /// All but the frames.
@@ -112,7 +112,7 @@ impl Manifest {
         Ok(Bytes::from(text))
     }
 
-    /// Reads the document.
+    /// Parses a whole document.
     ///
     /// # Errors
     ///
@@ -242,10 +242,10 @@ mod tests {
         let manifest = manifest(60);
         let animation = &manifest.head.animation;
         let pending = manifest.frames.len();
-        for (glimpse, told) in [(1, 0..=0), (2_000, 2..=5), (16_000, 18..=30), (1 << 20, 0..=0)] {
+        for (glimpse, expected) in [(1, 0..=0), (2_000, 2..=5), (16_000, 18..=30), (1 << 20, 0..=0)] {
             let body = manifest.encode(glimpse).unwrap();
             let awaited = Beginning::decode(animation, &body).unwrap().unwrap().awaited;
-            assert!(told.contains(&awaited.len()), "{glimpse}: {} of {pending}", awaited.len());
+            assert!(expected.contains(&awaited.len()), "{glimpse}: {} of {pending}", awaited.len());
             assert!(awaited.iter().all(|frame| manifest.frames.contains(frame)), "{glimpse}");
         }
         let mut manifest = manifest;

@@ -1,4 +1,4 @@
-//! What a manifest says, shows and remembers.
+//! The text of a manifest, its summary, and the facts that it carries over.
 
 use super::*;
 use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
@@ -188,7 +188,7 @@ fn of_many_diagnostics_the_first_are_repeated_and_the_others_counted() {
     assert_eq!(shortened.clone().shortened(), shortened);
 }
 
-/// What each line says is read by people, and costs each reader of a large manifest.
+/// People read each line, and each reader of a large manifest pays for it.
 #[test]
 fn a_document_leaves_out_what_says_nothing() {
     let json = |reason: &Reason| serde_json::to_string(reason).unwrap();

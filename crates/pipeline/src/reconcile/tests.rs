@@ -7,7 +7,7 @@ use super::*;
 use crate::Randomness;
 use crate::keys::Key;
 
-/// What the listing of `scripts/film/` and `frames/film/` amounts to.
+/// Returns the manifest for a listing of `scripts/film/` and `frames/film/`.
 fn manifest(listing: &str, settings: &str) -> Manifest {
     let (scripts, results) = listed(listing);
     let settings = match settings {
@@ -38,7 +38,7 @@ fn listed(listing: &str) -> (Scripts, Results) {
     (scripts, results)
 }
 
-/// What a manifest says, in short.
+/// Returns a short summary of a manifest.
 fn said(manifest: &Manifest) -> String {
     let mut text = format!("{:?}", manifest.head.status).to_lowercase();
     for frame in &manifest.frames {
@@ -110,7 +110,7 @@ fn receipts_of_other_versions_and_other_scripts_count_for_nothing() {
 fn a_split_script_has_just_as_many_frames_as_the_split_says() {
     let listing = "1.txt a\n1@a-p1.split-2\n1@a-p1/3.png\n1@a-p1/2.error.json";
     check(listing, "", "rendering, 1/1 a pending, 1/2 a failed by 1@a-p1/2.error.json");
-    // Of two splits, as of two versions of the reader, the one with more frames.
+    // Two splits, as of two versions of the reader: the one with more frames counts.
     let two = "1.txt a\n1@a-p1.split-1\n1@a-p2.split-2\n1@a-p1/1.png\n1@a-p1/2.png";
     check(two, "", "done, 1/1 a p1, 1/2 a p1");
     // A frame of the whole script says nothing of its parts, and the other way round.

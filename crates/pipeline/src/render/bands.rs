@@ -1,15 +1,19 @@
-//! A frame that is too big for one invocation is drawn in bands by several, and put together by whoever finds all of them.
+//! A frame that is too big for one invocation is drawn in bands by several. The invocation that finds all
+//! bands puts them together.
 //!
-//! 1. Whoever finds a frame too big says so by a receipt, `cut-<k>`, and wakes an invocation for each band by an object below
-//!    `parts/`. Nobody who sees that receipt measures or cuts again; of two cuts that were made at once the finer one counts.
+//! 1. An invocation that finds a frame too big records it in a receipt, `cut-<k>`, and wakes an invocation for each
+//!    band by an object below `parts/`. An invocation that sees that receipt does not measure or cut again; of two
+//!    cuts that were made at once the finer one counts.
 //! 2. Each puts its band below `frames/`, only if absent, and lists what there is of the frame. If all bands of its cut are
 //!    there it puts them together, and puts the frame as if it had been drawn in one piece: nothing behind that knows of bands.
-//! 3. Whoever is woken for the frame itself wakes the bands that are missing, or puts together what is there.
+//! 3. An invocation that is woken for the frame itself wakes the bands that are missing, or puts
+//!    together what is there.
 //!
 //! A band's key has its script's version and the pixel version, so that bands of different pictures cannot meet; and a band is
 //! never cut. Which rows a band has, and what is in it, is the renderer's to know.
 //!
-//! Invariant: whoever leaves has listed after its own band was put, so that the last one to put its band finds all of them.
+//! Invariant: an invocation that leaves has listed after its own band was put, so the last one to put its band
+//! finds all of them.
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -44,17 +48,17 @@ pub trait BandJoiner: Send {
     fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
 }
 
-/// Which rows an event is about, and who woke it.
+/// The rows that an event is about, and the retry that woke it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Woken {
     pub(crate) band: Band,
-    /// Of the renderer that cut the frame.
+    /// The pixel version of the renderer that cut the frame.
     pub(crate) pixels: u32,
-    /// The retry's; 0 for whoever cut the frame.
+    /// The number of the retry's attempt; 0 if the invocation that cut the frame woke it.
     pub(crate) attempt: u64,
 }
 
-/// What the receipts of a frame say about its bands.
+/// The bands of a frame, from its receipts.
 #[derive(Debug, Default)]
 pub(crate) struct Bands {
     cut: Option<NonZeroU64>,
@@ -62,7 +66,7 @@ pub(crate) struct Bands {
 }
 
 impl Bands {
-    /// Those that were drawn with this pixel version.
+    /// Returns the bands that were drawn with this pixel version.
     pub(crate) fn of(receipts: &[ReceiptFound], of_part: Part, pixels: u32) -> Self {
         let mut bands = Bands::default();
         for found in receipts {
@@ -89,7 +93,7 @@ impl Bands {
     }
 }
 
-/// What came of a band's event: there is nothing to fold as long as others are to come.
+/// The result of a band's event: there is nothing to fold as long as others are to come.
 type Came = (Outcome, Option<Fact>);
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
@@ -120,8 +124,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
         let fact = Fact::Version(subject.name.clone(), script.version);
-        // Whoever was woken for them may be drawing. But whoever cut the frame may also have died over putting these objects,
-        // and a store need not tell of one that nobody was told is put; and they may have come while another version was current.
+        // An invocation that was woken for them may be drawing. But the one that cut the frame may also have died
+        // while it put these objects, and a store need not send an event for an object whose put was never
+        // acknowledged; and the bands may have come while another version was current.
         let attempt = retry.map_or(0, |(attempt, _)| attempt.get());
         self.wake_bands(subject, &tag, missing, attempt).await?;
         Ok((Outcome::Cut(count), Some(fact)))
@@ -185,7 +190,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         drawn
     }
 
-    /// Puts the frame together of all its bands. One that cannot be read is drawn anew, here.
+    /// Puts the frame together of all its bands. A band that cannot be read is drawn again, here.
     async fn put_together<R: Renderer>(
         &self,
         renderer: &R,
@@ -208,7 +213,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let receipt = Receipt::Frame { name: name.clone(), tag, part: *part };
         let put = self.put_receipt(&animation.receipt(&receipt), frame, "image/png").await?;
         let fact = Fact::Drawn(name.clone(), script.version, *part, self.policy.pixels);
-        // Of two that put the last bands at once each may have found all of them.
+        // If two put the last bands at once, each may have found all of them.
         Ok((put.map_or(Outcome::Present, |_| Outcome::Drawn), Some(fact)))
     }
 

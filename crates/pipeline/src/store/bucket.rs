@@ -1,5 +1,5 @@
-//! A bucket's contents and rules as a plain value, one request at a time: what the memory store and the simulation
-//! share. It has no clock: every write is told the time.
+//! A bucket's contents and rules as a plain value, one request at a time. The memory store and the simulation share
+//! it. It has no clock: every write passes the time.
 
 use std::collections::BTreeMap;
 use std::ops::{Bound, Range};
@@ -11,7 +11,7 @@ use super::{Condition, ETag, ListPage, ListRequest, Listed, Object, ObjectInfo, 
 use crate::clock::Timestamp;
 use crate::{Error, Result};
 
-/// Objects by key.
+/// The objects of a bucket by key, and its unfinished uploads.
 #[derive(Debug, Clone, Default)]
 pub struct Bucket {
     objects: BTreeMap<String, Object>,
@@ -21,7 +21,7 @@ pub struct Bucket {
 }
 
 impl Bucket {
-    /// Reads an object.
+    /// Reads a whole object.
     pub fn get(&self, key: &str) -> Result<Object> {
         self.objects.get(key).cloned().ok_or_else(|| Error::NotFound { key: key.to_owned() })
     }
@@ -102,7 +102,7 @@ impl Bucket {
         self.uploads.remove(&id);
     }
 
-    /// How many uploads are neither finished nor given up.
+    /// Returns the number of uploads that are neither finished nor aborted.
     pub fn unfinished_uploads(&self) -> usize {
         self.uploads.len()
     }

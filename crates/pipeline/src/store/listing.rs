@@ -62,7 +62,7 @@ mod tests {
         bucket
     }
 
-    /// How many objects, the last of them, and how many requests it took.
+    /// Returns the number of objects, the last of them, and the number of requests.
     async fn read(bucket: &Bucket, end: Option<&str>) -> (usize, Option<String>, u32) {
         let requests = Mutex::new(0);
         let page = |request| {

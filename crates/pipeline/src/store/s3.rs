@@ -49,7 +49,7 @@ pub use upload::S3Upload;
 use answers::{decoded, error_of, status};
 use upload::headers;
 
-/// Of one request, the repetitions not counted in: longer than any object of the pipeline takes.
+/// The timeout of one request, the repetitions not counted in: longer than any object of the pipeline takes.
 const READ_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// The first try and its repetitions.
@@ -62,18 +62,18 @@ pub struct S3Store {
     bucket: String,
 }
 
-/// Who and where, when it is not the environment that says so.
+/// The credentials and the endpoint, when the environment does not name them.
 #[derive(Clone)]
 pub struct Connection {
     /// With its scheme: `http://127.0.0.1:9000`.
     pub endpoint: String,
-    /// The store's region.
+    /// The region for which requests are signed.
     pub region: String,
     /// The access key's id.
     pub access_key: String,
-    /// Its secret.
+    /// The secret key that belongs to the access key.
     pub secret_key: String,
-    /// What comes with a temporary key.
+    /// The session token of a temporary key.
     pub session_token: Option<String>,
 }
 
@@ -156,7 +156,7 @@ impl S3Store {
         self.client.config().region().map(Region::as_ref)
     }
 
-    /// The bucket's name.
+    /// Returns the bucket's name.
     pub fn bucket(&self) -> &str {
         &self.bucket
     }

@@ -1,4 +1,4 @@
-//! What an assembler builds, waits for, leaves to the next one, refuses and takes away.
+//! The work of an assembler: the GIFs that it builds, waits for, leaves to the next one, refuses and takes away.
 
 use super::*;
 use crate::fakes::film;
@@ -26,7 +26,7 @@ impl World {
         Some(String::from_utf8_lossy(&object.body).into_owned())
     }
 
-    /// What the GIF of all frames is.
+    /// Returns the GIF of all frames.
     pub(super) fn film_of(&self, frames: u64) -> String {
         let name = |number: u64| ScriptName::new(&number.to_string()).unwrap();
         let text = |number: u64| format!("frame {number}");
@@ -39,7 +39,7 @@ impl World {
         Joiner { takes, ..self.joiner() }
     }
 
-    /// Nobody holds a lease, nothing is unfinished, and the manifest names the GIF, if there is one.
+    /// Returns whether no lease is held, nothing is unfinished, and the manifest names the GIF, if there is one.
     pub(super) fn is_at_rest(&self) -> bool {
         let head = self.manifest().head;
         let bucket = self.store.bucket.lock().unwrap();
@@ -221,7 +221,7 @@ async fn a_gif_of_this_set_that_nobody_has_named_is_named_and_one_in_its_place_i
     assert_eq!((assembled.rounds, assembled.built), (1, 0));
     assert_eq!(world.gif().unwrap(), "GIF");
     assert!(world.is_at_rest());
-    // Somebody cuts it off, and keeps its metadata.
+    // Another client cuts it off, and keeps its metadata.
     {
         let mut bucket = world.store.bucket.lock().unwrap();
         let metadata = bucket.head(GIF).unwrap().metadata;
@@ -234,7 +234,7 @@ async fn a_gif_of_this_set_that_nobody_has_named_is_named_and_one_in_its_place_i
 }
 
 #[tokio::test]
-async fn an_assembler_leaves_the_gif_to_whoever_holds_the_lease() {
+async fn an_assembler_leaves_the_gif_to_the_holder_of_the_lease() {
     let world = World::new();
     let claim = world.announced(2).await;
     let until = world.store.clock.now().after(seconds(600)).0;
@@ -259,7 +259,7 @@ async fn an_assembler_leaves_the_gif_to_whoever_holds_the_lease() {
 
 /// It began after the first look at the lease, which was free then.
 #[tokio::test]
-async fn an_assembler_leaves_the_gif_to_whoever_has_just_taken_the_lease() {
+async fn an_assembler_leaves_the_gif_to_one_that_has_just_taken_the_lease() {
     let world = World::new();
     let claim = world.announced(2).await;
     let until = world.store.clock.now().after(seconds(600)).0;
@@ -277,7 +277,7 @@ async fn an_assembler_leaves_the_gif_to_whoever_has_just_taken_the_lease() {
 
 /// `rayfold dev` was stopped while an assembler waited, and started again: no assembler of before is alive.
 #[tokio::test]
-async fn whoever_begins_anew_waits_for_no_assembler_of_before() {
+async fn a_restarted_platform_waits_for_no_assembler_of_before() {
     for (until, is_freed) in [(599, true), (600, false), (700, false)] {
         let mut world = World::new();
         world.announced(2).await;
@@ -299,7 +299,7 @@ async fn whoever_begins_anew_waits_for_no_assembler_of_before() {
     }
 }
 
-/// Else the retry that a user asks for waits until its time is up.
+/// Otherwise the retry that a user asks for waits until its time is up.
 #[tokio::test]
 async fn an_assembler_that_the_platform_has_given_up_holds_nobody_off() {
     for (assembler, is_freed) in [("given-up", true), ("another", false), ("", false)] {
@@ -356,7 +356,7 @@ async fn an_unfinished_gif_that_nobody_needs_any_more_is_given_up() {
     }
 }
 
-/// Whoever found the lease taken was woken for a manifest that the holder had not seen.
+/// The assembler that found the lease taken was woken for a manifest that the holder had not seen.
 #[tokio::test]
 async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
     let world = World::new();
@@ -417,7 +417,8 @@ async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_o
     assert_eq!(world.manifest().head.status, Status::Done);
 }
 
-/// A frame was gone when it looked, and was there again when it had written that down: nobody else is woken for that.
+/// A frame was gone when it looked, and was there again when it had written that down: no other invocation
+/// is woken for that.
 #[tokio::test]
 async fn an_assembler_that_has_written_something_looks_again() {
     let world = World::new();
@@ -452,7 +453,7 @@ async fn a_lease_that_the_listing_does_not_show_is_not_asked_for() {
     assert_eq!(asked.load(Ordering::Relaxed), 1, "the look with which every assembler begins");
 }
 
-/// Somebody has put half of it in its place, and then the set was another one for a moment.
+/// Another client has put half of it in its place, and then the set was another one for a moment.
 #[tokio::test]
 async fn the_gif_of_a_set_is_remembered_while_the_set_changes_and_changes_back() {
     let world = World::new();
@@ -465,7 +466,7 @@ async fn the_gif_of_a_set_is_remembered_while_the_set_changes_and_changes_back()
     assert_eq!(world.gif(), Some(world.film_of(2)));
 }
 
-/// Of a GIF that is put, and of one that is found.
+/// A GIF that is put, and one that is found.
 #[tokio::test]
 async fn a_gif_is_named_in_no_manifest_but_the_one_that_was_read() {
     for is_found in [false, true] {

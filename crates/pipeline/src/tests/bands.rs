@@ -1,4 +1,4 @@
-//! Frames that are too big for one invocation: what becomes of their bands when somebody meddles, and when events are lost.
+//! Frames that are too big for one invocation, and their bands, when another client meddles and when events are lost.
 
 use super::*;
 use crate::manifest::Frame;
@@ -102,7 +102,7 @@ async fn each_frame_of_a_script_may_be_big() {
 
 /// The last one is killed when its band is put; the platform's next attempt at its event finds all bands.
 #[tokio::test]
-async fn bands_that_nobody_put_together_are_by_whoever_comes_next() {
+async fn bands_that_are_not_put_together_are_by_the_next_invocation() {
     let world = World::new();
     let version = world.upload_big("big frame 1").await;
     let keys = world.keys("parts/");
@@ -114,7 +114,7 @@ async fn bands_that_nobody_put_together_are_by_whoever_comes_next() {
     }
 }
 
-/// Else a frame whose putting together kills the process would be woken for ever.
+/// Otherwise a frame whose putting together kills the process would be woken for ever.
 #[tokio::test]
 async fn putting_together_counts_as_an_attempt() {
     let world = World::new();
@@ -152,7 +152,7 @@ async fn bands_of_different_versions_never_meet() {
     assert_eq!(world.frame(&second), None);
 }
 
-/// Whoever cut the frame may have died before the store had told of what it put.
+/// The invocation that cut the frame may have died before the store had sent the events of its writes.
 #[tokio::test]
 async fn an_event_of_a_frame_that_is_cut_wakes_all_that_is_missing() {
     let world = World::new();
@@ -275,7 +275,7 @@ async fn a_failure_record_names_the_band_and_blames_nobody_who_only_woke_others(
     let FrameState::Failed(fault) = &world.manifest().frames[0].state else { panic!() };
     let message = &fault.reason.as_ref().unwrap().message;
     assert_eq!(message, "band 2 of 3: timed out in each of 3 attempts");
-    // Of another version it says nothing.
+    // It says nothing of another version.
     world.put(&script, "big frame 2");
     let recorded = world.record(&woken(&version, "2-of-3", 0), None, End::TimedOut).await;
     assert!(matches!(recorded, Recorded::Resolved(_)), "{recorded:?}");
@@ -340,7 +340,7 @@ async fn a_retry_of_what_failed_begins_anew_and_of_what_is_on_its_way_goes_on() 
     assert_eq!(world.keys("frames/"), Vec::<String>::new());
 }
 
-/// Whoever was woken by a renderer of other pixels cuts anew: no frame is put together of both.
+/// An invocation that a renderer of other pixels woke cuts again: no frame is put together of both.
 #[tokio::test]
 async fn bands_of_different_renderers_never_meet() {
     let mut world = World::new();

@@ -24,7 +24,7 @@ fn is_like(error: &Error, other: &Error) -> bool {
 }
 
 impl World {
-    /// Of twelve frames five are taken when the GIF is left unfinished. Gives the claim.
+    /// Takes five of twelve frames and leaves the GIF unfinished. Returns the claim.
     async fn unfinished(&mut self) -> String {
         self.policy.spare_frames = 1;
         let claim = self.announced(12).await;
@@ -54,7 +54,7 @@ impl World {
     }
 }
 
-/// How many parts the GIF of so many frames has, if the first are sent already.
+/// Returns the number of parts that the GIF of so many frames has, if the first are sent already.
 async fn parts(is_begun: bool) -> u32 {
     let mut world = World::new();
     let claim = if is_begun { world.unfinished().await } else { world.announced(2).await };
@@ -114,7 +114,8 @@ async fn a_gif_whose_parts_cannot_be_sent_is_given_up_and_why_is_said() {
     }
 }
 
-/// What may pass leaves it to the next attempt, an upload that is gone is begun anew, and all else is said.
+/// A transient error leaves it to the next attempt, an upload that is gone is begun again, and all
+/// other errors are reported.
 #[tokio::test]
 async fn an_unfinished_gif_is_gone_on_with_unless_its_upload_is_gone() {
     let last = parts(true).await;
@@ -184,7 +185,7 @@ async fn only_what_makes_the_same_gif_is_gone_on_with() {
         let assembled = world.assemble(&world.slow(seconds(10)), &claim).await.unwrap();
         assert_eq!((assembled.built, assembled.building), (1, seconds(expected)), "{what}");
         assert!(world.keys(CHECKPOINT).is_empty());
-        // Of garbage nobody knows the upload: the bucket's rule clears it away.
+        // The upload in garbage is unknown: the bucket's rule clears it away.
         assert_eq!(world.uploads(), usize::from(what == "garbage"), "{what}");
     }
 }

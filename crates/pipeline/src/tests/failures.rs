@@ -1,11 +1,11 @@
-//! What becomes of events that the platform has given up.
+//! The handling of events that the platform has given up.
 
 use super::*;
 
 const SCRIPT: &str = "scripts/film/1.txt";
 
 impl World {
-    /// A script that nobody has drawn, and its version.
+    /// Uploads a script that no invocation has drawn, and returns its version.
     fn pending(&self) -> ETag {
         self.put(SCRIPT, "frame 1")
     }
@@ -84,8 +84,8 @@ async fn other_failed_events_are_about_what_is_there_now() {
     assert!(matches!(recorded, Err(Error::Key { .. })), "{recorded:?}");
 }
 
-/// What may pass is tried again a few times, and then left to the sweep; a frame that an invocation has begun in vain as often
-/// as that is given up. What nobody has tried is never given up.
+/// A transient error is tried again a few times, and then left to the sweep; a frame that an invocation has begun in
+/// vain as often as that is given up. A frame that no invocation has tried is never given up.
 #[tokio::test]
 async fn a_frame_is_woken_left_or_given_up_as_its_attempts_say() {
     for (end, attempts, begun, expected) in [
@@ -150,7 +150,7 @@ async fn a_set_that_cannot_be_assembled_in_any_attempt_is_refused() {
     for (end, what) in [(End::TimedOut, "timed out"), (End::Died, "died, most likely for lack of memory,")] {
         let world = World::new();
         let claim = world.claimed().await;
-        // Of an older set.
+        // The GIF is of an older set.
         world.put_gif("another");
         let recorded = world.record(&claim, None, end).await;
         assert!(matches!(recorded, Recorded::Refused(_)), "{recorded:?}");
@@ -198,7 +198,7 @@ async fn the_manifest_shows_a_frame_that_is_left_to_the_sweep() {
     assert_eq!(world.manifest().frames[0].state, FrameState::Pending);
 }
 
-/// Somebody has put half of it in its place, with what it says of itself.
+/// Another client has put half of it in its place, with its metadata.
 #[tokio::test]
 async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
     let world = World::new();

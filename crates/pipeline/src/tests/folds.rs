@@ -28,7 +28,7 @@ fn name() -> ScriptName {
     ScriptName::new("1").unwrap()
 }
 
-/// Someone else writes the next revision, which says the same.
+/// Another invocation writes the next revision, which says the same.
 pub(super) fn write_next(bucket: &mut Bucket, now: Timestamp) {
     let mut manifest = Manifest::decode(&World::film(), &bucket.get(MANIFEST).unwrap().body).unwrap();
     manifest.head.revision += 1;
@@ -36,7 +36,8 @@ pub(super) fn write_next(bucket: &mut Bucket, now: Timestamp) {
     bucket.put(now, MANIFEST, manifest.encode(32 * 1024).unwrap(), PutOptions::always()).unwrap();
 }
 
-/// Of a manifest that is larger than what is read at once the lines are looked up, but not by whoever has just put the result.
+/// The lines of a manifest that is larger than what is read at once are looked up, but not by the invocation that has
+/// just put the result.
 #[tokio::test]
 async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
     for (glimpse, age, leaves) in [
@@ -65,7 +66,7 @@ async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
     }
 }
 
-/// What cannot be read shows nothing, not even that something is not there.
+/// An unreadable manifest shows nothing, not even that something is not there.
 #[tokio::test]
 async fn a_manifest_that_cannot_be_read_is_made_anew_whatever_the_fact_is() {
     for fact in [Fact::Absent(name()), Fact::Settings(None), Fact::Fold] {
@@ -129,7 +130,7 @@ async fn a_fold_leaves_when_the_second_revision_is_written_and_not_before() {
 
 /// It was killed between its commit and its claim, and the platform tries its event again.
 #[tokio::test]
-async fn whoever_finds_its_own_commit_claims() {
+async fn a_finisher_that_finds_its_own_commit_claims() {
     let world = World::new();
     world.upload("1.txt", "frame 1").await;
     let version = world.store.bucket.lock().unwrap().head(SCRIPT).unwrap().etag;
@@ -218,7 +219,7 @@ async fn a_manifest_that_somebody_else_has_just_written_is_not_written_over() {
     assert_eq!((head.total, head.revision), (2, 3));
 }
 
-/// What a finisher does of whom another frame's result is `to come`: its fold, and its requests.
+/// Returns the fold and the requests of a finisher of whom another frame's result is `to come`.
 async fn finishes(world: &World) -> (Folded, Vec<String>) {
     let requests = Arc::new(Mutex::new(Vec::new()));
     let noted = requests.clone();
@@ -256,7 +257,7 @@ async fn a_finisher_leaves_while_another_frame_is_to_come_and_the_last_one_lists
     assert_eq!((world.manifest().head.done, world.manifest().head.revision), (3, 2));
 }
 
-/// Whoever draws it has looked already, or draws another version, or nobody does.
+/// The invocation that draws it has looked already, or draws another version, or none draws it.
 #[tokio::test]
 async fn a_frame_that_is_there_or_is_no_longer_current_is_left_for_by_nobody() {
     for (key, text) in [
@@ -439,7 +440,7 @@ async fn the_last_one_writes_the_manifest_whatever_the_lot_says() {
     }
 }
 
-/// With many finishers one listing should serve all; with few there is nobody to wait for.
+/// With many finishers one listing should serve all; with few there is none to wait for.
 #[tokio::test]
 async fn a_finisher_pauses_before_it_lists_only_in_a_crowd() {
     for (others, looks) in [(0, 1), (7, 1), (8, 2)] {
@@ -451,7 +452,7 @@ async fn a_finisher_pauses_before_it_lists_only_in_a_crowd() {
             let version = ETag::new(&format!("older{number}"));
             world.put(&format!("frames/film/1@{version}-p1.png"), "drawn");
         }
-        // Nobody draws the first one's new version, so that there is none to leave for.
+        // No invocation draws the first one's new version, so that there is none to leave for.
         world.put(SCRIPT, "hang 2");
         let (folded, requests) = finishes(&world).await;
         assert_eq!(folded, Folded::Committed);
@@ -473,7 +474,7 @@ async fn a_page_is_written_down_only_over_the_manifest_that_was_read_before_it()
     let mut done = false;
     world.meddle(move |request, bucket, now| {
         if request == "put manifests/film.json" && !std::mem::replace(&mut done, true) {
-            // The frame goes, and someone else writes.
+            // The frame goes, and another invocation writes.
             bucket.delete(&frame);
             write_next(bucket, now);
         }
@@ -508,7 +509,7 @@ async fn the_writer_of_a_manifest_leaves_for_no_frame_because_of_an_older_page()
     assert_eq!(world.manifest().head.done, 2);
 }
 
-/// Of so many receipts a page does not show all.
+/// There are more receipts than a page shows.
 #[tokio::test]
 async fn a_finisher_looks_at_one_frame_where_there_is_more_than_a_page() {
     let world = one_of_three().await;

@@ -1,4 +1,4 @@
-//! What is asked of the store to see how an animation stands, and what is made of the answers.
+//! The requests by which an animation is observed, and the conclusions from the answers.
 
 use super::*;
 use crate::fold::fold;
@@ -39,8 +39,9 @@ async fn of_many_keys_that_no_script_can_have_the_first_are_named_and_the_others
         world.upload("1.txt", "frame 1").await;
         let head = world.manifest().head;
         assert_eq!((head.rejected.len(), head.status), (100 + usize::from(last.is_some()), Status::Failed));
-        let told = last.map(|more| ("scripts/film/".to_owned(), format!("{more} that no script can have")));
-        assert_eq!(head.rejected.get(100).map(|more| (more.key.clone(), more.problem.clone())), told);
+        let expected =
+            last.map(|more| ("scripts/film/".to_owned(), format!("{more} that no script can have")));
+        assert_eq!(head.rejected.get(100).map(|more| (more.key.clone(), more.problem.clone())), expected);
     }
 }
 

@@ -1,5 +1,5 @@
-//! What is sent before what: a request that comes too early is answered by what is not there yet, and whoever is killed
-//! between two of them leaves what heals.
+//! The order of requests: a request that comes too early is answered by what is not there yet, and an invocation that
+//! is killed between two of them leaves what heals.
 
 use super::assemblies::{CHECKPOINT, GIF, LEASE, seconds};
 use super::*;
@@ -46,7 +46,7 @@ impl World {
     }
 }
 
-/// Whoever finds that a script is split asks for no more of its parts than are late.
+/// An invocation that finds that a script is split asks for no more of its parts than are late.
 #[tokio::test]
 async fn a_script_is_split_when_its_parts_are_there() {
     let world = World::new();
@@ -55,7 +55,7 @@ async fn a_script_is_split_when_its_parts_are_there() {
     sent.comes_before(("put parts/", ".json"), ("put frames/", ".split-3"));
 }
 
-/// A band that comes before the cut finds nobody who wakes the others.
+/// A band that comes before the cut finds no invocation that wakes the others.
 #[tokio::test]
 async fn a_frame_is_cut_before_its_bands_are_woken() {
     let world = World::new();
@@ -76,7 +76,7 @@ async fn an_assembler_reads_the_manifest_then_the_gif_and_then_lists() {
     sent.comes_before(("head ", GIF), ("list ", "film/"));
 }
 
-/// Whoever comes in between has a manifest that it can read, or one that is set aside already.
+/// An invocation that comes in between has a manifest that it can read, or one that is set aside already.
 #[tokio::test]
 async fn what_cannot_be_read_is_set_aside_before_its_place_is_taken() {
     let world = World::new();
@@ -88,7 +88,7 @@ async fn what_cannot_be_read_is_set_aside_before_its_place_is_taken() {
     assert_eq!(sent.places("put manifests/", ".json~"), puts[..1]);
 }
 
-/// Whoever is woken before finds the lease taken, and leaves.
+/// An assembler that is woken before finds the lease taken, and leaves.
 #[tokio::test]
 async fn the_next_assembler_is_woken_when_the_lease_is_free() {
     let mut world = World::new();
@@ -126,7 +126,7 @@ async fn what_is_unfinished_is_given_up_before_the_lease() {
     sent.comes_before(("abort ", GIF), ("delete ", LEASE));
 }
 
-/// Whoever is woken before finds the result that is to go, and draws nothing.
+/// An invocation that is woken before finds the result that is to go, and draws nothing.
 #[tokio::test]
 async fn what_is_to_be_drawn_again_is_deleted_before_it_is_woken() {
     let world = World::new();

@@ -1,10 +1,11 @@
-//! What a step makes of a store that says no: what may pass is tried again, what will not is said at once.
+//! The reaction of a step to a store that refuses: a transient error is tried again, a permanent one
+//! is reported at once.
 
 use super::*;
 use crate::fold::Folded;
 use crate::lease::HeldLease;
 
-/// Each of the errors after which a conditional put may succeed when all is looked at anew.
+/// Returns each of the errors after which a conditional put may succeed when all is read again.
 fn passing() -> [Error; 5] {
     let (key, source) = ("k".to_owned(), || "x".into());
     [
@@ -70,7 +71,8 @@ async fn ones_own_lease_need_not_be_renewed() {
     assert!(taken.unwrap().is_some());
 }
 
-/// The put took place and its answer was lost. Whoever takes the lease for another's leaves, and holds off all others.
+/// The put took place and its answer was lost. An assembler that takes the lease for another's leaves, and
+/// holds off all others.
 #[tokio::test]
 async fn a_left_lease_that_was_taken_without_an_answer_is_ones_own() {
     const TAKEN: &str = r#"{"assembler":"request-0","until":9000000,"checkpoint":true}"#;
@@ -113,7 +115,8 @@ async fn a_manifest_that_may_not_be_put_is_said_at_once() {
     assert_eq!(world.keys("assemblies/"), [""; 0]);
 }
 
-/// The platform's next attempt at an event runs until later: nobody is to take the lease over from it before.
+/// The platform's next attempt at an event runs until later: no other assembler is to take the lease
+/// over from it before.
 #[tokio::test]
 async fn a_lease_is_ones_own_for_as_long_as_one_may_run() {
     for there in

@@ -1,4 +1,4 @@
-//! What an event of the render function leads to, how long it may take, and what a retry on demand does.
+//! The results of an event of the render function, its time limit, and the work of a retry on demand.
 
 use super::*;
 use crate::fakes::Paste;
@@ -8,17 +8,17 @@ use crate::retry::Retried;
 
 const SCRIPT: &str = "scripts/film/1.txt";
 
-/// Draws as long as it is told to, or for ever.
+/// Draws for as long as `takes` says, or for ever.
 struct Painter {
     clock: JumpingClock,
     takes: Option<Duration>,
-    /// What it was told that it may take.
-    told: Mutex<Vec<Option<Duration>>>,
+    /// The time limits that it was given, in order.
+    limits: Mutex<Vec<Option<Duration>>>,
 }
 
 impl Painter {
     fn new(world: &World, takes: Option<Duration>) -> Self {
-        Painter { clock: world.store.clock.clone(), takes, told: Mutex::default() }
+        Painter { clock: world.store.clock.clone(), takes, limits: Mutex::default() }
     }
 
     async fn take_time(&self) {
@@ -45,7 +45,7 @@ impl Renderer for Painter {
         part: Part,
         left: Option<Duration>,
     ) -> Result<Drawing> {
-        self.told.lock().unwrap().push(left);
+        self.limits.lock().unwrap().push(left);
         self.take_time().await;
         DRAWER.draw(name, script, part, left).await
     }
@@ -143,7 +143,7 @@ async fn all_that_is_drawn_of_a_frame_in_bands_is_drawing() {
 }
 
 #[tokio::test]
-async fn a_drawing_is_told_its_time_and_stopped_before_the_deadline() {
+async fn a_drawing_gets_a_time_limit_and_is_stopped_before_the_deadline() {
     let mut world = World::new();
     world.put(SCRIPT, "frame 1");
     let painter = Painter::new(&world, Some(Duration::ZERO));
@@ -155,7 +155,7 @@ async fn a_drawing_is_told_its_time_and_stopped_before_the_deadline() {
     let error = world.paint(&painter, SCRIPT).await.unwrap_err();
     assert_eq!(error.to_string(), "out of time: 1 is not drawn after 9500 ms");
     assert_eq!(world.store.clock.now(), begin.after(ms(9_500)));
-    assert_eq!(*painter.told.lock().unwrap(), [None, Some(ms(9_500))]);
+    assert_eq!(*painter.limits.lock().unwrap(), [None, Some(ms(9_500))]);
     assert!(!world.keys("frames/").iter().any(|key| key.contains(version.as_str())));
 }
 
@@ -177,7 +177,7 @@ async fn of_an_animation_with_too_many_frames_no_more_are_drawn() {
     world.policy.most_frames = Some(2);
     assert_eq!(world.upload("1.txt", "frame 1").await, Outcome::Drawn);
     assert_eq!(world.upload("2.txt", "frame 2").await, Outcome::Drawn);
-    // Nobody knows yet.
+    // No manifest knows yet.
     assert_eq!(world.upload("3.txt", "frame 3").await, Outcome::Drawn);
     assert_eq!(world.upload("4.txt", "frame 4").await, Outcome::TooMany);
     assert_eq!((world.manifest().head.status, world.manifest().head.total), (Status::Failed, 4));
@@ -252,7 +252,7 @@ async fn mixed(world: &World) {
     world.put(&format!("frames/film/4@{version}-p1/2.error.json"), r#"{"message":"why"}"#);
 }
 
-/// What is left of the results, without versions.
+/// Returns the results that are left, without versions.
 fn results(world: &World) -> Vec<String> {
     let short = |key: String| {
         let (name, rest) = key["frames/film/".len()..].split_once('@').unwrap();
@@ -296,7 +296,7 @@ async fn a_refusal_goes_when_the_set_is_to_be_assembled_again() {
     assert!(!world.keys("frames/").contains(&refusal));
 }
 
-/// Where no result went the manifest is as it was, and whoever draws folds.
+/// If no result was deleted, the manifest is as it was, and the invocation that draws folds.
 #[tokio::test]
 async fn a_retry_folds_only_what_it_has_changed() {
     let world = World::new();
@@ -306,7 +306,7 @@ async fn a_retry_folds_only_what_it_has_changed() {
     assert_eq!(world.keys("manifests/"), [""; 0]);
 }
 
-/// It was drawn by somebody else meanwhile.
+/// Another invocation drew it meanwhile.
 #[tokio::test]
 async fn a_frame_is_put_only_where_there_is_none() {
     let world = World::new();
@@ -322,7 +322,7 @@ async fn a_frame_is_put_only_where_there_is_none() {
     assert_eq!(world.store.bucket.lock().unwrap().get(&frame).unwrap().body, "another's");
 }
 
-/// Else a frame that ends whoever draws it would be woken for ever.
+/// Otherwise a frame that ends each invocation that draws it would be woken for ever.
 #[tokio::test]
 async fn an_attempt_counts_when_it_has_begun_however_it_ends() {
     let mut world = World::new();
@@ -338,7 +338,7 @@ async fn an_attempt_counts_when_it_has_begun_however_it_ends() {
 async fn of_an_animation_with_too_many_frames_no_parts_are_drawn_either() {
     let mut world = World::new();
     world.policy.most_frames = Some(2);
-    // The manifest is written anew at once, not when it is old.
+    // The manifest is written again at once, not when it is old.
     world.policy.fresh = Duration::ZERO;
     world.upload("1.txt", "split 2 1").await;
     world.upload("2.txt", "frame 2").await;

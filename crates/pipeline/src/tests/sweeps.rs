@@ -1,4 +1,5 @@
-//! What the sweep wakes, gives up, claims, heals and deletes, and what it leaves alone.
+//! The work of the sweep: the frames that it wakes and gives up, its claims, repairs and deletions, and the
+//! things it leaves alone.
 
 use super::*;
 use crate::sweep::{Swept, sweep};
@@ -22,7 +23,7 @@ impl World {
         assert_eq!(self.store.clock.now(), then);
     }
 
-    /// What is left below these prefixes.
+    /// Returns the keys that are left below these prefixes.
     fn left(&self, prefixes: &[&str]) -> Vec<String> {
         prefixes.iter().flat_map(|prefix| self.keys(prefix)).collect()
     }
@@ -94,7 +95,7 @@ async fn a_claim_is_put_where_manifest_or_gif_are_not_as_they_should_be() {
     assert!(claimed(&world).await, "the manifest shows scripts that are gone");
 }
 
-/// Two frames that nobody draws, a manifest that says so, and their versions.
+/// Makes two frames that no invocation draws, a manifest that says so, and returns their versions.
 async fn stuck(world: &World) -> [ETag; 2] {
     let versions = [1, 2].map(|number| world.put(&format!("scripts/film/{number}.txt"), "hang 1"));
     world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
@@ -269,7 +270,7 @@ async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
     }
     let now = world.put(SCRIPT, "frame 1");
     world.render(SCRIPT).await;
-    // Of an animation below this one.
+    // The part is of an animation below this one.
     world.put("parts/film/sub/1@0-p1/1.json", "{}");
     world.later(6 * DAY).await;
     assert_eq!(world.visit().await.deleted, 0);
@@ -319,7 +320,7 @@ async fn what_came_late_of_an_older_version_goes_too() {
     assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
 }
 
-/// What says that there are parts goes last: a sweep that has found it gone does not look for them.
+/// The object that says that there are parts goes last: a sweep that has found it gone does not look for them.
 #[tokio::test]
 async fn what_a_sweep_could_not_delete_the_next_one_does() {
     let world = World::new();
@@ -377,7 +378,7 @@ async fn as_long_as_frames_are_drawn_nothing_is_stuck() {
     assert_eq!(world.visit().await.woken, 2);
 }
 
-/// Whoever has begun last may still be at it, or wait to be tried again.
+/// The invocation that has begun last may still be at it, or wait to be tried again.
 #[tokio::test]
 async fn a_frame_is_not_given_up_before_the_next_attempt_would_be_due() {
     let world = World::new();
@@ -433,7 +434,7 @@ async fn of_two_error_receipts_only_that_goes_which_cannot_be_read() {
     assert_eq!(world.keys("frames/"), [key(1)]);
 }
 
-/// Whoever fails at it in each attempt refuses the set that the claim names.
+/// An assembler that fails at it in each attempt refuses the set that the claim names.
 #[tokio::test]
 async fn a_claim_of_the_sweeps_names_the_set_that_is_there_now() {
     let world = World::new();
@@ -477,7 +478,7 @@ async fn frames_are_woken_while_more_are_to_be_uploaded() {
     assert_eq!(world.visit().await, woken(2));
 }
 
-/// Somebody has put half of it in its place, with what it says of itself.
+/// Another client has put half of it in its place, with its metadata.
 #[tokio::test]
 async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
     let world = World::new();
@@ -565,7 +566,7 @@ async fn what_comes_back_while_a_sweep_dies_over_its_results_the_next_attempt_wa
         world.upload("1.txt", "frame 2").await;
         world.later(8 * DAY).await;
         world.dies_deleting(text, "sweep").await;
-        // Another frame is to come: which ones were deleted, nobody knows.
+        // Another frame is to come: which ones were deleted is not known.
         world.put("scripts/film/2.txt", "hang 1");
         let other = world.visit_as("other").await.unwrap();
         assert_eq!((other.woken, other.deleted), (0, 0), "{text}: a sweep is at it");

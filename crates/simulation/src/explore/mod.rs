@@ -1,17 +1,18 @@
-//! Small worlds searched instead of drawn by lot: all interleavings of the real steps, or those that provoke most.
+//! Small worlds searched instead of drawn at random: all interleavings of the real steps, or those that provoke most.
 //!
-//! [`explore`] visits every state that a [`World`] can come to: invocations' requests in any order, and within the world's
-//! budget kills before and after any request, writes that land after their sender's death, lost answers, and events that
-//! come twice or never. States are told apart by a hash of 64 bits; a request that can meet no other is taken alone
-//! (partial-order reduction: in a world that always comes to rest nothing is missed by it). States that few preemptions lead
-//! to come first. [`provoke`] runs schedules that are chosen to provoke, with preemptions and faults aimed at writes.
+//! [`explore`] visits every state that a [`World`] can come to: invocations' requests in any order, and within the
+//! world's budget kills before and after any request, writes that land after their sender's death, lost answers, and
+//! events that come twice or never. States are distinguished by a hash of 64 bits; a request that can meet no other
+//! is taken alone (partial-order reduction: in a world that always comes to rest nothing is missed by it). States
+//! that few preemptions lead to come first. [`provoke`] runs schedules that are chosen to provoke, with preemptions
+//! and faults aimed at writes.
 //!
-//! What must hold is what [`super::run`] checks: revisions grow by one, no function writes below `scripts/`, no GIF gives
-//! way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps where something
-//! happened that only they heal.
+//! The invariants are those that [`super::run`] checks: revisions grow by one, no function writes below `scripts/`,
+//! no GIF gives way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps
+//! where something happened that only they heal.
 //!
-//! Not searched: listings that mix two moments, time (the store's clock moves with the user's acts alone, others stand still), the deadline. The seeds of
-//! [`super::run`] have these.
+//! Not searched: listings that mix two moments, time (the store's clock moves with the user's acts alone, others
+//! stand still), the deadline. The seeds of [`super::run`] have these.
 
 mod order;
 mod process;
@@ -28,12 +29,12 @@ pub use search::explore;
 use state::{Choice, Fate, Offer, State};
 pub use worlds::{World, provoking, worlds};
 
-/// How often what may go wrong in a world.
+/// The number of faults of each kind in a world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Budget {
-    /// Invocations killed.
+    /// The number of invocations killed.
     pub kills: u8,
-    /// Of these, writes that land after their sender is dead.
+    /// The number of these that are writes that land after their sender is dead.
     pub ghosts: u8,
     /// Answers to writes lost.
     pub losses: u8,
@@ -43,10 +44,10 @@ pub struct Budget {
     pub drops: u8,
 }
 
-/// What a search has seen.
+/// The result of a search.
 #[derive(Debug, Clone, Default)]
 pub struct Explored {
-    /// States that differ.
+    /// The number of different states.
     pub states: u64,
     /// States in which nothing is left to happen.
     pub rests: u64,
@@ -58,8 +59,9 @@ pub struct Explored {
     pub steps: u64,
     /// The most steps to a state of rest, by the way that it was reached first.
     pub depth: usize,
-    /// What preemptions and faults weigh at most on the way to a state, by the way that it was reached first: 1 before a
-    /// write, 2 elsewhere. If the search ended at its limit, what they weigh on the cheapest way that it did not go.
+    /// The largest weight of the preemptions and faults on the way to a state, by the way that it was reached
+    /// first: 1 before a write, 2 elsewhere. If the search ended at its limit, their weight on the cheapest way
+    /// that it did not go.
     pub price: usize,
     /// There was no more to see; else the search ended at its limit.
     pub complete: bool,
@@ -77,15 +79,15 @@ impl Explored {
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{world}: {what}\n{}", steps.join("\n"))]
 pub struct Counterexample {
-    /// The world.
+    /// The name of the world.
     pub world: &'static str,
-    /// What does not hold.
+    /// The invariant that does not hold.
     pub what: String,
-    /// What happened, one thing after the other.
+    /// The steps that led there, in order, in words.
     pub steps: Vec<String>,
-    /// How many states were seen before; none by a schedule.
+    /// The number of states that were seen before; none by a schedule.
     pub states: u64,
-    /// What preemptions and faults weigh on the way; not counted in a schedule.
+    /// The weight of the preemptions and faults on the way; not counted in a schedule.
     pub price: usize,
 }
 
@@ -155,12 +157,12 @@ fn schedule(
         if lands_last && choices.iter().any(|choice| !matches!(choice, Choice::Ghost(_))) {
             choices.retain(|choice| !matches!(choice, Choice::Ghost(_)));
         }
-        // What meets nobody is no turn of its own.
+        // A request that meets no other is no turn of its own.
         let alone = choices.first().filter(|_| is_alone).map(|choice| state.actor(*choice));
         let Some(actor) = alone.or_else(|| order.next(&state, &choices, random)) else { break };
         let mine = choices.into_iter().filter(|choice| state.actor(*choice) == actor);
         let (plain, mut awkward): (Vec<Choice>, Vec<Choice>) = mine.partition(|choice| is_plain(*choice));
-        // Whoever wants a write to land last wants it to be on its way.
+        // A schedule in which a write lands last needs it to be on its way.
         if lands_last && awkward.iter().any(|choice| is_late(*choice)) {
             awkward.retain(|choice| is_late(*choice));
         }

@@ -1,11 +1,11 @@
-//! Who goes on next in a schedule that is to provoke.
+//! The order in which processes go on in a schedule that is to provoke.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::state::{Choice, State};
 use rayfold_pipeline::Randomness;
 
-/// How often priorities change in a schedule.
+/// The number of times that priorities change in a schedule.
 const CHANGES: u32 = 4;
 
 /// The most preemptions of a schedule that has few.
@@ -14,19 +14,20 @@ const FEW: u64 = 2;
 /// Writes of a schedule that preemptions and faults are aimed at: in most of the worlds all of them.
 pub(super) const MAX_WRITES: u64 = 12;
 
-/// Priorities that are drawn by lot are above this, those that have changed below.
+/// Priorities that are drawn at random are above this, those that have changed below.
 const DRAWN: u64 = 1 << 63;
 
 /// A way to choose who goes on.
 #[derive(Debug)]
 pub(super) enum Order {
-    /// Whoever has the highest priority. Priorities are drawn by lot, the user's anew after each act, and fall below all
-    /// others a few times, mostly before a write (probabilistic concurrency testing; Burckhardt et al., ASPLOS 2010).
+    /// The process with the highest priority. Priorities are drawn by lot, the user's anew after each act, and
+    /// fall below all others a few times, mostly before a write (probabilistic concurrency testing; Burckhardt
+    /// et al., ASPLOS 2010).
     Priorities { priorities: BTreeMap<u64, u64>, changes: u32, lowest: u64, pauses: Pauses },
-    /// Whoever went on before, up to a pause; then whoever the lot falls on.
+    /// The process that went on before, up to a pause; then the one that the lot falls on.
     Turns { current: Option<u64>, pauses: Pauses },
-    /// Whoever went on before, up to the end, but for a few writes before which the lot falls on another one (context
-    /// bounding; Musuvathi and Qadeer, PLDI 2007). `writes` are counted as they come up.
+    /// The process that went on before, up to the end, but for a few writes before which the lot falls on another one
+    /// (context bounding; Musuvathi and Qadeer, PLDI 2007). `writes` are counted as they come up.
     Few { current: Option<u64>, preempted: Vec<u64>, writes: u64 },
 }
 
@@ -42,7 +43,7 @@ impl Kind {
     pub(super) const ALL: [Kind; 3] = [Kind::Priorities, Kind::Turns, Kind::Few];
 }
 
-/// How seldom somebody is put off.
+/// A process is put off before one in so many writes, and at one in so many other steps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pauses {
     before_writes: u64,
@@ -64,7 +65,7 @@ impl Order {
         }
     }
 
-    /// Who goes on; nobody when nothing is left to happen.
+    /// Returns the process that goes on; `None` when nothing is left to happen.
     pub(super) fn next(&mut self, state: &State, choices: &[Choice], random: &Randomness) -> Option<u64> {
         let actors: BTreeSet<u64> = choices.iter().map(|choice| state.actor(*choice)).collect();
         let actors: Vec<u64> = actors.into_iter().collect();

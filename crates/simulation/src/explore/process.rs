@@ -5,8 +5,8 @@
 //! is known by a hash of these, is worked out once ([`Memo`]), and states of the world can be copied and compared. At some
 //! places a step says what it goes on with ([`Invocation::forget_history_before`]): what has happened before is then forgotten, and
 //! two invocations that have come to the same on different ways are one.
-//! Clocks of invocations stand still, and pauses end at once: whoever pauses is one whose next request takes effect later,
-//! and that is searched anyway.
+//! Clocks of invocations stand still, and pauses end at once: a pause only lets the next request of its invocation
+//! take effect later, and that is searched anyway.
 
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -36,20 +36,20 @@ use rayfold_pipeline::{
     render_frame, sweep,
 };
 
-/// How long an invocation may run.
+/// The time limit of an invocation.
 const TIMEOUT: Duration = Duration::from_secs(900);
 
-/// What a frame takes where there is no time for a second one.
+/// The time that a frame takes where there is no time for a second one.
 const LONG_PUSH: Duration = Duration::from_secs(300);
 
-/// What an invocation works on.
+/// The event that an invocation works on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Work {
     /// An object event of the render function.
     Render(String),
-    /// A claim.
+    /// The key of a claim.
     Assemble(String),
-    /// The schedule.
+    /// A tick of the schedule.
     Sweep,
 }
 
@@ -62,7 +62,7 @@ pub(super) enum Request {
     List(ListRequest),
 }
 
-/// What a request answers.
+/// The answer to a request.
 #[derive(Debug, Clone)]
 pub(super) enum Answer {
     Object(Object),
@@ -75,12 +75,12 @@ pub(super) enum Answer {
     Lost,
 }
 
-/// What an invocation has come to.
+/// The state that an invocation has reached.
 #[derive(Debug, PartialEq)]
 pub(super) struct Standing {
     /// The requests that it waits on, each with its number.
     pub(super) requests: Vec<(u32, Request)>,
-    /// How it ended; an error is what the platform sees.
+    /// The end of the invocation; an error is what the platform sees.
     pub(super) end: Option<Result<(), End>>,
     /// A hash of what it asks for.
     pub(super) asks: u64,
@@ -88,7 +88,7 @@ pub(super) struct Standing {
     carried: Option<u64>,
 }
 
-/// How an invocation ended that did not succeed.
+/// The end of an invocation that did not succeed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
     /// The platform tries again.
@@ -102,7 +102,7 @@ pub(super) enum End {
 pub(super) struct Event {
     slot: u32,
     answer: Arc<Answer>,
-    /// Of all that has happened up to it.
+    /// The hash of all that has happened up to it.
     hash: u64,
 }
 
@@ -112,22 +112,22 @@ pub(super) struct Process {
     pub(super) work: Work,
     /// Shared by the platform's attempts at the event.
     pub(super) request_id: Arc<str>,
-    /// Counted from 1.
+    /// The number of the attempt, from 1.
     pub(super) attempt: u32,
     start: Timestamp,
-    /// Of all the above.
+    /// The hash of all the above.
     begun: u64,
     history: Vec<Event>,
     /// Answers from here on have led to nothing yet: others of requests that were sent with theirs are yet to come.
     silent: usize,
-    /// Of all that has happened.
+    /// The hash of all that has happened.
     pub(super) hash: u64,
     pub(super) standing: Arc<Standing>,
     /// When it last listed the scripts, if it is one that writes GIFs.
     pub(super) listed: Timestamp,
 }
 
-/// What is known of invocations by the hash of what has happened to them.
+/// The known states of invocations, by the hash of what has happened to them.
 #[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
@@ -136,7 +136,7 @@ pub(super) struct Memo {
     manner: Manner,
 }
 
-/// How the steps work in a world.
+/// The configuration of the steps in a world.
 #[derive(Debug, Clone, Copy)]
 struct Manner {
     mutation: Option<Mutation>,
@@ -209,7 +209,7 @@ impl Memo {
         next
     }
 
-    /// What has happened to it is no longer told apart from anything else that has led to where it goes on with the same.
+    /// Forgets the history of a process: it is then equal to each other one that continues from the same state.
     fn forget(&mut self, process: &mut Process, carried: u64) {
         process.hash = hash_of(&(process.begun, process.listed, carried));
         process.silent = process.history.len();
@@ -377,7 +377,7 @@ fn poll(task: &mut Task) -> Option<Result<(), End>> {
     None
 }
 
-/// Where a step leaves its requests and finds the answers.
+/// The board on which a step leaves its requests and finds the answers.
 #[derive(Clone)]
 struct Board {
     slots: Arc<Mutex<Slots>>,
@@ -402,7 +402,7 @@ impl Board {
             let mut slots = lock(&self.slots);
             if let Some(request) = request.take() {
                 if let Some(carried) = self.carried.take() {
-                    // From here on requests are numbered anew: nothing tells how many there were.
+                    // From here on requests are numbered from the start: nothing tells how many there were.
                     assert!(slots.waiting.is_empty(), "what is asked for is forgotten");
                     slots.next = 0;
                     slots.carried = Some(hash_of(&carried));
@@ -531,7 +531,7 @@ impl Upload for BoardUpload {
     }
 }
 
-/// Of a frame that is too big.
+/// The bands of a frame that is too big.
 const BANDS: NonZeroU64 = NonZeroU64::new(2).expect("two is not zero");
 
 /// Lists frames, at once or in the time of one.

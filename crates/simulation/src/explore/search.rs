@@ -1,13 +1,14 @@
 //! All states of a world, those first that few preemptions and faults lead to.
 //!
-//! A preemption is that somebody goes on though whoever went on before still could; that the user pauses after an act, and
-//! that somebody goes on where another one has ended or died, is none. What is wrong with a protocol mostly shows after one
-//! or two (iterative context bounding; Musuvathi and Qadeer, PLDI 2007), before a write rather than before a read, so it is
-//! found long before the search has come to its end. Each state is visited once, from whichever side it is reached first:
-//! nothing is left out for the order's sake.
+//! A preemption is that a process goes on though the one that went on before still could. It is no preemption that
+//! the user pauses after an act, or that a process goes on where another one has ended or died. Errors of a protocol
+//! mostly show after one or two preemptions (iterative context bounding; Musuvathi and Qadeer, PLDI 2007), before a
+//! write rather than before a read, so they are found long before the search has come to its end. Each state is
+//! visited once, from whichever side it is reached first: nothing is left out for the order's sake.
 //!
-//! Of a state that has been visited a hash is kept, and the step that led to it. Whole states are kept of those from which
-//! steps are still to be tried; if that becomes too many, the last ones come first, which leaves few behind.
+//! For a state that has been visited, its hash and the step that led to it are kept. Whole states are kept
+//! of those from which steps are still to be tried; if that becomes too many, the last ones come first,
+//! which leaves few behind.
 
 use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
@@ -17,13 +18,14 @@ use super::state::{Choice, State, USER};
 use super::{Counterexample, Explored, World, is_plain};
 use rayfold_pipeline::Mutation;
 
-/// What a preemption or a fault weighs before a write, and elsewhere.
+/// The weight of a preemption or a fault before a write, and elsewhere.
 const PRICES: [usize; 2] = [1, 2];
 
 /// Steps still to be tried, beyond which the last ones come first.
 const MANY: usize = 1_000_000;
 
-/// How a state was reached: from which visited one, and by which of its choices. Small, as there is one for each state.
+/// The way by which a state was reached: the visited state before it, and the number of its choice. Small, as there
+/// is one for each state.
 #[derive(Clone, Copy)]
 struct Step {
     from: u32,
@@ -37,9 +39,9 @@ struct Way {
     step: Step,
     /// Steps from the beginning.
     depth: usize,
-    /// What its preemptions and faults weigh.
+    /// The weight of its preemptions and faults.
     price: usize,
-    /// Who goes on after it, if nobody is preempted.
+    /// The process that goes on after it, if none is preempted.
     current: u64,
 }
 
@@ -50,7 +52,7 @@ struct Open {
     way: Way,
 }
 
-/// What is still to be tried, by what its preemptions and faults weigh; the newest first among equals.
+/// The states still to be tried, by the weight of their preemptions and faults; the newest first among equals.
 #[derive(Default)]
 struct Frontier {
     by_price: Vec<Vec<Open>>,
@@ -67,7 +69,7 @@ impl Frontier {
         self.len += 1;
     }
 
-    /// What the cheapest one weighs.
+    /// Returns the weight of the cheapest one.
     fn cheapest(&self) -> usize {
         self.by_price.iter().position(|of_a_price| !of_a_price.is_empty()).unwrap_or_default()
     }
@@ -190,7 +192,7 @@ impl Search<'_> {
             let is_preempted = !offer.is_alone && goes_on && actor != current && current != USER;
             let preemption = if is_preempted { preemption } else { 0 };
             let fault = if is_plain(choice) { 0 } else { weight(state.is_write(choice)) };
-            // What meets nobody is no turn of its own.
+            // A request that meets no other is no turn of its own.
             let current = if offer.is_alone { current } else { actor };
             let step = Step { from, choice: u16::try_from(number).unwrap_or(u16::MAX) };
             let way = Way { step, depth: depth + 1, price: price + preemption + fault, current };
@@ -205,15 +207,15 @@ impl Search<'_> {
         let mut steps: Vec<Step> = std::iter::successors(Some(way.step), before).take(way.depth).collect();
         steps.reverse();
         let mut memo = Memo::new(self.world, self.mutation);
-        let mut told = Vec::new();
+        let mut steps_in_words = Vec::new();
         let mut state = State::begin(self.world, &mut memo).ok();
         for Step { choice, .. } in steps {
             let Some(before) = state else { break };
             let choice = before.offer(self.world).choices[usize::from(choice)];
-            told.push(before.describe(self.world, choice));
+            steps_in_words.push(before.describe(self.world, choice));
             state = before.after(self.world, &mut memo, choice).ok();
         }
         let (world, states) = (self.world.name, self.explored.states);
-        Box::new(Counterexample { world, what, steps: told, states, price: way.price })
+        Box::new(Counterexample { world, what, steps: steps_in_words, states, price: way.price })
     }
 }

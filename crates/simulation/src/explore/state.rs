@@ -24,10 +24,10 @@ const APART: Duration = Duration::from_secs(1);
 /// Between two sweeps, once all has come to rest: longer than the sweep's patience with any frame.
 const SWEEPS_APART: Duration = Duration::from_secs(4 * 3600);
 
-/// How many sweeps must do.
+/// The number of sweeps that must suffice.
 const SWEEPS: u32 = 6;
 
-/// How often the platform tries an event.
+/// The number of times that the platform tries an event.
 const ATTEMPTS: u32 = 3;
 
 /// Steps after which a world that should come to rest does not.
@@ -47,7 +47,7 @@ pub(super) enum Choice {
     Ghost(usize),
 }
 
-/// What can happen next.
+/// The choices for the next step.
 #[derive(Debug)]
 pub(super) struct Offer {
     /// Each of them alone.
@@ -56,7 +56,7 @@ pub(super) struct Offer {
     pub(super) is_alone: bool,
 }
 
-/// How often an event is delivered.
+/// The number of deliveries of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Delivery {
     Once,
@@ -64,7 +64,7 @@ pub(super) enum Delivery {
     Never,
 }
 
-/// What comes of a request, and of whoever sent it.
+/// The outcome of a request, and of its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fate {
     /// It takes effect and is answered; if it fires an event, that is delivered so.
@@ -98,7 +98,7 @@ struct Ghost {
 pub(super) struct State {
     contents: Arc<Contents>,
     acted: usize,
-    /// How far the clock is ahead of the story, while the sweep heals.
+    /// The time by which the clock is ahead of the story, while the sweep heals.
     ahead: Duration,
     processes: Vec<Arc<Process>>,
     ghosts: Vec<Arc<Ghost>>,
@@ -133,7 +133,7 @@ impl State {
         Ok(state)
     }
 
-    /// Tells states apart.
+    /// Returns a hash that distinguishes states.
     pub(super) fn hash(&self) -> u64 {
         let spread = |hash: u64| hash.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
         let listed = |process: &Arc<Process>| process.hash ^ process.listed.0;
@@ -151,12 +151,12 @@ impl State {
         hash_of(&(self.contents.hash, self.acted, self.budget, self.needs_sweep, asked, self.ghosts.len()))
     }
 
-    /// The store's clock.
+    /// Returns the time of the store's clock.
     fn now(&self) -> Timestamp {
         EPOCH.after(APART * u32::try_from(self.acted).unwrap_or(u32::MAX) + self.ahead)
     }
 
-    /// What the clock of an invocation shows, from its beginning to its end: it runs behind the store's.
+    /// Returns the time of an invocation's clock, from its beginning to its end: it runs behind the store's.
     fn start(&self) -> Timestamp {
         EPOCH.after(self.ahead)
     }
@@ -184,13 +184,13 @@ impl State {
 
     /// Whether nothing that can happen to the world's end changes what the request finds, or finds what it changes.
     fn meets_no_other(&self, world: &World, request: &Request) -> bool {
-        let is_told = self.acted == world.acts.len();
+        let user_is_done = self.acted == world.acts.len();
         match request {
             // Scripts are the user's alone.
-            Request::List(request) => is_told && request.prefix.starts_with("scripts/"),
+            Request::List(request) => user_is_done && request.prefix.starts_with("scripts/"),
             // A frame is never changed, and here none is deleted.
             Request::Get(key, _) if key.ends_with(".png") => self.contents.bucket.head(key).is_ok(),
-            Request::Get(key, _) => is_told && key.starts_with("scripts/"),
+            Request::Get(key, _) => user_is_done && key.starts_with("scripts/"),
             // No function reads claims, and no two are called the same.
             Request::Put(key, ..) => {
                 key.starts_with("assemblies/") && self.contents.bucket.head(key).is_err()
@@ -398,7 +398,7 @@ impl State {
         Ok(())
     }
 
-    /// What must hold of every write of a function.
+    /// Checks the invariants of every write of a function.
     fn watch(
         &mut self,
         key: &str,
@@ -426,7 +426,8 @@ impl State {
         }
     }
 
-    /// What must hold when nothing is left to happen: after sweeps, if something happened that only they heal.
+    /// Checks the invariants that hold when nothing is left to happen: after sweeps, if something happened
+    /// that only they heal.
     pub(super) fn judge(&self, world: &World, memo: &mut Memo) -> Result<(), String> {
         let animation = Animation::new("a").map_err(|error| error.to_string())?;
         let check = |state: &State| {
@@ -464,7 +465,7 @@ impl State {
         Err("the world does not come to rest".to_owned())
     }
 
-    /// Who does it: the user, an attempt at an event, or what a dead one has left.
+    /// Returns the actor of a choice: the user, an attempt at an event, or what a dead one has left.
     pub(super) fn actor(&self, choice: Choice) -> u64 {
         match choice {
             Choice::User(_) => USER,
@@ -483,7 +484,7 @@ impl State {
         matches!(request, Some((_, Request::Put(..) | Request::Delete(_))))
     }
 
-    /// In words, for whoever reads a counterexample.
+    /// Describes a choice in words, for the reader of a counterexample.
     pub(super) fn describe(&self, world: &World, choice: Choice) -> String {
         match choice {
             Choice::User(delivery) => {
@@ -520,7 +521,7 @@ impl Contents {
         self.bucket.delete(key)
     }
 
-    /// How often the key has fired, this time included.
+    /// Returns how often the key has fired, this time included.
     fn fire(&mut self, key: &str) -> u32 {
         let count = self.fired.entry(key.to_owned()).or_default();
         *count += 1;
@@ -535,7 +536,7 @@ impl Contents {
     }
 }
 
-/// What an object that comes or goes wakes.
+/// Returns the work that an object wakes when it comes or goes.
 fn work_of(key: &str, there: bool) -> Option<Work> {
     match key.split('/').next() {
         Some("scripts") => Some(Work::Render(key.to_owned())),

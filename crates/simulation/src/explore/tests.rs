@@ -23,13 +23,13 @@ fn worlds_hold_whatever_happens_in_whatever_order_and_nothing_is_missed_by_forge
         assert!(explored.steps >= explored.states - 1, "{}: {explored:?}", world.name);
         if explored.complete {
             small += 1;
-            let told_apart = search(&world.remembering(), 4 * SMALL);
+            let remembered = search(&world.remembering(), 4 * SMALL);
             assert!(
-                told_apart.complete && told_apart.saw_the_same_as(&explored),
-                "{}: {told_apart:?}",
+                remembered.complete && remembered.saw_the_same_as(&explored),
+                "{}: {remembered:?}",
                 world.name
             );
-            assert!(told_apart.states >= explored.states && explored.rests > 0, "{}", world.name);
+            assert!(remembered.states >= explored.states && explored.rests > 0, "{}", world.name);
         }
     }
     assert_eq!(small, SMALL_WORLDS);
@@ -49,8 +49,8 @@ fn a_missing_second_listing_is_noticed() {
     notices(Mutation::SkipSecondListing, "one of two frames, changed and changed back", 20_000);
 }
 
-/// A set was whole when it was claimed, not when the assembler looked, and whole again when it was committed: whoever
-/// came then found the commit, and nobody claimed.
+/// A set was whole when it was claimed, not when the assembler looked, and whole again when it was committed. The
+/// finisher that came then found the commit, and none claimed.
 #[test]
 fn claims_before_their_commit_are_noticed() {
     notices(Mutation::ClaimBeforeCommit, "the second of two frames comes, goes and comes back", 20_000);
@@ -71,8 +71,8 @@ fn missing_claims_are_noticed() {
     notices(Mutation::NeverClaim, "one frame, a kill", 20_000);
 }
 
-/// An assembler wrote down that a frame was pending which was there again, and left; whoever had brought it back had found
-/// the manifest of before.
+/// An assembler wrote down that a frame was pending which was there again, and left. The invocation that had brought
+/// the frame back had found the manifest of before.
 #[test]
 fn assemblers_that_leave_early_are_noticed() {
     notices(Mutation::AssemblerLeavesEarly, "the second of two frames comes, goes and comes back", 20_000);
@@ -100,8 +100,8 @@ fn unconditional_gifs_are_noticed() {
     notices(Mutation::DropGifCondition, "one frame, overwritten twice when done, a late write", 20_000);
 }
 
-/// Who had found the lease taken took it when it was handed over, as one that nobody wanted, and gave up what was unfinished;
-/// the claim's assembler found it taken, and nobody built.
+/// An assembler that had found the lease taken took it when it was handed over, as one that none wanted, and gave up
+/// what was unfinished; the claim's assembler found it taken, and none built.
 #[test]
 fn a_lease_that_is_handed_over_is_not_taken_by_who_has_left_the_gif_to_its_holder() {
     for name in ["two frames in two pieces, a kill", "two frames in two pieces, the first overwritten"] {
@@ -124,8 +124,8 @@ fn schedules_find_nothing_where_all_rules_hold() {
     }
 }
 
-/// Two that few seeds notice, so they are named here; of what notices them is
-/// `rayfold-bench explore`'s report.
+/// Two rules that few seeds notice, so they are named here; the report of `rayfold-bench explore`
+/// lists what notices them.
 #[test]
 fn rules_that_few_schedules_notice_are_noticed() {
     let worlds = provoking();

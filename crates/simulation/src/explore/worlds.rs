@@ -2,27 +2,28 @@
 
 use super::Budget;
 
-/// A small world.
+/// A world that is small enough for a search.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// What it is called in reports.
+    /// The name of the world in reports.
     pub name: &'static str,
-    /// What the user puts, or deletes, in this order: keys and texts.
+    /// The objects that the user puts, or deletes, in this order: keys and texts.
     pub(super) acts: Vec<(String, Option<&'static str>)>,
-    /// How many of the acts are past: all has come to rest after each.
+    /// The number of acts that are past: all has come to rest after each.
     pub(super) past: usize,
     /// Whether the event of the past's last claim comes once more.
     pub(super) is_claimed_again: bool,
     /// Whether an assembler has time for one frame, so that a GIF of several takes as many invocations.
     pub(super) is_cut: bool,
-    /// What may go wrong.
+    /// The faults that may happen.
     pub budget: Budget,
-    /// Whether invocations are told apart by all that has happened to them, not only by what they go on with.
+    /// Whether invocations are distinguished by all that has happened to them, not only by the state
+    /// that they continue from.
     pub(super) remembers: bool,
 }
 
 impl World {
-    /// The same one, in which nothing is forgotten: its search comes to the same, and takes longer.
+    /// Returns the world with invocations that forget nothing: its search has the same result, and takes longer.
     pub fn remembering(&self) -> Self {
         World { remembers: true, ..self.clone() }
     }
@@ -33,13 +34,13 @@ const CALM: Budget = Budget { kills: 0, ghosts: 0, losses: 0, doubles: 0, drops:
 
 /// A script of one frame.
 const A: Option<&str> = Some("frame 0");
-/// Another one.
+/// A second text of the script.
 const B: Option<&str> = Some("frame 1");
-/// A third one.
+/// A third text of the script.
 const C: Option<&str> = Some("frame 2");
 /// One frame that is drawn in bands.
 const BIG: Option<&str> = Some("big frame 0");
-/// It goes.
+/// The script is deleted.
 const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
@@ -57,7 +58,7 @@ fn cut(world: World) -> World {
     World { is_cut: true, ..world }
 }
 
-/// All of them.
+/// Returns all worlds that are searched.
 pub fn worlds() -> Vec<World> {
     let kill = Budget { kills: 1, ..CALM };
     let late = Budget { kills: 1, ghosts: 1, ..CALM };
@@ -159,7 +160,7 @@ pub fn worlds() -> Vec<World> {
     ]
 }
 
-/// Those in which few schedules show much: what [`super::provoke`] is best given.
+/// Returns the worlds in which few schedules show much, which suit [`super::provoke`] best.
 pub fn provoking() -> Vec<World> {
     const NAMES: [&str; 12] = [
         "one frame, a kill",

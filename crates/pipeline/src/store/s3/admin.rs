@@ -1,4 +1,4 @@
-//! Setting a bucket up where nobody else does: on AWS that is Terraform's part, on a laptop it is ours.
+//! Sets a bucket up where no other program does: on AWS that is Terraform's part, on a laptop it is ours.
 
 use aws_sdk_s3::types::{
     Event, FilterRule, FilterRuleName, NotificationConfiguration, NotificationConfigurationFilter,
@@ -13,11 +13,11 @@ use crate::{Error, Result};
 /// Events of keys below a prefix go to a queue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notification {
-    /// Of the keys.
+    /// The prefix of the keys whose events are sent.
     pub prefix: String,
     /// S3's names of the events.
     pub events: Vec<String>,
-    /// The queue.
+    /// The ARN of the queue.
     pub queue_arn: String,
 }
 
@@ -25,7 +25,7 @@ impl S3Store {
     /// Makes the bucket; it is no error that it is there and ours.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the name is not allowed or taken by someone else.
+    /// [`Error::Refused`] when the name is not allowed or another account has it.
     pub async fn create_bucket(&self) -> Result<()> {
         match self.client.create_bucket().bucket(&self.bucket).send().await {
             Ok(_) => Ok(()),

@@ -1,4 +1,4 @@
-//! What S3's answers mean to the pipeline.
+//! The meaning of S3's answers to the pipeline.
 
 use aws_sdk_s3::config::http::HttpResponse;
 use aws_sdk_s3::error::{ProvideErrorMetadata, SdkError};
@@ -34,7 +34,7 @@ where
             _ => refused(key, error),
         },
         SdkError::DispatchFailure(ref failure) if !failure.is_io() && !failure.is_timeout() => {
-            // Nothing was sent: there are no credentials, or no way to connect as told.
+            // Nothing was sent: there are no credentials, or the configured endpoint cannot be connected to.
             refused(key, error)
         }
         SdkError::ConstructionFailure(_) => refused(key, error),

@@ -11,7 +11,8 @@ use super::answers::error_of;
 use crate::store::{Condition, ETag, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Error, Result};
 
-/// Of all parts but the last. S3 allows 10,000 parts of at least 5 MiB: this allows objects of 78 GiB.
+/// The size of all parts but the last, in bytes. S3 allows 10,000 parts of at least 5 MiB: this allows
+/// objects of 78 GiB.
 const PART: usize = 8 << 20;
 
 /// An object being written to an [`S3Store`].
@@ -95,7 +96,7 @@ impl S3Upload {
                     aws_sdk_s3::error::ProvideErrorMetadata::code(error) == Some("NoSuchUpload")
                 });
                 if is_gone {
-                    // Completed by an earlier try whose answer was lost, or aborted by someone else.
+                    // Completed by an earlier try whose answer was lost, or aborted by another process.
                     let source = "the upload is not there any more".into();
                     return Err(Error::Ambiguous { key: self.key.clone(), source });
                 }
@@ -161,7 +162,7 @@ fn part(number: i32, etag: Option<String>) -> CompletedPart {
     CompletedPart::builder().part_number(number).set_e_tag(etag).build()
 }
 
-/// `If-None-Match` and `If-Match`.
+/// Returns the values of `If-None-Match` and `If-Match`.
 pub(super) fn headers(condition: &Condition) -> (Option<String>, Option<String>) {
     match condition {
         Condition::Always => (None, None),
