@@ -21,7 +21,7 @@ struct Animation {
     frames: Vec<Frame>,
 }
 
-/// How a frame differs from the one before, which at first is black.
+/// The difference between a frame and the one before, which at first is black.
 #[derive(Debug, Arbitrary)]
 enum Frame {
     Same,
@@ -31,7 +31,7 @@ enum Frame {
     Dots(Vec<(u16, [u8; 3])>),
     Darker(u8),
     Moved(u16),
-    /// Of another size: to be refused.
+    /// A frame of another size, which is to be refused.
     Odd { width: u8, height: u8 },
 }
 
@@ -148,7 +148,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// What a viewer sees, and how long all of it takes in hundredths of a second.
+/// Returns the frames that a viewer sees, and their total time in hundredths of a second.
 fn decode(bytes: &[u8], size: (u32, u32)) -> (Vec<RgbImage>, u64) {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);

@@ -1,4 +1,4 @@
-//! Any bytes on a connection to the store on board: it answers or hangs up, lets nobody in, and goes on.
+//! Any bytes on a connection to the built-in store: it answers or hangs up, lets no client in, and goes on.
 #![no_main]
 
 use std::net::SocketAddr;

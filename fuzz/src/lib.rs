@@ -1,4 +1,4 @@
-//! What must hold of every diagnostic, whatever text it is about.
+//! The invariants of every diagnostic, whatever text it is about.
 
 use rayfold_scene::Diagnostic;
 

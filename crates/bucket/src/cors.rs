@@ -44,7 +44,7 @@ impl Origin {
     }
 }
 
-/// Answers a preflight.
+/// Returns the response to a preflight.
 ///
 /// # Errors
 /// `BadRequest` for a preflight without method or origin, `AccessForbidden` if no rule allows it.

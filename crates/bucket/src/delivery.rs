@@ -70,7 +70,7 @@ impl Letter {
 
 impl Delivery {
     /// # Errors
-    /// [`Error::Webhook`].
+    /// [`Error::Webhook`] if the URL or the token cannot be used.
     pub(crate) fn new(storage: Storage, region: &str, webhook: &Webhook) -> Result<Self> {
         let wrong = |reason: &str| Error::Webhook { url: webhook.url.clone(), reason: reason.to_owned() };
         let uri: Uri = webhook.url.parse().map_err(|_| wrong("it is not a URL"))?;

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn a_created_object_is_told_as_s3_tells_it() {
+    fn the_event_of_a_created_object_is_as_of_s3() {
         let event = Event {
             size: Some(10),
             etag: Some("d41d".into()),

@@ -40,7 +40,6 @@ pub(crate) struct Bucket {
     /// The rules that select the changes with events.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) notifications: Vec<Notification>,
-    /// The CORS rules.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) cors: Vec<CorsRule>,
 }

@@ -59,7 +59,6 @@ impl Caller {
 pub(crate) enum ChangeError {
     /// The request was refused. Nothing was changed.
     Refused(Box<S3Error>),
-    /// The storage failed.
     Storage(StorageError),
 }
 

@@ -63,7 +63,7 @@ pub(crate) struct Storage {
     committed: Arc<Notify>,
 }
 
-/// The writing thread.
+/// The thread that writes.
 pub(crate) struct Writing {
     thread: JoinHandle<()>,
     messages: Sender<Message>,

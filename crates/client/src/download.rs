@@ -45,7 +45,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// Downloads the current GIF to a file, which appears once all of it is there.
     ///
     /// # Errors
-    /// Those of [`fetch_gif`](Self::fetch_gif), and [`Error::Write`].
+    /// The errors of [`fetch_gif`](Self::fetch_gif), and [`Error::Write`].
     pub async fn download_gif(&self, animation: &Animation, path: &Path) -> Result<ObjectInfo> {
         let mut download = Download { path: path.to_path_buf(), file: None };
         let info = self.fetch_gif(animation, &mut download).await?;

@@ -1,5 +1,5 @@
-//! The words for an error that a user reads: those of the store seldom name the bucket, and never say where credentials come
-//! from.
+//! The words for an error that a user reads: the store's errors seldom name the bucket, and never
+//! the source of credentials.
 
 use rayfold_pipeline::Error as StoreError;
 

@@ -28,7 +28,7 @@ pub struct File {
 pub enum Content {
     /// A file on disk, which is read again when it is sent.
     Path(PathBuf),
-    /// Bytes in memory.
+    /// A content in memory.
     Bytes(Bytes),
 }
 

@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn silence_is_told_and_others_changes_end_the_waiting() {
+    async fn silence_is_reported_and_others_changes_end_the_waiting() {
         let world = World::new();
         let submitted = submitted(&world, &[("1", "frame"), ("2", "frame")]).await;
         let reports = std::sync::Mutex::new(Vec::new());

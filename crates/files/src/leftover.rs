@@ -23,7 +23,7 @@ const MARK_DIGITS: usize = 4;
 /// The time since the last write after which an unlocked temporary file of another system counts as left behind.
 const AGE: Duration = Duration::from_secs(60 * 60);
 
-/// The same time on file systems without locks. A run may still be writing there, but no frame takes days.
+/// The age on file systems without locks. A run may still be writing there, but no frame takes days.
 const AGE_WITHOUT_LOCKS: Duration = Duration::from_secs(7 * 24 * 60 * 60);
 
 /// Returns a name that no other run uses, short enough for every file system.

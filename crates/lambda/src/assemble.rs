@@ -13,7 +13,7 @@ use crate::event::{Event, FAILURE_QUEUE, Message, Sweep, Unreadable};
 use crate::logs::ms;
 use crate::records;
 
-/// Handles a payload.
+/// Handles the payload of an invocation.
 ///
 /// # Errors
 /// [`Failed`] if another try may succeed. For messages of the failure queue the answer lists them instead.
@@ -37,7 +37,6 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
     }
 }
 
-/// Handles one claim.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
     let assembled = assemble(&context.invocation(&context.policy, call), &context.animator, &key).await?;
     let Some(assembled) = assembled else {

@@ -67,7 +67,7 @@ pub struct Message {
 }
 
 impl Event {
-    /// Parses a payload.
+    /// Parses the payload of an invocation.
     ///
     /// # Errors
     /// Returns [`Unreadable`] if the payload is no known event.

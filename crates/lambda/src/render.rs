@@ -12,7 +12,7 @@ use crate::event::Event;
 use crate::logs::ms;
 use crate::records;
 
-/// Handles a payload.
+/// Handles the payload of an invocation.
 ///
 /// # Errors
 /// [`Failed`] if another try may succeed.
@@ -31,7 +31,6 @@ pub async fn handle<S: Store>(context: &Context<S>, call: &Call, payload: Value)
     records::work(&context.bucket, &call.request_id, objects, |key| record(context, call, key)).await
 }
 
-/// Handles one event.
 async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Result<String, Error> {
     if key.starts_with(SCRIPTS) && Uploaded::of(&key, 0) == Uploaded::Nothing {
         return Ok("nothing that is read".into());

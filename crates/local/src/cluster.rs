@@ -59,7 +59,7 @@ impl Bucket {
         Ok(Self { endpoint, store })
     }
 
-    /// Returns the bucket.
+    /// Returns the store of the bucket.
     pub fn store(&self) -> &S3Store {
         &self.store
     }
@@ -67,7 +67,7 @@ impl Bucket {
     /// Returns the settings of an invoker on this bucket.
     ///
     /// # Errors
-    /// [`Error::Random`].
+    /// [`Error::Random`] if the system has no random bytes.
     pub fn settings(&self, functions: Functions) -> Result<Settings> {
         let mut settings = Settings::new(functions, None, any_port(), token(16)?);
         settings.listing = Some(Listing::new(self.store.clone(), &token(8)?));

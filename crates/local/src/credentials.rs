@@ -22,13 +22,13 @@ impl Credentials {
     /// Returns new random credentials.
     ///
     /// # Errors
-    /// [`Error::Random`].
+    /// [`Error::Random`] if the system has no random bytes.
     pub fn random() -> Result<Self> {
         Ok(Self { access_key: format!("rayfold{}", token(6)?), secret_key: token(20)? })
     }
 
-    /// Returns the credentials of an earlier run beside `data`. If there are none, makes new ones and stores them
-    /// there.
+    /// Returns the credentials of an earlier run beside `data`. If there are none, makes new ones
+    /// and stores them there.
     pub(crate) fn kept(data: &Path) -> Result<Self> {
         let path = data.join("credentials.json");
         if let Ok(text) = fs::read(&path)
@@ -55,7 +55,7 @@ impl Credentials {
 /// Returns `bytes` random bytes in hexadecimal.
 ///
 /// # Errors
-/// [`Error::Random`].
+/// [`Error::Random`] if the system has no random bytes.
 pub(crate) fn token(bytes: usize) -> Result<String> {
     let mut random = vec![0; bytes];
     getrandom::fill(&mut random).map_err(Error::Random)?;

@@ -8,6 +8,7 @@ use crate::program::Program;
 /// An error of setting up the bucket or the invoker.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the messages show what the fields hold")]
 pub enum Error {
     /// Neither the S3 server nor the tools to build it are on this machine.
     #[error(
@@ -15,7 +16,6 @@ pub enum Error {
          --example stores {}` ({reason})", program.binary, program.variable, program.name.to_lowercase()
     )]
     NoServer {
-        /// The server's program.
         program: &'static Program,
         /// The missing programs, and the places that were searched.
         reason: String,
@@ -23,7 +23,7 @@ pub enum Error {
     /// The variable that names the S3 server names nothing.
     #[error("{variable} names {}, which is no file", path.display())]
     NamedServerMissing {
-        /// The variable.
+        /// The environment variable with the path.
         variable: &'static str,
         /// The path in that variable.
         path: PathBuf,
@@ -34,7 +34,6 @@ pub enum Error {
         program.binary, program.variable
     )]
     Install {
-        /// The server's program.
         program: &'static Program,
         /// The last lines that Go wrote.
         reason: String,
@@ -53,9 +52,8 @@ pub enum Error {
     /// The S3 server ended or stayed unreachable during its start.
     #[error("{program} did not start: {reason}; its log is {}", log.display())]
     ServerStart {
-        /// The server's program.
         program: &'static Program,
-        /// The observed symptom.
+        /// The symptom that was observed.
         reason: String,
         /// The server's log file.
         log: PathBuf,
@@ -68,17 +66,11 @@ pub enum Error {
     File {
         /// The path of the file or folder.
         path: PathBuf,
-        /// The system's error.
         source: io::Error,
     },
     /// A loopback port was not available.
     #[error("cannot listen on {address}")]
-    Listen {
-        /// The address.
-        address: String,
-        /// The system's error.
-        source: io::Error,
-    },
+    Listen { address: String, source: io::Error },
     /// A function's binary is missing from its folder.
     #[error(
         "the function {function} is not in {}: build it with `cargo build -p rayfold-lambda`, or name the folder that \
@@ -109,7 +101,6 @@ pub enum Error {
     Spawn {
         /// The path of the program.
         program: PathBuf,
-        /// The system's error.
         source: io::Error,
     },
     /// The bucket could not be set up.
@@ -117,48 +108,29 @@ pub enum Error {
     Bucket {
         /// The name of the bucket.
         bucket: String,
-        /// The store's error.
         source: rayfold_pipeline::Error,
     },
     /// The S3 server does not answer.
     #[error("cannot reach {endpoint}")]
-    Unreachable {
-        /// The server's address.
-        endpoint: String,
-        /// The reason.
-        source: rayfold_pipeline::Error,
-    },
+    Unreachable { endpoint: String, source: rayfold_pipeline::Error },
     /// The S3 server has no such bucket.
     #[error(
         "there is no bucket {bucket} at {endpoint}: create it with `aws s3 mb s3://{bucket} --endpoint-url {endpoint}`"
     )]
-    NoBucket {
-        /// The server's address.
-        endpoint: String,
-        /// The bucket's name.
-        bucket: String,
-    },
+    NoBucket { endpoint: String, bucket: String },
     /// The S3 server refuses access to the bucket.
     #[error(
         "{endpoint} refuses access to the bucket {bucket}: credentials come from AWS_ACCESS_KEY_ID and \
          AWS_SECRET_ACCESS_KEY, or AWS_PROFILE"
     )]
-    Refused {
-        /// The server's address.
-        endpoint: String,
-        /// The bucket's name.
-        bucket: String,
-        /// The server's message.
-        source: rayfold_pipeline::Error,
-    },
+    Refused { endpoint: String, bucket: String, source: rayfold_pipeline::Error },
     /// The S3 server lacks conditional puts.
     #[error(
         "{endpoint} cannot hold animations: {problem}. Conditional puts (If-None-Match, If-Match) are needed"
     )]
     NoConditions {
-        /// The server's address.
         endpoint: String,
-        /// The observed behaviour.
+        /// The behaviour that was observed.
         problem: &'static str,
     },
     /// The system returned no random bytes for the credentials.

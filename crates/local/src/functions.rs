@@ -32,7 +32,8 @@ impl Functions {
     /// `say` gets a line before each step that takes time.
     ///
     /// # Errors
-    /// [`Error::NoFunction`], [`Error::FunctionNowhere`], [`Error::Build`].
+    /// [`Error::NoFunction`] or [`Error::FunctionNowhere`] if a binary is missing, and [`Error::Build`]
+    /// if a build fails.
     pub fn locate(say: &mut dyn FnMut(&str)) -> Result<Self> {
         if let Some(named) = env::var_os("RAYFOLD_FUNCTIONS") {
             let functions = Self::in_folder(named);
@@ -61,8 +62,8 @@ impl Functions {
         }
     }
 
-    /// Finds the functions of an installed program: beside it (`self`), on the PATH, or by building them in its
-    /// sources.
+    /// Finds the functions of an installed program: beside it (`self`), on the PATH, or by building
+    /// them in its sources.
     fn installed(self, sources: Option<&Path>, say: &mut dyn FnMut(&str)) -> Result<Self> {
         let Err(_) = self.check() else { return Ok(self) };
         let path = env::var_os("PATH").unwrap_or_default();
@@ -93,7 +94,7 @@ impl Functions {
     /// Checks that both binaries exist.
     ///
     /// # Errors
-    /// [`Error::NoFunction`].
+    /// [`Error::NoFunction`] for the first one that is missing.
     pub fn check(&self) -> Result<()> {
         match self.missing() {
             Some(function) => Err(Error::NoFunction { function, folder: self.folder.clone() }),

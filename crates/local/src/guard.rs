@@ -44,8 +44,8 @@ impl Guarded {
     /// Starts `program` and appends its output to `log`. `lock`, if given, stays locked until the program has ended.
     ///
     /// # Errors
-    /// Fails with [`Error::Spawn`] if the shell cannot be started. If the program is missing, [`Self::exited`] returns
-    /// a status.
+    /// Fails with [`Error::Spawn`] if the shell cannot be started. If the program is missing,
+    /// [`Self::exited`] returns a status.
     pub(crate) fn spawn(
         program: &Path,
         args: &[String],

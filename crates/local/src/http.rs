@@ -46,13 +46,13 @@ pub(crate) async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAd
     Ok((listener, address))
 }
 
-/// A running server.
+/// A running server, which ends when this is dropped.
 #[derive(Debug)]
 pub(crate) struct Server(JoinHandle<()>);
 
 impl Server {
-    /// Replies to every request on `listener` by `handler`. If the handler returns no response, the connection is
-    /// closed.
+    /// Replies to every request on `listener` by `handler`. If the handler returns no response,
+    /// the connection is closed.
     pub(crate) fn start<H, F>(listener: TcpListener, handler: H) -> Self
     where
         H: Fn(Request<Incoming>) -> F + Clone + Send + 'static,

@@ -17,7 +17,7 @@ impl Program {
     /// Returns the binary that the variable names, the one on the PATH, or the one built earlier.
     ///
     /// # Errors
-    /// [`Error::NoServer`], [`Error::NamedServerMissing`].
+    /// [`Error::NoServer`] or [`Error::NamedServerMissing`], if the program is not found.
     pub fn find(&'static self) -> Result<PathBuf> {
         if let Some(path) = env::var_os(self.variable).map(PathBuf::from) {
             let variable = self.variable;

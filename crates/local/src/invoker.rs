@@ -53,7 +53,7 @@ const CATCH_UP: &str = r#"{"sweep":true,"catch_up":true}"#;
 /// The time between two checks whether everything has ended.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// A running invoker.
+/// A running invoker of the functions.
 pub struct Invoker {
     pools: Pools,
     pending: Pending,
@@ -68,7 +68,7 @@ impl Invoker {
     /// Listens for events, and sweeps to catch up on missed ones.
     ///
     /// # Errors
-    /// [`Error::NoFunction`], [`Error::Listen`].
+    /// [`Error::NoFunction`] if a binary is missing, and [`Error::Listen`] if the address is not available.
     pub async fn start(settings: Settings, observer: Option<UnboundedSender<Observation>>) -> Result<Self> {
         let (listener, _) = listen(settings.webhook).await?;
         Self::start_on(listener, settings, observer)

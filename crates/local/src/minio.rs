@@ -18,7 +18,7 @@ pub(crate) const QUEUE_ARN: &str = "arn:minio:sqs:us-east-1:RAYFOLD:webhook";
 /// Starts `binary` on the folder `objects`.
 ///
 /// # Errors
-/// As [`ServerProcess::start`].
+/// The errors of [`ServerProcess::start`].
 pub(crate) async fn start(
     binary: &Path,
     objects: &Path,

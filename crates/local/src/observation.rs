@@ -25,21 +25,21 @@ pub enum Seen {
         function: Option<Function>,
         /// S3's name of the event.
         name: String,
-        /// The object's key.
+        /// The key of the changed object.
         key: String,
     },
     /// An invocation was assigned to a process.
     Started(Attempt),
     /// A process is about to send a request to the store.
     Requested {
-        /// The invocation's attempt.
+        /// The attempt that sends it.
         attempt: Attempt,
-        /// The request.
+        /// The class of the request.
         request: StoreRequest,
     },
     /// An invocation ended.
     Finished {
-        /// The invocation's attempt.
+        /// The attempt that ended.
         attempt: Attempt,
         /// The outcome of the attempt.
         outcome: Outcome,
@@ -59,12 +59,12 @@ pub enum Seen {
     },
     /// Another invoker has come, with which the events of the bucket are shared.
     Joined {
-        /// Its name.
+        /// The name of that invoker.
         invoker: String,
     },
     /// Another invoker has gone.
     Lost {
-        /// Its name.
+        /// The name of that invoker.
         invoker: String,
     },
     /// A message of the failure queue was given up.
@@ -77,7 +77,7 @@ pub enum Seen {
 /// An attempt at an invocation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Attempt {
-    /// The invoked function.
+    /// The function that was invoked.
     pub function: Function,
     /// The request id, which is the same for all attempts at an event.
     pub request_id: String,

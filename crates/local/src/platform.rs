@@ -38,7 +38,7 @@ pub struct Plan {
     pub address: SocketAddr,
     /// The name of the bucket.
     pub bucket: String,
-    /// The function binaries.
+    /// The paths of the function binaries.
     pub functions: Functions,
 }
 
@@ -77,7 +77,7 @@ impl Platform {
         }
         let mut settings = Settings::new(plan.functions.clone(), Some(server.address()), webhook, secret);
         if server.queue_arn().is_none() {
-            // Of a fixed name: the next invoker on this bucket takes the place of the one before.
+            // The name is fixed: the next invoker on this bucket takes the place of the one before.
             settings.listing = Some(Listing::new(store.clone(), "local"));
         }
         settings.environment = server.environment();
@@ -89,7 +89,7 @@ impl Platform {
     /// Starts the invoker, which sweeps to catch up on changes while there was none.
     ///
     /// # Errors
-    /// Fails like [`Invoker::start`].
+    /// The errors of [`Invoker::start`].
     pub async fn start_invoker(
         &mut self,
         observer: Option<UnboundedSender<Observation>>,

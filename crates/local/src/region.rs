@@ -1,4 +1,4 @@
 //! The region of all local parts.
 
-/// S3's default region.
+/// The default region of S3.
 pub const REGION: &str = "us-east-1";

@@ -26,7 +26,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// Both functions.
+    /// Both functions, the render function first.
     pub const ALL: [Self; 2] = [Self::Render, Self::Assemble];
 
     /// Returns the name of the function's binary.
@@ -59,7 +59,7 @@ pub struct Route {
     pub events: Vec<String>,
 }
 
-/// All routes.
+/// The routes of all events.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Routes {
@@ -91,8 +91,8 @@ impl Routes {
         self.iter().map(to_queue).collect()
     }
 
-    /// Returns the function that an event on a key invokes. The key is decoded. AWS writes event names without the
-    /// `s3:`.
+    /// Returns the function that an event on a key invokes. The key is decoded. AWS writes event
+    /// names without the `s3:`.
     pub fn function(&self, key: &str, event: &str) -> Option<Function> {
         let event = event.strip_prefix("s3:").unwrap_or(event);
         let wakes = |pattern: &String| {

@@ -23,7 +23,7 @@ use crate::program::{MINIO, Program, SEAWEEDFS};
 use crate::region::REGION;
 use crate::{minio, seaweedfs};
 
-/// What MinIO keeps at the top of its data.
+/// The folder at the top of MinIO's data.
 const MINIO_MARK: &str = ".minio.sys";
 
 /// Between two attempts to lock a data folder.
@@ -32,7 +32,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// A server that does not stop is killed after five seconds.
 const ATTEMPTS: u32 = 140;
 
-/// What lies in a data folder.
+/// The names of everything in a data folder.
 const OURS: [&str; 8] = [
     "lock",
     "credentials.json",
@@ -44,20 +44,20 @@ const OURS: [&str; 8] = [
     seaweedfs::CONFIG,
 ];
 
-/// Which S3 server.
+/// The kind of S3 server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StoreKind {
     /// The one in this program, which needs nothing installed.
     #[default]
     BuiltIn,
-    /// MinIO.
+    /// MinIO, which must be installed, or built from its source.
     Minio,
     /// SeaweedFS, which sends no events: the invoker lists the bucket.
     SeaweedFs,
 }
 
 impl StoreKind {
-    /// All.
+    /// All kinds, the built-in store first.
     pub const ALL: [Self; 3] = [Self::BuiltIn, Self::Minio, Self::SeaweedFs];
 
     /// As a flag has it.
@@ -83,7 +83,7 @@ impl StoreKind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// Where it keeps its objects in a data folder.
+    /// Returns the path of its objects in a data folder.
     pub fn objects(self, data: &Path) -> PathBuf {
         data.join(match self {
             Self::BuiltIn => "bucket",
@@ -105,7 +105,7 @@ pub struct S3Server {
     running: Running,
     data: PathBuf,
     credentials: Credentials,
-    /// Of the data folder, until the server is gone.
+    /// The lock of the data folder, until the server is gone.
     _lock: File,
 }
 
@@ -175,12 +175,12 @@ impl S3Server {
         Ok(Self { kind, running, data: data.to_owned(), credentials, _lock: lock })
     }
 
-    /// Which one it is.
+    /// Returns the kind of server.
     pub fn kind(&self) -> StoreKind {
         self.kind
     }
 
-    /// Of the S3 endpoint.
+    /// Returns the address of the S3 endpoint.
     pub fn address(&self) -> SocketAddr {
         match &self.running {
             Running::BuiltIn(server) => server.address(),
@@ -188,7 +188,7 @@ impl S3Server {
         }
     }
 
-    /// Of the server's process, if it is not this one.
+    /// Returns the id of the server's process, if it is not this one.
     pub fn pid(&self) -> Option<u32> {
         match &self.running {
             Running::BuiltIn(_) => None,
@@ -196,7 +196,7 @@ impl S3Server {
         }
     }
 
-    /// The S3 endpoint.
+    /// Returns the URL of the S3 endpoint.
     pub fn endpoint(&self) -> String {
         format!("http://{}", self.address())
     }
@@ -206,7 +206,7 @@ impl S3Server {
         &self.data
     }
 
-    /// Of the owner.
+    /// Returns the owner's credentials.
     pub fn credentials(&self) -> &Credentials {
         &self.credentials
     }
@@ -236,7 +236,7 @@ impl S3Server {
         }
     }
 
-    /// What the standard AWS environment has to say so that S3 is this one.
+    /// Returns the variables of the standard AWS environment that select this S3 server.
     pub fn environment(&self) -> Vec<(String, String)> {
         [
             ("AWS_ENDPOINT_URL", self.endpoint().as_str()),
@@ -248,7 +248,7 @@ impl S3Server {
         .to_vec()
     }
 
-    /// How to reach it as its owner.
+    /// Returns the owner's connection to it.
     pub fn connection(&self) -> Connection {
         Connection {
             endpoint: self.endpoint(),
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(fs::read_dir(data.path()).unwrap().count(), 1);
     }
 
-    /// What `rayfold dev` kept in MinIO before there was another store.
+    /// The data that `rayfold dev` kept in MinIO before there was another store.
     #[tokio::test]
     async fn the_data_of_minio_beside_it_stays_as_it_is() {
         let data = tempfile::tempdir().unwrap();

@@ -18,7 +18,7 @@ use crate::program::SEAWEEDFS;
 /// Its file of identities, in the data folder.
 pub(crate) const CONFIG: &str = "seaweedfs.json";
 
-/// The parts whose ports nobody but the process itself needs.
+/// The parts whose ports only the process itself needs.
 const INNER_PORTS: [&str; 7] = [
     "master.port",
     "master.port.grpc",
@@ -32,7 +32,7 @@ const INNER_PORTS: [&str; 7] = [
 /// Starts `binary` on the folder `objects`, which lies in the data folder.
 ///
 /// # Errors
-/// As [`ServerProcess::start`].
+/// The errors of [`ServerProcess::start`].
 pub(crate) async fn start(
     binary: &Path,
     objects: &Path,
@@ -71,7 +71,7 @@ fn arguments(address: SocketAddr, objects: &Path, config: &Path) -> Result<Vec<S
         // Catalogues for other protocols, on ports of their own.
         "-s3.port.iceberg=0".to_owned(),
         "-s3.port.lance=0".to_owned(),
-        // Else a put makes the bucket that a user has misspelled.
+        // Otherwise a put makes the bucket that a user has misspelled.
         "-s3.autoCreateBucket=false".to_owned(),
         "-master.telemetry=false".to_owned(),
         // Each bucket takes volumes of its own, several at once.

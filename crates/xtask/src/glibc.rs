@@ -52,7 +52,7 @@ impl Needs {
     /// Reads the requirements of the program `bytes`.
     ///
     /// # Errors
-    /// [`Error::Format`].
+    /// [`Error::Format`] if the program cannot be parsed.
     pub(crate) fn of(bytes: &[u8]) -> Result<Self, Error> {
         read(bytes).map_err(Error::Format)
     }

@@ -27,7 +27,7 @@ const CURVE: &str = "curve-";
 pub(crate) struct Example {
     /// The name of the example, and of its picture without the ending.
     pub(crate) name: String,
-    /// The complete script.
+    /// The complete script of the example.
     pub(crate) script: String,
 }
 

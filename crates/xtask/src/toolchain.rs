@@ -13,7 +13,6 @@ const ZIG: &str = "0.15.2";
 const CARGO_ZIGBUILD: &str = "0.24.0";
 const MATURIN: &str = "1.16.0";
 
-/// The installed tools.
 pub(crate) struct Toolchain {
     binaries: PathBuf,
 }

@@ -134,7 +134,7 @@ const fn configuration(name: &'static str, chosen_by: &'static [&'static str]) -
     Operation { name, chosen_by, ..PLAIN }
 }
 
-/// The supported operations.
+/// The operations that the store supports.
 pub(super) const OPERATIONS: &[Operation] = &[
     Operation {
         name: "ListBuckets",

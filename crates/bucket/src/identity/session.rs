@@ -16,7 +16,7 @@ pub(crate) struct Session {
     pub(crate) secret_key: String,
     pub(crate) token: String,
     pub(crate) policy: Policy,
-    /// The ARN `arn:aws:sts::000000000000:assumed-role/role/session`.
+    /// The ARN of the session: `arn:aws:sts::000000000000:assumed-role/role/session`.
     pub(crate) arn: String,
     pub(crate) expires: SystemTime,
     /// The policy document as it was received.

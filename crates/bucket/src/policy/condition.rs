@@ -113,7 +113,7 @@ impl Value {
 }
 
 impl Condition {
-    /// Makes a condition.
+    /// Makes a condition on a key's values.
     ///
     /// # Errors
     /// Returns the value that the operator cannot use.

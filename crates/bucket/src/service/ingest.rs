@@ -116,7 +116,7 @@ pub(crate) fn valid(algorithm: Algorithm, value: Option<&str>) -> Answer<String>
         .ok_or_else(|| invalid_request(format!("Value for {} header is invalid.", algorithm.header())))
 }
 
-/// Receives a body.
+/// Receives a body and verifies it.
 pub(crate) async fn ingest<S>(storage: &Storage, expected: ExpectedBody, mut body: S) -> Answer<Ingested>
 where
     S: Stream<Item = Result<Bytes, StdError>> + Unpin,

@@ -1,4 +1,4 @@
-//! ListParts and ListMultipartUploads.
+//! The operations ListParts and ListMultipartUploads.
 
 use s3s::dto::*;
 

@@ -1,4 +1,4 @@
-//! PutObject.
+//! The operation PutObject: a new object in one request.
 
 use hyper::header::{HeaderMap, HeaderValue};
 use s3s::dto::*;

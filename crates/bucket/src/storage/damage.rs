@@ -61,7 +61,7 @@ async fn changes(rng: &mut Rng, storage: &Storage, model: &mut Model) {
         }
         if rng.u8(0..4) == 0 {
             let lazy = [rng.u8(..); 8];
-            storage.change(Kind::Lazy, move |batch| batch.put(Table::Outbox, &lazy, b"told")).await.unwrap();
+            storage.change(Kind::Lazy, move |batch| batch.put(Table::Outbox, &lazy, b"sent")).await.unwrap();
         }
     }
 }

@@ -27,7 +27,6 @@ const CACHE_BYTES: usize = 64 * 1024 * 1024;
 /// The row with the number of the last journal entry that the database holds durably.
 const APPLIED: &[u8] = b"applied";
 
-/// An open database.
 pub(super) struct Open {
     database: Database,
     disk: Arc<Disk>,
@@ -509,7 +508,7 @@ mod tests {
 
     /// Only a full disk is waited for. Any other error is reported at once.
     #[test]
-    fn faults_other_than_a_full_disk_are_told() {
+    fn faults_other_than_a_full_disk_are_reported() {
         assert!(is_full(&full()) && !is_full(&io::Error::other("a fault")));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");

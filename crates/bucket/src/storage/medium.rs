@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::bodies::sync_folder;
 use crate::private;
 
-/// An open file.
+/// A file of the store that is open.
 pub(super) trait Medium: std::fmt::Debug + Send + Sync {
     /// Returns the length in bytes.
     fn len(&self) -> io::Result<u64>;

@@ -22,7 +22,7 @@ use crate::{Error, Result};
 /// Opens database and journal.
 ///
 /// # Errors
-/// [`Error::Damaged`], [`Error::File`], [`Error::Storage`].
+/// [`Error::Damaged`], [`Error::File`] and [`Error::Storage`].
 pub(super) fn open(folder: &mut Folder) -> Result<(Open, Journal)> {
     let format_1 = folder.is_of_format_1();
     let (journal_file, contents) = journal_of(folder)?;

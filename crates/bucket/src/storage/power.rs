@@ -229,7 +229,7 @@ async fn work(
             if rng.bool() {
                 let lazy = [rng.u8(..)];
                 let change =
-                    storage.change(Kind::Lazy, move |batch| batch.put(Table::Outbox, &lazy, b"told"));
+                    storage.change(Kind::Lazy, move |batch| batch.put(Table::Outbox, &lazy, b"sent"));
                 let _ = change.await;
             }
         }

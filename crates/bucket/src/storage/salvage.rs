@@ -174,7 +174,7 @@ impl Salvage {
     /// between, a repair can be started again.
     ///
     /// # Errors
-    /// [`Error::File`] and [`Error::Storage`].
+    /// The errors [`Error::File`] and [`Error::Storage`].
     pub(crate) fn keep(mut self, aside: &Path) -> Result<()> {
         let transaction = self.fresh.begin().map_err(|source| self.failed(source))?;
         self.fresh.commit_durably(transaction, self.last).map_err(|source| self.failed(source))?;

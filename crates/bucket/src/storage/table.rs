@@ -24,7 +24,6 @@ type Read = ReadOnlyTable<&'static [u8], &'static [u8]>;
 pub(crate) enum Table {
     /// Single values, by name.
     Settings = 0,
-    /// Buckets by name.
     Buckets = 1,
     /// Objects by bucket and key, in the order of listings.
     Objects = 2,
@@ -177,7 +176,6 @@ impl<'t> Batch<'t> {
         Ok(Self { tables, changes, adopted, discarded, removed_bytes: 0 })
     }
 
-    /// Writes a row.
     pub(crate) fn put(&mut self, table: Table, key: &[u8], value: &[u8]) -> Result<(), StorageError> {
         let replaced = self.tables[table as usize].insert(key, value)?;
         self.removed_bytes += replaced.map_or(0, |value| value.value().len() as u64);

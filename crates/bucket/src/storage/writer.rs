@@ -71,7 +71,6 @@ pub(super) trait Job: Send {
 
 /// A message to the writing thread.
 pub(super) enum Message {
-    /// Run this change.
     Change(Box<dyn Job>),
     /// Reopen the database if it has damage, then drop the sender.
     Reopen(Sender<()>),
@@ -341,7 +340,7 @@ fn is_awaited(mut kinds: impl Iterator<Item = Kind>) -> bool {
 }
 
 enum Failure {
-    /// Nothing was changed.
+    /// The change was refused, and nothing was changed.
     Refused(Unavailable),
     /// The database must be reopened.
     Database(redb::Error),

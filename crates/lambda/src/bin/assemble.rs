@@ -1,4 +1,4 @@
-//! The assemble function.
+//! The program of the assemble function.
 
 fn main() -> anyhow::Result<()> {
     rayfold_lambda::run(rayfold_lambda::Function::Assemble)

@@ -1,4 +1,4 @@
-//! The render function.
+//! The program of the render function.
 
 fn main() -> anyhow::Result<()> {
     rayfold_lambda::run(rayfold_lambda::Function::Render)

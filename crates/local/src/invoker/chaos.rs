@@ -1,6 +1,6 @@
-//! What the platform may do to events and processes, on purpose and from a seed.
+//! The faults of events and processes that the platform makes on purpose, from a seed.
 //!
-//! The same seed draws the same fates in the same order; which event meets which fate still depends on the order in
+//! A seed always draws the same faults in the same order; which event meets which fault still depends on the order in
 //! which the store reports them.
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,13 +11,13 @@ use crate::observation::{Attempt, StoreRequest};
 /// The switches; all off by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chaos {
-    /// Of all the random choices.
+    /// The seed of all random choices.
     pub seed: u64,
     /// Probability that an event is delivered twice.
     pub duplicate: f64,
     /// Probability that an event is delayed, by up to `delay_up_to`.
     pub delay: f64,
-    /// The longest delay.
+    /// The longest delay of an event.
     pub delay_up_to: Duration,
     /// Events are kept until none has come for this long, then delivered newest first.
     pub reverse_after: Option<Duration>,
@@ -25,11 +25,11 @@ pub struct Chaos {
     pub drop: f64,
     /// Probability that an invocation's process is killed, at a random time up to `kill_within`.
     pub kill: f64,
-    /// The latest kill.
+    /// The latest time of a kill within its invocation.
     pub kill_within: Duration,
 }
 
-/// What happens to a process that is about to send a request to the store.
+/// The fate of a process that is about to send a request to the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// The request goes through.

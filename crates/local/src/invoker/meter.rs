@@ -65,7 +65,7 @@ impl Meter {
         Ok(Self { address, shared, _server: server })
     }
 
-    /// What the process is told to be the store.
+    /// Returns the endpoint that the process takes for the store.
     pub(crate) fn endpoint(&self) -> String {
         format!("http://{}", self.address)
     }
@@ -75,7 +75,7 @@ impl Meter {
         *self.shared.current() = Current { attempt: Some(attempt), requests: Requests::default() };
     }
 
-    /// What was sent since [`Self::begin`].
+    /// Returns the requests sent since [`Self::begin`].
     pub(crate) fn requests(&self) -> Requests {
         self.shared.current().requests
     }
@@ -135,7 +135,7 @@ fn slow_down() -> Response<Body> {
     answer
 }
 
-/// What a request is to S3's bill.
+/// Returns the class in which S3 bills a request.
 fn classify(method: &Method, uri: &Uri) -> StoreRequest {
     let decoded = |text: &str| percent_decode_str(text).decode_utf8_lossy().into_owned();
     let path = uri.path().trim_start_matches('/');
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_are_told_apart_as_they_are_billed() {
+    fn requests_are_classified_as_they_are_billed() {
         let kind = |method: Method, uri: &str| {
             let seen = classify(&method, &uri.parse().unwrap());
             (seen.kind, seen.key)

@@ -18,9 +18,9 @@ pub(crate) struct Job {
     pub(crate) caller: Caller,
 }
 
-/// Who hears of the end.
+/// The receiver of the outcome.
 pub(crate) enum Caller {
-    /// Nobody: failures are tried again, then delivered.
+    /// No receiver: failures are tried again, then delivered.
     Event,
     /// The one who waits; trying again is up to them.
     Waiting(oneshot::Sender<Outcome>),

@@ -1,13 +1,13 @@
-//! How fast new processes may start: Lambda's token bucket.
+//! The rate at which new processes may start: Lambda's token bucket.
 
 use std::time::Instant;
 
-/// How fast new processes may start.
+/// The rate at which new processes may start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {
-    /// At once.
+    /// The number that may start at once.
     pub burst: u32,
-    /// Afterwards.
+    /// The rate after the burst, per second.
     pub per_second: f64,
 }
 

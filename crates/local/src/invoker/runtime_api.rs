@@ -3,8 +3,9 @@
 //! `GET …/invocation/next` waits for an invocation; `POST …/invocation/{id}/response` and `…/error` end it; `POST
 //! …/init/error` says that there will be none. A process handles one invocation at a time.
 //!
-//! Lambda's own is seen by its process alone. A port of this machine is seen by all of its users and by the pages of their
-//! browsers, so that here each path begins with a token that the process alone is told, and nothing from a page is heard.
+//! Lambda's own is seen by its process alone. A port of this machine is seen by all of its users and by the
+//! pages of their browsers. So each path here begins with a token that only the process gets, and nothing from
+//! a page is heard.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,10 +23,10 @@ use crate::credentials::token;
 use crate::error::Result;
 use crate::http::{Body, Server, any_port, full, json, listen};
 
-/// After the token.
+/// The path after the token.
 const BASE: &str = "/2018-06-01/runtime/";
 
-/// What `next` hands out.
+/// An invocation that `next` hands out.
 #[derive(Clone, Debug)]
 pub(crate) struct Handout {
     pub(crate) request_id: String,
@@ -35,7 +36,7 @@ pub(crate) struct Handout {
     pub(crate) trace_id: String,
 }
 
-/// What the process did.
+/// An action of the process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Call {
     /// It asked for the next invocation.
@@ -60,7 +61,7 @@ pub(crate) struct RuntimeApi {
 struct Shared {
     /// Its own address, as a request names it.
     host: String,
-    /// What the path of each request begins with.
+    /// The beginning of each request's path.
     base: String,
     handouts: tokio::sync::Mutex<mpsc::UnboundedReceiver<Handout>>,
     calls: mpsc::UnboundedSender<Call>,
@@ -87,7 +88,7 @@ impl RuntimeApi {
         Ok(Self { address, token, handouts, calls, _server: server })
     }
 
-    /// What the process is told; anybody else is not.
+    /// Returns the endpoint for the process, with the token.
     pub(crate) fn endpoint(&self) -> String {
         format!("http://{}/{}", self.address, self.token)
     }
@@ -97,7 +98,7 @@ impl RuntimeApi {
         let _ = self.handouts.send(handout);
     }
 
-    /// What the process does next; never ends.
+    /// Returns the next action of the process; never ends.
     pub(crate) async fn call(&mut self) -> Call {
         match self.calls.recv().await {
             Some(call) => call,

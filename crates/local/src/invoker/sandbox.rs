@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::observation::{Attempt, Observer, Outcome, Requests, Seen};
 use crate::routes::Function;
 
-/// What Lambda gives a process before its first call of `next`.
+/// The time that Lambda gives a process before its first call of `next`.
 const INIT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// A process, warm after its first invocation.

@@ -37,8 +37,8 @@ pub struct Settings {
     pub timeout: Duration,
     /// The pauses before each further attempt at a failed event; Lambda's are one and two minutes.
     pub retry_pauses: Vec<Duration>,
-    /// How soon the store delivers what it has kept while nobody listened; nothing when it keeps no events. The sweep at
-    /// the start waits for these: what they wake needs no waking.
+    /// The time within which the store delivers the events that it has kept while nobody listened; `None` when it
+    /// keeps no events. The sweep at the start waits for these: a frame that they wake needs no waking.
     pub kept_events: Option<Duration>,
     /// The listings of the bucket from which events come, if the store sends none.
     pub listing: Option<Listing>,
@@ -51,7 +51,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Those of a laptop.
+    /// Returns settings that suit a laptop.
     pub fn new(
         functions: Functions,
         store: Option<SocketAddr>,
@@ -82,7 +82,7 @@ impl Settings {
 /// The listing by which an invoker finds changes in a bucket, and the invoker's share of them.
 #[derive(Clone)]
 pub struct Listing {
-    /// The bucket.
+    /// The store of the bucket.
     pub store: S3Store,
     /// The invoker's name, without slashes. Of two invokers on a bucket with one name, each believes to be alone.
     pub name: String,
