@@ -168,15 +168,15 @@ fn the_core_sees_no_runtime_network_clock_or_randomness() {
 #[test]
 fn no_modules_use_one_another_in_a_circle() {
     let read = |path: &Path| std::fs::read_to_string(path).ok();
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     for folder in std::fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap()) {
         let name = folder.file_name().into_string().unwrap();
         let roots = crate_roots(&folder.path().join("src"));
         assert!(!roots.is_empty(), "crates/{name} has neither a library nor a program");
         let circles = roots.iter().flat_map(|root| circles::circles(root, &read));
-        told.extend(circles.map(|circle| format!("crates/{name}: {circle}")));
+        found.extend(circles.map(|circle| format!("crates/{name}: {circle}")));
     }
-    assert!(told.is_empty(), "modules that use one another in a circle:\n{}", told.join("\n"));
+    assert!(found.is_empty(), "modules that use one another in a circle:\n{}", found.join("\n"));
 }
 
 #[test]

@@ -63,8 +63,8 @@ async fn assume(server: &Server, statements: &str) -> Credentials {
         .await
         .unwrap();
     #[expect(deprecated, reason = "AWS still answers it, and so do we")]
-    let told = answer.packed_policy_size();
-    assert_eq!(told, Some(share as i32), "percent of what a policy may be long");
+    let percent = answer.packed_policy_size();
+    assert_eq!(percent, Some(share as i32), "percent of what a policy may be long");
     let given = answer.credentials().unwrap();
     let left =
         given.expiration().secs() - std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs() as i64;
@@ -159,7 +159,7 @@ async fn a_session_outlives_the_server_and_needs_its_token() {
 }
 
 #[tokio::test]
-async fn what_is_absent_is_told_to_those_who_may_list() {
+async fn absence_is_shown_to_callers_that_may_list() {
     let data = tempfile::tempdir().unwrap();
     let server = server(data.path()).await;
     filled(&server).await;
@@ -255,7 +255,7 @@ async fn what_no_statement_names_is_denied() {
 }
 
 #[tokio::test]
-async fn whoever_may_not_assume_a_role_is_told_why() {
+async fn a_caller_that_may_not_assume_a_role_learns_why() {
     let data = tempfile::tempdir().unwrap();
     let server = server(data.path()).await;
     let policy = format!(r#"{{"Version":"2012-10-17","Statement":[{READ}]}}"#);

@@ -84,7 +84,7 @@ async fn put_until_killed(process: Process, puts: usize) -> Vec<usize> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_was_acknowledged_is_there_whole_and_told() {
+async fn what_was_acknowledged_is_there_whole_and_sends_events() {
     let puts = puts();
     let folder = tempfile::tempdir().unwrap();
     let (webhook, heard) = listener(0).await;
@@ -122,15 +122,15 @@ async fn what_was_acknowledged_is_there_whole_and_told() {
         futures_util::future::join_all(whole).await;
     }
     for _ in 0..1000 {
-        let told: std::collections::BTreeSet<_> = heard.all().into_iter().map(|(_, key)| key).collect();
-        if there.keys().all(|key| told.contains(key)) {
+        let sent: std::collections::BTreeSet<_> = heard.all().into_iter().map(|(_, key)| key).collect();
+        if there.keys().all(|key| sent.contains(key)) {
             break;
         }
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    let told: std::collections::BTreeSet<_> = heard.all().into_iter().map(|(_, key)| key).collect();
-    let untold: Vec<_> = there.keys().filter(|key| !told.contains(*key)).collect();
-    assert!(untold.is_empty(), "never told: {untold:?}");
+    let sent: std::collections::BTreeSet<_> = heard.all().into_iter().map(|(_, key)| key).collect();
+    let unsent: Vec<_> = there.keys().filter(|key| !sent.contains(*key)).collect();
+    assert!(unsent.is_empty(), "never sent: {unsent:?}");
 
     // The files are exactly those of the large objects.
     let large = there.values().filter(|size| **size > 131_072).count();
@@ -145,7 +145,12 @@ async fn what_was_acknowledged_is_there_whole_and_told() {
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     assert_eq!(files(), large, "orphans, or objects without a file");
-    println!("{} acknowledged, {} there, {} told of {puts}", acknowledged.len(), there.len(), told.len());
+    println!(
+        "{} acknowledged, {} there, {} with an event, of {puts} puts",
+        acknowledged.len(),
+        there.len(),
+        sent.len()
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -118,7 +118,7 @@ impl Invoker {
         }
     }
 
-    /// By process id.
+    /// Sends a signal to the process, by its id.
     fn signal(&self, signal: &str) {
         let status = Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
         assert!(status.success());

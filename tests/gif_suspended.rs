@@ -21,7 +21,6 @@ use rayfold_gif::{Encoder, Error, Plays, Settings, Summary};
 /// The number of animations.
 const ANIMATIONS: usize = 60;
 
-/// A random animation.
 struct Animation {
     settings: Settings,
     frames: Vec<RgbImage>,

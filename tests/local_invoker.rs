@@ -84,7 +84,7 @@ async fn a_warm_process_is_used_again_and_a_crashed_one_is_replaced() {
     assert_eq!((served(&answers[0]), served(&answers[1])), (1, 2));
     assert!(matches!(&answers[2], Outcome::Crashed(how) if how.contains('3')), "{:?}", answers[2]);
     assert_eq!(served(&answers[3]), 1);
-    assert!(matches!(&answers[4], Outcome::Failed(body) if body.contains("as told")));
+    assert!(matches!(&answers[4], Outcome::Failed(body) if body.contains("as asked")));
     assert_eq!(served(&answers[5]), 3, "an error that a function reports does not end its process");
 }
 

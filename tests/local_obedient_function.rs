@@ -23,7 +23,7 @@ fn main() {
             std::thread::sleep(Duration::from_secs(3600));
         } else if event.contains("fail") {
             end = "error";
-            answer = "{\"errorType\":\"Told\",\"errorMessage\":\"as told\"}".to_owned();
+            answer = "{\"errorType\":\"Asked\",\"errorMessage\":\"as asked\"}".to_owned();
         } else if event.contains("slow") {
             std::thread::sleep(Duration::from_millis(200));
         }

@@ -82,7 +82,7 @@ fn at_put_of(ending: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_frame_in_bands_is_put_together_whoever_is_killed_on_the_way() {
+async fn a_frame_in_bands_is_put_together_whichever_invocation_is_killed() {
     on_every_store(async |store| {
         for ending in [".cut-4", ".band-0.json", ".band", ".png"] {
             for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer] {
@@ -168,11 +168,11 @@ async fn a_frame_that_takes_too_long_is_named() {
     let FrameState::Failed(fault) = &frame.state else { panic!("{frame:?}") };
     assert!(fault.reason.as_ref().unwrap().message.contains("timed out in each of 3 attempts"), "{fault:?}");
     let seen = stage.seen();
-    let told = seen
+    let timeouts = seen
         .iter()
         .filter(|o| matches!(&o.seen, Seen::Finished { outcome: Outcome::Failed(body), .. } if body.contains("out of time")))
         .count();
-    assert_eq!(told, 3, "it stops in time to say so and is not killed");
+    assert_eq!(timeouts, 3, "it stops in time to say so and is not killed");
     }).await;
 }
 

@@ -153,7 +153,7 @@ async fn unfinished(server: &S3Server, bucket: &str, key: &str) -> usize {
 }
 
 #[tokio::test]
-async fn refusals_are_told_apart_from_trouble() {
+async fn refusals_differ_from_trouble() {
     on_every_store(async |store| {
         let (server, _data) = started(store).await;
         let right = server.connection();

@@ -1,4 +1,4 @@
-# What the stack may cost in a month before somebody is told. It tells; it stops nothing.
+# What the stack may cost in a month before the recipients get a message. It reports; it stops nothing.
 
 resource "aws_budgets_budget" "this" {
   count = var.budget == null ? 0 : 1

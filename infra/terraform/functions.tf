@@ -79,7 +79,7 @@ resource "aws_lambda_function" "this" {
 
   environment {
     variables = merge(
-      # Events name their bucket; the sweep and the failure queue's records are told which one to look at.
+      # Events name their bucket; the sweep and the failure queue's records get its name from here.
       { RAYFOLD_BUCKET = local.bucket },
       local.limits_of_animations,
       each.value.program == "render" ? local.limits_of_scripts : {},

@@ -127,7 +127,7 @@ variable "eventbridge_enabled" {
 }
 
 variable "finished_topic_arn" {
-  description = "ARN of an SNS topic that is told of each finished GIF; its policy must let s3.amazonaws.com publish. Null tells none"
+  description = "ARN of an SNS topic that gets a message for each finished GIF; its policy must let s3.amazonaws.com publish. Null sends none"
   type        = string
   default     = null
 
@@ -384,7 +384,7 @@ variable "alarms_enabled" {
 }
 
 variable "alarm_actions" {
-  description = "ARNs, of SNS topics for example, that are told when an alarm goes off and when it is over"
+  description = "ARNs, of SNS topics for example, that get a message when an alarm goes off and when it is over"
   type        = list(string)
   default     = []
   nullable    = false
@@ -428,7 +428,7 @@ variable "runbook_url" {
 }
 
 variable "budget" {
-  description = "Dollars a month from which somebody is told what the stack costs: at 80 % spent, and at 100 % forecast. It needs the tag Application to be activated for cost allocation; null sets none"
+  description = "Dollars a month from which the recipients get a message about the cost of the stack: at 80 % spent, and at 100 % forecast. It needs the tag Application to be activated for cost allocation; null sets none"
   type = object({
     monthly_usd = number
     emails      = optional(list(string), [])

@@ -83,18 +83,18 @@ pub(crate) fn upward(
 /// (crate::b::Thing) -> a (crate::a)`. `read` returns the text of a file, if it exists.
 pub(crate) fn circles(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Vec<String> {
     let uses = uses(root, read);
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     let mut seen = BTreeSet::new();
     for start in uses.keys().filter(|path| !path.is_empty()).chain(uses.keys().filter(|path| path.is_empty()))
     {
         if !seen.contains(start)
             && let Some(circle) = way_back(start, &uses)
         {
-            told.push(tell(&circle, &uses));
+            found.push(tell(&circle, &uses));
             seen.extend(circle);
         }
     }
-    told
+    found
 }
 
 /// A file with a module, and the folder of its children.
@@ -353,12 +353,12 @@ fn way_back(start: &Vec<String>, uses: &Uses) -> Option<Vec<Vec<String>>> {
 
 fn tell(circle: &[Vec<String>], uses: &Uses) -> String {
     let name = |module: &[String]| if module.is_empty() { "crate".to_owned() } else { module.join("::") };
-    let mut told = name(&circle[0]);
+    let mut path = name(&circle[0]);
     for (i, module) in circle.iter().enumerate() {
         let next = &circle[(i + 1) % circle.len()];
-        told += &format!(" -> {} (`{}`)", name(next), uses[module][next]);
+        path += &format!(" -> {} (`{}`)", name(next), uses[module][next]);
     }
-    told
+    path
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ fn is_recent(moment: &DateTime) -> bool {
 }
 
 #[tokio::test]
-async fn buckets_are_told_with_their_owner_a_page_at_a_time() {
+async fn buckets_are_listed_with_their_owner_a_page_at_a_time() {
     let stage = stage().await;
     for name in ["albums", "series"] {
         stage.client.create_bucket().bucket(name).send().await.unwrap();
@@ -86,7 +86,7 @@ async fn a_bucket_is_where_the_store_is_and_the_owners_alone() {
 /// For historical reasons an empty location stands for us-east-1.
 #[tokio::test]
 async fn a_buckets_location_is_the_region_unless_it_is_the_first_one() {
-    for (region, told) in [("us-east-1", ""), ("eu-central-1", "eu-central-1")] {
+    for (region, expected) in [("us-east-1", ""), ("eu-central-1", "eu-central-1")] {
         let folder = tempfile::tempdir().unwrap();
         let options = rayfold_bucket::Options { region: region.into(), ..options(folder.path(), None) };
         let server = Server::start(options).await.unwrap();
@@ -95,7 +95,7 @@ async fn a_buckets_location_is_the_region_unless_it_is_the_first_one() {
             aws_sdk_s3::Client::from_conf(config.region(aws_sdk_s3::config::Region::new(region)).build());
         client.create_bucket().bucket(BUCKET).send().await.unwrap();
         let location = client.get_bucket_location().bucket(BUCKET).send().await.unwrap().location_constraint;
-        assert_eq!(location.map(|place| place.as_str().to_owned()).unwrap_or_default(), told);
+        assert_eq!(location.map(|place| place.as_str().to_owned()).unwrap_or_default(), expected);
     }
 }
 
@@ -130,7 +130,7 @@ async fn a_read_on_the_very_second_of_a_change_sees_it() {
 }
 
 #[tokio::test]
-async fn when_a_body_expires_and_what_it_is_are_told() {
+async fn the_headers_of_a_body_are_returned() {
     let stage = stage().await;
     let date = DateTime::from_secs(2_000_000_000);
     let text = "Wed, 18 May 2033 03:33:20 GMT";
@@ -189,11 +189,11 @@ async fn listings_repeat_what_was_asked_and_name_the_next_marker_as_s3_does() {
     for key in ["a", "b", "c"] {
         stage.put(key, "1").await;
     }
-    for (delimiter, told) in [("/", Some("/")), ("", None)] {
+    for (delimiter, expected) in [("/", Some("/")), ("", None)] {
         let second = stage.client.list_objects_v2().bucket(BUCKET).delimiter(delimiter).send().await.unwrap();
-        assert_eq!(second.delimiter(), told);
+        assert_eq!(second.delimiter(), expected);
         let first = stage.client.list_objects().bucket(BUCKET).delimiter(delimiter).send().await.unwrap();
-        assert_eq!((first.delimiter(), first.next_marker()), (told, None));
+        assert_eq!((first.delimiter(), first.next_marker()), (expected, None));
     }
     let cut = stage.client.list_objects().bucket(BUCKET).max_keys(2);
     assert_eq!(cut.clone().delimiter("/").send().await.unwrap().next_marker(), Some("b"));
@@ -281,16 +281,16 @@ async fn upload(
     for (number, body) in (1..).zip(bodies) {
         let part = stage.client.upload_part().bucket(BUCKET).key(key).upload_id(id).part_number(number);
         let part = part.set_checksum_algorithm(algorithm.clone()).body(body.clone().into());
-        let told = part.send().await.unwrap();
+        let uploaded = part.send().await.unwrap();
         parts.push(
             CompletedPart::builder()
                 .part_number(number)
-                .set_e_tag(told.e_tag)
-                .set_checksum_crc32(told.checksum_crc32)
-                .set_checksum_crc32_c(told.checksum_crc32_c)
-                .set_checksum_crc64_nvme(told.checksum_crc64_nvme)
-                .set_checksum_sha1(told.checksum_sha1)
-                .set_checksum_sha256(told.checksum_sha256)
+                .set_e_tag(uploaded.e_tag)
+                .set_checksum_crc32(uploaded.checksum_crc32)
+                .set_checksum_crc32_c(uploaded.checksum_crc32_c)
+                .set_checksum_crc64_nvme(uploaded.checksum_crc64_nvme)
+                .set_checksum_sha1(uploaded.checksum_sha1)
+                .set_checksum_sha256(uploaded.checksum_sha256)
                 .build(),
         );
     }
@@ -445,8 +445,8 @@ async fn uploads_refuse_checksums_that_do_not_fit_together() {
     let whole = "a0+JpU4tJ+zX6NoFtKuP2dHYsRk=";
     let right = complete(listed().set_checksum_sha1(kept.checksum_sha1.clone()).build());
     let right = right.checksum_type(ChecksumType::Composite).mpu_object_size(5).checksum_sha1(whole);
-    let told = right.send().await.unwrap();
-    assert_eq!(told.checksum_sha1, Some(format!("{whole}-1")));
+    let completed = right.send().await.unwrap();
+    assert_eq!(completed.checksum_sha1, Some(format!("{whole}-1")));
 }
 
 /// An upload without its own algorithm accepts parts with any. At the end the client may state the parts' checksums and
@@ -465,7 +465,7 @@ async fn an_upload_without_an_algorithm_takes_any() {
 }
 
 #[tokio::test]
-async fn a_puts_checksum_is_told_under_its_own_name_and_of_its_kind() {
+async fn a_puts_checksum_is_returned_by_its_name_and_kind() {
     let stage = stage().await;
     for (place, algorithm) in ALGORITHMS.into_iter().enumerate() {
         let put = stage.client.put_object().bucket(BUCKET).key("a").checksum_algorithm(algorithm);

@@ -136,8 +136,8 @@ async fn a_page_uploads_a_file_by_a_signed_form() {
         let head = stage.client.head_object().bucket(BUCKET).key("up/film.txt").send().await.unwrap();
         assert_eq!(head.metadata().unwrap()["colour"], "red");
     }
-    let told = post(&stage, &[("success_action_status", "201")], "", now, b"hello").await;
-    assert_eq!((told.status, told.element("Key")), (201, "up/film.txt"), "{told:?}");
+    let answer = post(&stage, &[("success_action_status", "201")], "", now, b"hello").await;
+    assert_eq!((answer.status, answer.element("Key")), (201, "up/film.txt"), "{answer:?}");
     // The form is valid until its policy expires, not for a quarter of an hour.
     assert_eq!(post(&stage, &[], "", Duration::from_secs(3000), b"hello").await.status, 204);
     let late = post(&stage, &[], "", Duration::from_secs(3700), b"hello").await;

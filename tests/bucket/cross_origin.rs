@@ -40,9 +40,9 @@ async fn a_page_uploads_by_a_presigned_url() {
     assert_eq!(none.failure(), (403, "AccessForbidden"), "no rules");
 
     set(&stage, rule("https://*.example", "PUT")).await.unwrap();
-    let told = stage.client.get_bucket_cors().bucket(BUCKET).send().await.unwrap();
-    let [told] = told.cors_rules() else { panic!("{told:?}") };
-    assert_eq!((told.id(), told.allowed_origins()), (Some("pages"), &["https://*.example".to_owned()][..]));
+    let answer = stage.client.get_bucket_cors().bucket(BUCKET).send().await.unwrap();
+    let [kept] = answer.cors_rules() else { panic!("{answer:?}") };
+    assert_eq!((kept.id(), kept.allowed_origins()), (Some("pages"), &["https://*.example".to_owned()][..]));
 
     let allowed = raw(&stage, &format!("OPTIONS {target}"), &asks, "").await;
     assert_eq!(allowed.status, 200, "{allowed:?}");

@@ -61,8 +61,8 @@ async fn every_error_has_a_message() {
         ("GET", "/films?policy", vec![], b""),
     ] {
         let answer = send(&stage, method, target, &headers, body).await;
-        let told = !answer.element("Code").is_empty() && !answer.element("Message").is_empty();
-        assert!(answer.status >= 400 && told, "{method} {target}: {answer:?}");
+        let has_reason = !answer.element("Code").is_empty() && !answer.element("Message").is_empty();
+        assert!(answer.status >= 400 && has_reason, "{method} {target}: {answer:?}");
     }
     let long = format!("/films/{}", "k".repeat(1025));
     assert!(!send(&stage, "GET", &long, &[], b"").await.element("Message").is_empty());
@@ -229,9 +229,9 @@ async fn buckets_have_names_as_with_s3_and_are_made_again_in_its_first_region() 
 async fn an_entity_tag_among_attributes_has_no_quotes() {
     let stage = stage().await;
     stage.put("a", "123456789").await;
-    let told = stage.client.get_object_attributes().bucket(BUCKET).key("a");
-    let told = told.object_attributes(ObjectAttributes::Etag).send().await.unwrap();
-    assert_eq!(told.e_tag(), Some("25f9e794323b453885f5181f1b624d0b"));
+    let attributes = stage.client.get_object_attributes().bucket(BUCKET).key("a");
+    let attributes = attributes.object_attributes(ObjectAttributes::Etag).send().await.unwrap();
+    assert_eq!(attributes.e_tag(), Some("25f9e794323b453885f5181f1b624d0b"));
 }
 
 #[tokio::test]

@@ -11,7 +11,7 @@ fn event(name: &str, key: &str) -> (String, String) {
 }
 
 #[tokio::test]
-async fn every_kind_of_change_is_told() {
+async fn every_kind_of_change_sends_an_event() {
     let (webhook, heard) = listener(0).await;
     let stage = stage_with(Some(webhook)).await;
     stage.put("before", "nobody asked yet").await;
@@ -31,11 +31,11 @@ async fn every_kind_of_change_is_told() {
     ];
     assert_eq!(all, expected);
     tokio::time::sleep(Duration::from_millis(50)).await;
-    assert_eq!(heard.all().len(), 3, "what was not there was told");
+    assert_eq!(heard.all().len(), 3, "an event was sent for an absent object");
 }
 
 #[tokio::test]
-async fn each_object_of_a_delete_of_many_is_told() {
+async fn each_object_of_a_delete_of_many_sends_an_event() {
     use aws_sdk_s3::types::{Delete, ObjectIdentifier};
     let (webhook, heard) = listener(0).await;
     let stage = stage_with(Some(webhook)).await;
@@ -47,11 +47,11 @@ async fn each_object_of_a_delete_of_many_is_told() {
     let many = Delete::builder().objects(object("a")).objects(object("never there")).objects(object("c"));
     let delete = stage.client.delete_objects().bucket(BUCKET).delete(many.build().unwrap());
     delete.send().await.unwrap();
-    let mut told = heard.wait(2).await;
-    told.sort();
-    assert_eq!(told, [event("ObjectRemoved:Delete", "a"), event("ObjectRemoved:Delete", "c")]);
+    let mut events = heard.wait(2).await;
+    events.sort();
+    assert_eq!(events, [event("ObjectRemoved:Delete", "a"), event("ObjectRemoved:Delete", "c")]);
     tokio::time::sleep(Duration::from_millis(50)).await;
-    assert_eq!(heard.all().len(), 2, "what was not there was told");
+    assert_eq!(heard.all().len(), 2, "an event was sent for an absent object");
 }
 
 #[tokio::test]
@@ -121,12 +121,12 @@ async fn events_wait_for_a_listener_across_restarts() {
     server.stop().await;
     let server = Server::start(options(stage.folder.path(), Some(webhook))).await.unwrap();
     tokio::time::sleep(Duration::from_millis(200)).await;
-    assert_eq!(heard.all().len(), 50, "events were told again after a stop in order");
+    assert_eq!(heard.all().len(), 50, "events were sent again after a stop in order");
     server.stop().await;
 }
 
 #[tokio::test]
-async fn notifications_are_told_back_and_filter_by_prefix_and_suffix() {
+async fn notifications_are_read_back_and_filter_by_prefix_and_suffix() {
     use aws_sdk_s3::types::{
         Event, FilterRule, FilterRuleName, NotificationConfiguration, NotificationConfigurationFilter,
         QueueConfiguration, S3KeyFilter,
@@ -148,8 +148,9 @@ async fn notifications_are_told_back_and_filter_by_prefix_and_suffix() {
     let configuration = NotificationConfiguration::builder().queue_configurations(queue.clone()).build();
     let set = stage.client.put_bucket_notification_configuration().bucket(BUCKET);
     set.notification_configuration(configuration).send().await.unwrap();
-    let told = stage.client.get_bucket_notification_configuration().bucket(BUCKET).send().await.unwrap();
-    assert_eq!(told.queue_configurations(), [queue]);
+    let configuration =
+        stage.client.get_bucket_notification_configuration().bucket(BUCKET).send().await.unwrap();
+    assert_eq!(configuration.queue_configurations(), [queue]);
     for key in ["scripts/a.json", "frames/a.txt", "scripts/a.txt"] {
         stage.put(key, "1").await;
     }
@@ -157,7 +158,7 @@ async fn notifications_are_told_back_and_filter_by_prefix_and_suffix() {
 }
 
 #[tokio::test]
-async fn an_event_is_told_within_moments() {
+async fn an_event_is_sent_within_moments() {
     let (webhook, heard) = listener(0).await;
     let stage = stage_with(Some(webhook)).await;
     notify(&client(stage.server.address())).await;

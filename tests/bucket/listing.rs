@@ -22,8 +22,8 @@ fn expected(keys: &BTreeMap<String, String>, prefix: &str, delimiter: &str, afte
         match end {
             Some(end) => {
                 let common = &key[..prefix.len() + end + delimiter.len()];
-                let told = listing.prefixes.last().is_some_and(|last| last == common);
-                if !told && !after.starts_with(common) {
+                let is_listed = listing.prefixes.last().is_some_and(|last| last == common);
+                if !is_listed && !after.starts_with(common) {
                     listing.prefixes.push(common.to_owned());
                 }
             }
@@ -243,13 +243,13 @@ async fn listings_of_uploads_are_as_the_model_says() {
             _ => ("", ""),
         };
         let Listing { keys: alone, prefixes } = expected(&keys, &prefix, delimiter, after.0);
-        let is_told = |(key, id): &(String, String)| {
+        let is_expected = |(key, id): &(String, String)| {
             let is_behind = key == after.0 && !after.1.is_empty() && id.as_str() > after.1;
             // A key below a common prefix is listed as that prefix.
             let is_alone = |rest: &str| delimiter.is_empty() || !rest.contains(delimiter);
             alone.contains(key) || (is_behind && key.strip_prefix(&prefix).is_some_and(is_alone))
         };
-        let uploads: Vec<_> = model.iter().filter(|upload| is_told(upload)).cloned().collect();
+        let uploads: Vec<_> = model.iter().filter(|upload| is_expected(upload)).cloned().collect();
         let found = uploads_listed(&stage, &prefix, delimiter, after, most).await;
         let shown = format!("prefix {prefix:?} delimiter {delimiter:?} after {after:?} pages of {most}");
         assert_eq!(found, (uploads, prefixes), "{shown}");

@@ -218,23 +218,23 @@ async fn ask(stage: &Stage, operation: &Operation, with: &[&Parameter]) -> (u16,
 /// Returns all contents of the store with their times.
 async fn state(stage: &Stage) -> String {
     let client = &stage.client;
-    let mut told = String::new();
+    let mut text = String::new();
     for bucket in client.list_buckets().send().await.unwrap().buckets() {
-        writeln!(told, "{bucket:?}").unwrap();
+        writeln!(text, "{bucket:?}").unwrap();
         let name = bucket.name().unwrap();
         for object in client.list_objects_v2().bucket(name).send().await.unwrap().contents() {
-            writeln!(told, "{object:?}").unwrap();
+            writeln!(text, "{object:?}").unwrap();
             let head = client.head_object().bucket(name).key(object.key().unwrap()).send().await.unwrap();
-            writeln!(told, "{:?} {:?}", head.metadata(), head.content_type()).unwrap();
+            writeln!(text, "{:?} {:?}", head.metadata(), head.content_type()).unwrap();
         }
         let uploads = client.list_multipart_uploads().bucket(name).send().await.unwrap();
-        writeln!(told, "{:?}", uploads.uploads()).unwrap();
+        writeln!(text, "{:?}", uploads.uploads()).unwrap();
         let notifications = client.get_bucket_notification_configuration().bucket(name).send().await.unwrap();
-        writeln!(told, "{:?}", notifications.queue_configurations()).unwrap();
+        writeln!(text, "{:?}", notifications.queue_configurations()).unwrap();
         let cors = send(stage, "GET", &format!("/{name}?cors"), &[], b"").await;
-        writeln!(told, "{}", cors.body).unwrap();
+        writeln!(text, "{}", cors.body).unwrap();
     }
-    told
+    text
 }
 
 #[tokio::test]

@@ -1,4 +1,4 @@
-//! Multipart uploads.
+//! Tests of multipart uploads.
 
 use aws_sdk_s3::types::{
     ChecksumAlgorithm, ChecksumMode, ChecksumType, CompletedMultipartUpload, CompletedPart, ObjectAttributes,
@@ -37,7 +37,7 @@ async fn parts_become_one_object() {
         parts.push(part.await);
     }
     parts.sort_by_key(|part| part.part_number);
-    let told = stage
+    let listed = stage
         .client
         .list_parts()
         .bucket(BUCKET)
@@ -47,8 +47,8 @@ async fn parts_become_one_object() {
         .send()
         .await
         .unwrap();
-    assert_eq!(told.parts().iter().map(|part| part.part_number.unwrap()).collect::<Vec<_>>(), [1, 2]);
-    assert_eq!((told.is_truncated, told.next_part_number_marker.as_deref()), (Some(true), Some("2")));
+    assert_eq!(listed.parts().iter().map(|part| part.part_number.unwrap()).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!((listed.is_truncated, listed.next_part_number_marker.as_deref()), (Some(true), Some("2")));
     let uploads = stage.client.list_multipart_uploads().bucket(BUCKET).send().await.unwrap();
     assert_eq!(uploads.uploads()[0].upload_id(), Some(id.as_str()));
 
@@ -82,8 +82,8 @@ async fn parts_become_one_object() {
         let again = stage.client.complete_multipart_upload().bucket(BUCKET).key("film").upload_id(&id);
         again.multipart_upload(list(&parts))
     };
-    let told_again = again().send().await.unwrap().e_tag.unwrap();
-    assert_eq!(told_again, etag, "an answer that was lost can be asked for again");
+    let etag_again = again().send().await.unwrap().e_tag.unwrap();
+    assert_eq!(etag_again, etag, "an answer that was lost can be asked for again");
     stage.put("film", "another").await;
     assert_eq!(failure(again().send().await), (404, "NoSuchUpload".into()), "what came after it stays");
     stage.client.delete_object().bucket(BUCKET).key("film").send().await.unwrap();

@@ -74,9 +74,9 @@ async fn every_checksum_is_kept_and_a_wrong_one_refused() {
     ] {
         put().checksum_algorithm(algorithm.clone()).send().await.unwrap();
         let asked = [ObjectAttributes::Checksum, ObjectAttributes::Etag, ObjectAttributes::ObjectSize];
-        let told = stage.client.get_object_attributes().bucket(BUCKET).key("a");
-        let told = told.set_object_attributes(Some(asked.to_vec())).send().await.unwrap();
-        let sum = told.checksum.unwrap();
+        let attributes = stage.client.get_object_attributes().bucket(BUCKET).key("a");
+        let attributes = attributes.set_object_attributes(Some(asked.to_vec())).send().await.unwrap();
+        let sum = attributes.checksum.unwrap();
         let values = [
             sum.checksum_crc32,
             sum.checksum_crc32_c,
@@ -92,7 +92,7 @@ async fn every_checksum_is_kept_and_a_wrong_one_refused() {
             _ => "FeKw08M4keuw8e9gnsQZQgwg4yDOlMZfvIwzEkSOsiU=",
         };
         assert_eq!(values.iter().flatten().collect::<Vec<_>>(), [expected]);
-        assert_eq!(told.object_size, Some(9));
+        assert_eq!(attributes.object_size, Some(9));
     }
     assert_eq!(failure(put().checksum_crc32("AAAAAA==").send().await), (400, "BadDigest".into()));
     assert_eq!(failure(put().checksum_crc32("nonsense").send().await), (400, "InvalidRequest".into()));

@@ -49,7 +49,7 @@ async fn presigned_urls_work_until_they_expire() {
 #[tokio::test]
 async fn a_presigned_url_takes_no_header_that_was_not_signed() {
     let stage = stage().await;
-    stage.put("secret", "told to nobody").await;
+    stage.put("secret", "for its owner alone").await;
     let upload = stage.client.create_multipart_upload().bucket(BUCKET).key("a").send().await.unwrap();
     let put = stage.client.put_object().bucket(BUCKET).key("a").presigned(stage.presigning()).await.unwrap();
     let part = stage.client.upload_part().bucket(BUCKET).key("a").part_number(1);

@@ -61,20 +61,20 @@ def value(shape, depth=0):
 
 def state(s3):
     """All that is in the store."""
-    told = []
+    contents = []
     for bucket in s3.list_buckets()["Buckets"]:
         name = bucket["Name"]
-        told.append((name, bucket["CreationDate"]))
+        contents.append((name, bucket["CreationDate"]))
         for item in s3.list_objects_v2(Bucket=name).get("Contents", []):
             got = s3.get_object(Bucket=name, Key=item["Key"])
-            told.append((item["Key"], item["ETag"], item["LastModified"], got["Body"].read(), got["Metadata"]))
-        told.append(repr(s3.list_multipart_uploads(Bucket=name).get("Uploads")))
-        told.append(repr(s3.get_bucket_notification_configuration(Bucket=name).get("QueueConfigurations")))
+            contents.append((item["Key"], item["ETag"], item["LastModified"], got["Body"].read(), got["Metadata"]))
+        contents.append(repr(s3.list_multipart_uploads(Bucket=name).get("Uploads")))
+        contents.append(repr(s3.get_bucket_notification_configuration(Bucket=name).get("QueueConfigurations")))
         try:
-            told.append(repr(s3.get_bucket_cors(Bucket=name)["CORSRules"]))
+            contents.append(repr(s3.get_bucket_cors(Bucket=name)["CORSRules"]))
         except botocore.exceptions.ClientError:
-            told.append("no rules")
-    return told
+            contents.append("no rules")
+    return contents
 
 
 def call(s3, name, arguments):

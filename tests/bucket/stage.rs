@@ -133,14 +133,14 @@ pub(crate) fn failure<T: std::fmt::Debug, E: ProvideErrorMetadata + std::fmt::De
 #[derive(Clone, Default)]
 pub(crate) struct Heard {
     /// The names and keys of the accepted events, in order.
-    told: Arc<Mutex<Vec<(String, String)>>>,
+    accepted: Arc<Mutex<Vec<(String, String)>>>,
     /// The number of rejected requests.
     refused: Arc<AtomicUsize>,
 }
 
 impl Heard {
     pub(crate) fn all(&self) -> Vec<(String, String)> {
-        self.told.lock().unwrap().clone()
+        self.accepted.lock().unwrap().clone()
     }
 
     pub(crate) fn refused(&self) -> usize {
@@ -187,7 +187,7 @@ pub(crate) async fn listener(refuse: usize) -> (Webhook, Heard) {
                         let record = &message["Records"][0];
                         let name = record["eventName"].as_str().unwrap().to_owned();
                         let key = record["s3"]["object"]["key"].as_str().unwrap().to_owned();
-                        hears.told.lock().unwrap().push((name, key));
+                        hears.accepted.lock().unwrap().push((name, key));
                     }
                     Ok::<_, hyper::Error>(answer)
                 }

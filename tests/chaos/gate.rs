@@ -42,7 +42,6 @@ enum Fate {
 /// The upstream of the gate, if it is open.
 type Way = Option<SocketAddr>;
 
-/// A listening proxy.
 pub(crate) struct Gate {
     address: SocketAddr,
     way: watch::Sender<Way>,

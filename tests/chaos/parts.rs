@@ -70,7 +70,7 @@ pub(crate) struct Ground {
 
 /// The parameters of the invoker.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(crate) struct InvokerTold {
+pub(crate) struct InvokerConfig {
     /// The address of the store.
     pub(crate) store: SocketAddr,
     pub(crate) region: String,
@@ -82,7 +82,6 @@ pub(crate) struct InvokerTold {
     pub(crate) seed: Option<u64>,
 }
 
-/// A process.
 pub(crate) struct Part {
     child: Child,
     /// The process id of a server that it has started, which is killed before it.
@@ -104,7 +103,7 @@ impl Part {
     }
 
     /// Starts the invoker. Also returns the address at which it receives events.
-    pub(crate) fn invoker(folder: &Path, config: &InvokerTold, ground: Ground) -> (Self, SocketAddr) {
+    pub(crate) fn invoker(folder: &Path, config: &InvokerConfig, ground: Ground) -> (Self, SocketAddr) {
         let config = serde_json::to_string(config).unwrap();
         let (part, said) = start("invoker", folder, &config, ground).expect("the invoker does not start");
         (part, said.parse().unwrap())
@@ -219,7 +218,7 @@ async fn be_store(folder: &Path, webhook: &str) {
     say_and_stay(&format!("{endpoint} {region} {access_key} {secret_key} {pid}")).await;
 }
 
-async fn be_invoker(folder: &Path, config: &InvokerTold) {
+async fn be_invoker(folder: &Path, config: &InvokerConfig) {
     let note = noting(folder);
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
     let functions = Functions::in_folder(functions);

@@ -7,7 +7,7 @@ use fastrand::Rng;
 use rayfold_pipeline::store::{Connection, S3Store};
 
 use crate::gate::Gate;
-use crate::parts::{Ground, InvokerTold, Part, lying_clock, set_clock};
+use crate::parts::{Ground, InvokerConfig, Part, lying_clock, set_clock};
 use crate::tally::Tally;
 
 /// The number of blocks of 1,024 bytes that the largest file may still grow by on a full disk.
@@ -19,7 +19,7 @@ const STEP: std::ops::RangeInclusive<i64> = -30..=30;
 /// The rare clock steps, which exceed the limit for signatures of a store.
 const FAR: [i64; 2] = [-3_600, 3_600];
 
-/// The real parts.
+/// The parts of the system, which run as real processes.
 pub(crate) struct World {
     folder: PathBuf,
     tally: Tally,
@@ -27,7 +27,7 @@ pub(crate) struct World {
     to_invoker: Gate,
     store: Option<Part>,
     invoker: Option<Part>,
-    told: InvokerTold,
+    invoker_config: InvokerConfig,
     connection: Connection,
 }
 
@@ -45,7 +45,7 @@ impl World {
         to_store.lead(Some(address(&connection)));
         let Connection { region, access_key, secret_key, .. } = connection.clone();
         let endpoint = format!("http://{}", to_store.address());
-        let told = InvokerTold {
+        let invoker_config = InvokerConfig {
             store: to_store.address(),
             region,
             access_key,
@@ -53,7 +53,7 @@ impl World {
             in_pieces: dice.bool(),
             seed: Some(dice.u64(..)),
         };
-        if told.in_pieces {
+        if invoker_config.in_pieces {
             tally.add("rounds with GIFs in pieces");
         }
         let connection = Connection { endpoint, ..connection };
@@ -64,7 +64,7 @@ impl World {
             to_invoker,
             store: Some(store),
             invoker: None,
-            told,
+            invoker_config,
             connection,
         };
         world.start_invoker(ground);
@@ -89,14 +89,14 @@ impl World {
             }
             3 | 4 => {
                 self.kill_invoker();
-                self.told.seed = Some(dice.u64(..));
+                self.invoker_config.seed = Some(dice.u64(..));
                 tokio::time::sleep(pause).await;
                 self.start_invoker(self.ground(None));
             }
             5 => {
                 self.kill_store();
                 self.kill_invoker();
-                self.told.seed = Some(dice.u64(..));
+                self.invoker_config.seed = Some(dice.u64(..));
                 tokio::time::sleep(pause).await;
                 self.start_store(None);
                 self.start_invoker(self.ground(None));
@@ -133,13 +133,12 @@ impl World {
         }
     }
 
-    /// Ends all faults.
     pub(crate) async fn calm_down(&mut self) {
         self.kill_invoker();
         self.kill_store();
         self.to_store.roll(None);
         self.to_invoker.roll(None);
-        self.told.seed = None;
+        self.invoker_config.seed = None;
         for name in ["store", "invoker"] {
             set_clock(&self.folder, name, 0);
         }
@@ -148,7 +147,7 @@ impl World {
     }
 
     fn ground(&self, largest_file: Option<u64>) -> Ground {
-        Ground { largest_file, lying_clock: lying_clock().is_some() && self.told.seed.is_some() }
+        Ground { largest_file, lying_clock: lying_clock().is_some() && self.invoker_config.seed.is_some() }
     }
 
     fn kill_store(&mut self) {
@@ -178,7 +177,8 @@ impl World {
     }
 
     fn start_invoker(&mut self, ground: Ground) {
-        let started = tokio::task::block_in_place(|| Part::invoker(&self.folder, &self.told, ground));
+        let started =
+            tokio::task::block_in_place(|| Part::invoker(&self.folder, &self.invoker_config, ground));
         self.to_invoker.lead(Some(started.1));
         self.invoker = Some(started.0);
     }

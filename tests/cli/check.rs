@@ -1,4 +1,4 @@
-//! `rayfold check`.
+//! Tests of `rayfold check`.
 
 use serde_json::Value;
 use snapbox::str;

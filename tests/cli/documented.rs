@@ -1,9 +1,10 @@
 //! The pictures of `scenes/README.md` are what the commands beside them write.
 //!
-//! Of each animation the first frames are rendered. What a GIF holds of a frame depends on the frames up to it alone, so
-//! that the beginning of the file must be the same, byte for byte, up to the last of these frames. Then the rest of the
-//! file can only differ if a later frame does; the last frame of the file is compared as a picture, within the error that a
-//! GIF has. `RAYFOLD_PICTURES=overwrite cargo test -p rayfold --test cli documented` renders them anew as a whole.
+//! The first frames of each animation are rendered. The part of a GIF for a frame depends only on the frames up to
+//! it, so the beginning of the file must be the same, byte for byte, up to the last of these frames. Then the rest
+//! of the file can only differ if a later frame does; the last frame of the file is compared as a picture, within
+//! the error that a GIF has. `RAYFOLD_PICTURES=overwrite cargo test -p rayfold --test cli documented` renders them
+//! again as a whole.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,8 @@ use crate::{Folder, RAYFOLD, decode_gif};
 /// Frames that are rendered of each animation.
 const FRAMES: usize = 3;
 
-/// Pictures of an earlier encoder that were not rendered anew: each takes minutes. To be removed from here when they are.
+/// Pictures of an earlier encoder that were not rendered again: each takes minutes. To be removed from
+/// here when they are.
 const NOT_RENEWED: [&str; 4] = ["marbles", "glass", "clockwork", "planets"];
 
 /// The largest difference of a level that a picture may have from its last frame, on average.

@@ -1,4 +1,4 @@
-//! `rayfold encode`.
+//! Tests of `rayfold encode`.
 
 use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Luma, LumaA, Rgb, RgbImage, Rgba};
 use snapbox::str;
@@ -38,7 +38,7 @@ fn the_image_at_fault_is_named_and_nothing_is_written() {
 }
 
 #[test]
-fn all_that_cannot_be_used_is_told_before_anything_is_encoded() {
+fn all_unusable_files_are_reported_before_anything_is_encoded() {
     let folder = Folder::with("text.png", "this is no image");
     folder.write("empty.tif", "");
     folder.write("frames/note.txt", "no image either");
@@ -117,7 +117,7 @@ error: wide.png: frame 1 is 65536 x 1 pixels, a GIF can hold 1 to 65535 on each 
 }
 
 #[test]
-fn a_rate_below_zero_is_told_as_such() {
+fn a_rate_below_zero_is_reported_as_such() {
     let folder = Folder::new();
     RgbImage::new(2, 2).save(folder.join("a.png")).unwrap();
     folder.rayfold("encode a.png -o out.gif --fps -1").assert().code(2).stderr_eq(str![[r#"

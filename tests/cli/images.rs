@@ -72,7 +72,7 @@ fn a_bad_script_leaves_no_image() {
 }
 
 #[test]
-fn frames_of_a_longer_run_are_told_and_stay() {
+fn frames_of_a_longer_run_are_reported_and_stay() {
     let folder = Folder::with("a.txt", BALL.to_owned() + &"Trace\n".repeat(5));
     folder.rayfold("render a.txt -o fr/%04d.png").assert().code(0);
     folder.write("a.txt", BALL.to_owned() + "Trace\n");

@@ -239,7 +239,7 @@ fn what_a_killed_run_left_goes_with_the_next() {
     let left = parts(&folder);
     assert_eq!(left.len(), 1);
     folder.write("a.txt", BALL);
-    // Where systems have no names, it must be old.
+    // On systems without names, it must be old.
     if !cfg!(target_os = "linux") {
         let file = std::fs::File::options().write(true).open(folder.join(&left[0])).unwrap();
         file.set_modified(std::time::SystemTime::now() - Duration::from_secs(2 * 60 * 60)).unwrap();

@@ -96,7 +96,6 @@ impl Folder {
             .env("COLUMNS", "100")
     }
 
-    /// Reads an image.
     pub(crate) fn image(&self, name: &str) -> image::RgbImage {
         image::load_from_memory(&self.read(name)).unwrap().into_rgb8()
     }

@@ -46,9 +46,9 @@ error: balls: an animation has one size, but frame 1 (balls/f1.txt) is 24 x 16 a
     assert_eq!(report["conflicts"][0]["severity"], "error");
     // A single script may be meant as separate pictures.
     folder.write("pair.txt", BALL.replace("Trace", "Trace\nScreen 6 4\nTrace"));
-    let told = said(&folder, "check pair.txt", 0);
-    assert!(told.starts_with("warning: pair.txt: an animation has one size"), "{told}");
-    assert!(told.ends_with("1 file, 2 frames: no errors, 1 warning\n"), "{told}");
+    let output = said(&folder, "check pair.txt", 0);
+    assert!(output.starts_with("warning: pair.txt: an animation has one size"), "{output}");
+    assert!(output.ends_with("1 file, 2 frames: no errors, 1 warning\n"), "{output}");
     folder.rayfold("render pair.txt -o %d.png").assert().code(0);
 }
 
@@ -56,10 +56,10 @@ error: balls: an animation has one size, but frame 1 (balls/f1.txt) is 24 x 16 a
 fn check_passed_a_side_that_no_gif_can_hold() {
     let folder = Folder::with("wide/a.txt", "Screen 65536 1\nTrace\n");
     for command in ["check wide", "render wide -o a.gif"] {
-        let told = said(&folder, command, 1);
+        let output = said(&folder, command, 1);
         assert!(
-            told.contains("65535 pixels on a side at most, but frame 1 (wide/a.txt) is 65536 x 1"),
-            "{told}"
+            output.contains("65535 pixels on a side at most, but frame 1 (wide/a.txt) is 65536 x 1"),
+            "{output}"
         );
     }
     assert_eq!(folder.list("."), ["wide"]);
@@ -69,17 +69,17 @@ fn check_passed_a_side_that_no_gif_can_hold() {
 fn submit_recommended_flags_that_it_lacked() {
     let folder = balls(1);
     folder.write("balls/f2.txt", BALL.replace("24, 16", "12, 8"));
-    let told = said(&folder, "submit balls --bucket nowhere", 1);
+    let output = said(&folder, "submit balls --bucket nowhere", 1);
     assert!(
-        told.contains("is 12 x 8: give their scripts the same Screen") && !told.contains("--size"),
-        "{told}"
+        output.contains("is 12 x 8: give their scripts the same Screen") && !output.contains("--size"),
+        "{output}"
     );
     // The recommended option exists.
     folder.write("balls/f2.txt", BALL.replace("24, 16", "8001, 8000"));
-    let told = said(&folder, "submit balls --bucket nowhere", 1);
-    assert!(told.contains("--max-pixels sets the limit on pixels"), "{told}");
-    let told = said(&folder, "submit balls --bucket nowhere --max-pixels 100000000", 1);
-    assert!(!told.contains("--max-pixels"), "{told}");
+    let output = said(&folder, "submit balls --bucket nowhere", 1);
+    assert!(output.contains("--max-pixels sets the limit on pixels"), "{output}");
+    let output = said(&folder, "submit balls --bucket nowhere --max-pixels 100000000", 1);
+    assert!(!output.contains("--max-pixels"), "{output}");
 }
 
 #[test]
@@ -101,16 +101,16 @@ fn encode_played_files_as_the_shell_sorts_them() {
     folder.rayfold("render balls -o f%d.png").assert().code(0);
     folder.rayfold("render balls -o balls.gif").assert().code(0);
     let as_the_shell_does = "f1.png f10.png f11.png f2.png f3.png f4.png f5.png f6.png f7.png f8.png f9.png";
-    let told = said(&folder, &format!("encode {as_the_shell_does} -o sorted.gif"), 0);
+    let output = said(&folder, &format!("encode {as_the_shell_does} -o sorted.gif"), 0);
     assert!(
-        told.starts_with(
+        output.starts_with(
             "sorted by name, from f1.png to f11.png; --no-sort keeps the order of the command line\n"
         ),
-        "{told}"
+        "{output}"
     );
     assert_eq!(folder.read("sorted.gif"), folder.read("balls.gif"));
-    let told = said(&folder, &format!("encode {as_the_shell_does} --no-sort -o given.gif"), 0);
-    assert!(!told.contains("sorted"), "{told}");
+    let output = said(&folder, &format!("encode {as_the_shell_does} --no-sort -o given.gif"), 0);
+    assert!(!output.contains("sorted"), "{output}");
     assert_eq!(decode_gif(&folder.read("given.gif"))[1].0, folder.image("f10.png"));
     // No message if nothing changes.
     assert!(!said(&folder, "encode f2.png f10.png -o two.gif", 0).contains("sorted"));
@@ -125,8 +125,8 @@ fn the_folder_of_frames_had_to_be_there() {
     folder.write("balls/f3.txt", "Trce");
     folder.rayfold("render balls -o other/%d.png").assert().code(1);
     assert_eq!(folder.list("."), ["balls", "new"]);
-    let told = said(&folder, "render balls -o balls/f1.txt/%d.png", 1);
-    assert!(told.starts_with("error: cannot write balls/f1.txt/1.png"), "{told}");
+    let output = said(&folder, "render balls -o balls/f1.txt/%d.png", 1);
+    assert!(output.starts_with("error: cannot write balls/f1.txt/1.png"), "{output}");
 }
 
 #[test]
@@ -140,14 +140,14 @@ fn rendering_began_anew_after_ctrl_c() {
     folder.write("f/5.png", "no image");
     // A complete picture stays, whatever its content.
     folder.write("f/6.png", &whole[0]);
-    let told = said(&folder, "render balls -o f/%d.png --skip-existing", 0);
-    assert!(told.starts_with("f/1.png to f/6.png: 6 frames (2 were there), "), "{told}");
+    let output = said(&folder, "render balls -o f/%d.png --skip-existing", 0);
+    assert!(output.starts_with("f/1.png to f/6.png: 6 frames (2 were there), "), "{output}");
     for (number, file) in (1..=5).zip(&whole) {
         assert!(folder.read(&format!("f/{number}.png")) == *file, "frame {number}");
     }
     assert!(folder.read("f/6.png") == whole[0]);
-    let told = said(&folder, "render balls -o a.gif --skip-existing", 2);
-    assert!(told.contains("expected a pattern such as frames/%04d.png"), "{told}");
+    let output = said(&folder, "render balls -o a.gif --skip-existing", 2);
+    assert!(output.contains("expected a pattern such as frames/%04d.png"), "{output}");
 }
 
 #[test]
@@ -164,8 +164,8 @@ fn an_animation_could_not_be_played_once_nor_hold_its_last_frame() {
         assert!(!repeats(&format!("{name}.gif")));
         assert_eq!(delays(&format!("{name}.gif")), [10, 10, 150]);
         folder.rayfold(&format!("{command} -o x.gif --once --loop 2")).assert().code(2);
-        let told = said(&folder, &format!("{command} -o x.gif --final-delay 0"), 2);
-        assert!(told.contains("expected seconds from 0.02 to 655.35, such as 1.5"), "{told}");
+        let output = said(&folder, &format!("{command} -o x.gif --final-delay 0"), 2);
+        assert!(output.contains("expected seconds from 0.02 to 655.35, such as 1.5"), "{output}");
     }
 }
 
@@ -181,9 +181,12 @@ fn wrong_values_were_answered_in_the_words_of_rust() {
         ("--precision f16", "[possible values: auto, f32, f64]"),
         ("--color pink", "[possible values: auto, always, never]"),
     ] {
-        let told = said(&folder, &format!("render balls -o a.gif {flags}"), 2);
-        assert!(told.contains(expected), "{flags}: {told}");
-        assert!(!told.contains("digit") && !told.contains("float") && !told.contains("non-zero"), "{told}");
+        let output = said(&folder, &format!("render balls -o a.gif {flags}"), 2);
+        assert!(output.contains(expected), "{flags}: {output}");
+        assert!(
+            !output.contains("digit") && !output.contains("float") && !output.contains("non-zero"),
+            "{output}"
+        );
     }
     let help = folder.rayfold("render --help").assert().code(0).get_output().stdout.clone();
     let help = String::from_utf8(help).unwrap();
@@ -213,8 +216,8 @@ error: found no AWS region: set AWS_REGION, or a region in the AWS profile
 #[test]
 fn cost_needed_a_duration_that_a_newcomer_does_not_have() {
     let folder = balls(12);
-    let told = said(&folder, "cost balls", 0);
-    assert!(told.starts_with("drawn here on one thread: 6 frames of 12, "), "{told}");
+    let output = said(&folder, "cost balls", 0);
+    assert!(output.starts_with("drawn here on one thread: 6 frames of 12, "), "{output}");
     let report = |flags: &str| -> Value {
         let out = folder.rayfold(&format!("cost balls --format json {flags}")).assert().code(0);
         serde_json::from_slice(&out.get_output().stdout).unwrap()
@@ -249,9 +252,9 @@ fn cost_showed_no_total_but_rows_of_nothing() {
 #[test]
 fn cost_did_not_say_that_an_assembly_would_not_fit() {
     let folder = Folder::new();
-    let told = said(&folder, "cost --frames 2000000 --ms 400 --size 1920x1080", 0);
+    let output = said(&folder, "cost --frames 2000000 --ms 400 --size 1920x1080", 0);
     let expected = "warning: assembling takes about 124,417 s, and what takes more than 81,000 s is refused";
-    assert!(told.starts_with(expected), "{told}");
+    assert!(output.starts_with(expected), "{output}");
     assert_eq!(said(&folder, "cost --frames 1000000 --ms 400 --size 1920x1080", 0), "");
 }
 
@@ -259,9 +262,9 @@ fn cost_did_not_say_that_an_assembly_would_not_fit() {
 fn another_size_squashed_the_picture_without_a_word() {
     let folder = Folder::new();
     folder.write("a.txt", "Screen 40 30\nCamera 0 0 5 0 0 -1 0 1 0 1 -.4 -.3 .4 .3\nTrace");
-    let told = said(&folder, "render a.txt -o a.png --size 90x30", 0);
+    let output = said(&folder, "render a.txt -o a.png --size 90x30", 0);
     let expected = "warning: a.txt: at 90 x 30 the picture is squashed: a ball is no circle in it; the window that would \
                     not: -0.9000 -0.3000 0.9000 0.3000";
-    assert!(told.contains(expected), "{told}");
+    assert!(output.contains(expected), "{output}");
     assert!(!said(&folder, "render a.txt -o a.png --size 80x60", 0).contains("squashed"));
 }

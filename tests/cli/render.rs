@@ -77,7 +77,7 @@ fn settings_of_the_folder_hold_unless_flags_say_otherwise() {
 }
 
 #[test]
-fn frames_that_a_gif_has_no_time_for_are_told() {
+fn frames_that_a_gif_has_no_time_for_are_reported() {
     balls(4).rayfold("render balls -o a.gif --fps 100").assert().code(0).stderr_eq(str![[r#"
 a.gif: 2 frames of 24 x 16, [..]B, in [..] s
 2 frames left out: a GIF shows at most 50 frames a second, not 100

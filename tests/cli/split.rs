@@ -1,4 +1,4 @@
-//! `rayfold split`.
+//! Tests of `rayfold split`.
 
 use snapbox::str;
 

@@ -1,4 +1,4 @@
-//! `rayfold render --watch`.
+//! Tests of `rayfold render --watch`.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, ChildStderr, Command, Stdio};

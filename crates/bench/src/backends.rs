@@ -7,7 +7,7 @@ use image::RgbImage;
 use rayfold_scene::Scene;
 use rayfold_tracer::{Level, Precision, RenderOptions, probe, reference};
 
-/// A ray.
+/// A ray with its origin and direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// The start of the ray.
@@ -30,9 +30,9 @@ pub struct Hit {
 /// The arithmetic of a backend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Always `f32`.
+    /// `f32` for every scene.
     Single,
-    /// Always `f64`.
+    /// `f64` for every scene.
     Double,
     /// Chosen for each scene.
     Chosen,
@@ -65,15 +65,15 @@ impl Backend {
     /// Returns the nearest hit of each ray.
     ///
     /// # Errors
-    /// Fails like [`rayfold_tracer::render`].
+    /// The errors of [`rayfold_tracer::render`].
     pub fn nearest(&self, scene: &Scene, rays: &[Ray]) -> Hits {
         (self.nearest)(scene, rays)
     }
 
-    /// Renders the image.
+    /// Renders the image of a scene.
     ///
     /// # Errors
-    /// Fails like [`rayfold_tracer::render`].
+    /// The errors of [`rayfold_tracer::render`].
     pub fn render(&self, scene: &Scene) -> anyhow::Result<RgbImage> {
         (self.render)(scene)
     }

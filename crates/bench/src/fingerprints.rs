@@ -49,13 +49,13 @@ pub fn run(args: &Args) -> Result<()> {
     for folder in &args.folders {
         find(folder, &mut scripts)?;
     }
-    let told: Vec<String> = scripts.par_iter().map(|script| of_script(script)).collect::<Result<_>>()?;
-    print(&told)?;
+    let lines: Vec<String> = scripts.par_iter().map(|script| of_script(script)).collect::<Result<_>>()?;
+    print(&lines)?;
     // In batches, so that progress is visible and lines need not be kept.
     for from in (0..args.random).step_by(200) {
         let seeds = args.seed + from..args.seed + args.random.min(from + 200);
-        let told: Vec<String> = seeds.into_par_iter().map(of_seed).collect::<Result<_>>()?;
-        print(&told)?;
+        let lines: Vec<String> = seeds.into_par_iter().map(of_seed).collect::<Result<_>>()?;
+        print(&lines)?;
     }
     Ok(())
 }
@@ -86,58 +86,58 @@ fn of_script(path: &Path) -> Result<String> {
     let name = path.display().to_string();
     let parsed = parse(&name, &std::fs::read(path)?, &Limits::default());
     let script = parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
-    let mut told = String::new();
+    let mut lines = String::new();
     let mut frame = 0;
     while let Some(scene) = script.frame(frame) {
         // The picture is drawn once at its own size. Kernels are compared on a smaller one, which shows differences as
         // well.
         writeln!(
-            told,
+            lines,
             "{name} {frame}: {:016x}",
             digest(render(&scene, &RenderOptions::default())?.as_raw())
         )?;
         let mut small = scene.clone();
         small.screen = Screen::new(scene.screen.width().min(97), scene.screen.height().min(83))?;
-        told += &of_scene(&format!("{name} {frame}"), &small, RenderOptions::default())?;
+        lines += &of_scene(&format!("{name} {frame}"), &small, RenderOptions::default())?;
         frame += 1;
     }
     ensure!(frame > 0, "{name} shows nothing");
-    Ok(told)
+    Ok(lines)
 }
 
 fn of_seed(seed: u64) -> Result<String> {
     let mut dice = Dice(fastrand::Rng::with_seed(seed));
     let scene = dice.scene()?;
     let options = dice.options();
-    let mut told = of_scene(&format!("seed {seed}"), &scene, options)?;
-    told += &of_rays(&format!("seed {seed}"), &scene, &dice.rays(), options)?;
-    Ok(told)
+    let mut lines = of_scene(&format!("seed {seed}"), &scene, options)?;
+    lines += &of_rays(&format!("seed {seed}"), &scene, &dice.rays(), options)?;
+    Ok(lines)
 }
 
 const PRECISIONS: [Precision; 3] = [Precision::Auto, Precision::F32, Precision::F64];
 
 /// Returns a line for each way to draw a scene.
 fn of_scene(name: &str, scene: &Scene, options: RenderOptions) -> Result<String> {
-    let mut told = String::new();
+    let mut lines = String::new();
     for (width, level) in levels() {
         for precision in PRECISIONS {
             let image = render(scene, &RenderOptions { precision, level: Some(level), ..options })?;
-            writeln!(told, "{name}, {width} {precision:?}: {:016x}", digest(image.as_raw()))?;
+            writeln!(lines, "{name}, {width} {precision:?}: {:016x}", digest(image.as_raw()))?;
         }
         if let Ok(image) = render_naive(scene, &RenderOptions { level: Some(level), ..options }) {
-            writeln!(told, "{name}, {width} naive: {:016x}", digest(image.as_raw()))?;
+            writeln!(lines, "{name}, {width} naive: {:016x}", digest(image.as_raw()))?;
         }
     }
     if scene.objects.len() < 100 {
         let image = reference::render(scene, &options)?;
-        writeln!(told, "{name}, reference: {:016x}", digest(image.as_raw()))?;
+        writeln!(lines, "{name}, reference: {:016x}", digest(image.as_raw()))?;
     }
-    Ok(told)
+    Ok(lines)
 }
 
 /// Returns a line for each way to trace single rays.
 fn of_rays(name: &str, scene: &Scene, rays: &[(DVec3, DVec3)], options: RenderOptions) -> Result<String> {
-    let mut told = String::new();
+    let mut lines = String::new();
     for (width, level) in levels() {
         for precision in PRECISIONS {
             let options = RenderOptions { precision, level: Some(level), ..options };
@@ -153,10 +153,10 @@ fn of_rays(name: &str, scene: &Scene, rays: &[(DVec3, DVec3)], options: RenderOp
                 found.normal.to_array().iter().for_each(|x| hasher.write_u64(x.to_bits()));
             }
             let hits = found.iter().flatten().count();
-            writeln!(told, "{name}, {width} {precision:?}, {hits} hits: {:016x}", hasher.finish())?;
+            writeln!(lines, "{name}, {width} {precision:?}, {hits} hits: {:016x}", hasher.finish())?;
         }
     }
-    Ok(told)
+    Ok(lines)
 }
 
 fn digest(bytes: &[u8]) -> u64 {

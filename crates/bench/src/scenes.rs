@@ -93,7 +93,7 @@ pub fn material(diffuse: DVec3, mirror: f64) -> Result<Material, InvalidValue> {
     Material::new(0.15 * diffuse, diffuse, DVec3::splat(mirror))
 }
 
-/// Returns a sun.
+/// Returns a sun of one grey level.
 ///
 /// # Errors
 /// Fails if the direction is zero.

@@ -16,7 +16,7 @@ use rayfold_pipeline::Mutation;
 use rayfold_simulation::{Run, Scale, ScaleReport, Violation, measure, replay, run as run_seed};
 
 /// The number of violations that are printed individually.
-const TOLD: usize = 20;
+const MAX_PRINTED: usize = 20;
 
 /// The sizes of a whole report, unless a part is requested separately.
 const SEEDS: u64 = 100_000;
@@ -56,7 +56,7 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// Runs the simulation.
+/// Runs the simulation and writes its reports.
 ///
 /// # Errors
 ///
@@ -187,7 +187,7 @@ impl Campaign {
                 self.broken += 1;
                 self.violations.push(violation);
                 self.violations.sort_by_key(|violation| violation.seed);
-                self.violations.truncate(TOLD);
+                self.violations.truncate(MAX_PRINTED);
             }
             Ok(run) => {
                 self.total.requests += run.requests;

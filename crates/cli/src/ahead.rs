@@ -1,4 +1,4 @@
-//! Making frames ahead of whoever takes them in order.
+//! Makes frames ahead of their consumer, which takes them in order.
 //!
 //! Frames are made side by side on the rayon pool while the caller's thread takes the finished ones in order; if that is
 //! one of the pool, it makes frames as well while it has none to take. How many may be made or waiting at once is
@@ -13,16 +13,16 @@ use rayon::Yield;
 
 use crate::interrupt;
 
-/// How long a thread of the pool sleeps when there is nothing to do: meanwhile others may bring work.
+/// The time that a thread of the pool sleeps when there is nothing to do: meanwhile others may bring work.
 const NAP: Duration = Duration::from_millis(1);
 
 /// Has `work` done on every item of `items`, at most `window` at once, and gives the results to `take` in order.
 ///
-/// The first error, of an item, of its work or of taking it, ends the whole: everything under way is told to stop
-/// ([`interrupt::stop`]) and awaited.
+/// The first error, of an item, of its work or of taking it, ends the whole: everything under way is
+/// stopped ([`interrupt::stop`]) and awaited.
 ///
 /// # Errors
-/// That first error.
+/// The first error, as above.
 pub(crate) fn in_order<I: Send, T: Send>(
     items: impl Iterator<Item = I>,
     window: usize,
@@ -45,7 +45,7 @@ pub(crate) fn in_order<I: Send, T: Send>(
                         // A panic must not leave the taker waiting for ever.
                         let result = catch_unwind(AssertUnwindSafe(|| work(item)))
                             .unwrap_or_else(|_| Err(anyhow::anyhow!("frame {} ran into a bug", index + 1)));
-                        // Nobody listens any more when the whole has failed.
+                        // The receiver is gone if the whole has failed.
                         let _ = sender.send((index, result));
                     });
                 }

@@ -111,7 +111,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
                 let _ = writeln!(std::io::stderr(), "{message}");
                 return ExitCode::from(2);
             }
-            // Help and version go to standard output and are no failure; nobody is left to tell if that is closed.
+            // Help and version go to standard output and are no failure; if that is closed, there is no
+            // way to report it.
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }

@@ -1,4 +1,4 @@
-//! Where the program speaks: standard output for data, standard error for people.
+//! The program's output: standard output for data, standard error for people.
 //!
 //! Knows what the global flags and the environment say about colour, progress and silence, so that no subcommand asks
 //! again. Errors are never silenced.
@@ -16,7 +16,7 @@ pub(crate) enum Color {
     Never,
 }
 
-/// How a subcommand that reports shows its findings.
+/// The format in which a subcommand shows its findings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// For people
@@ -94,7 +94,7 @@ impl Console {
         if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" }
     }
 
-    /// Somebody sits at a terminal who sees what is said here and can answer.
+    /// Returns whether a user sits at a terminal who sees the output and can answer.
     #[cfg(feature = "network")]
     pub(crate) fn can_ask(&self) -> bool {
         std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
@@ -113,7 +113,8 @@ impl Console {
     }
 }
 
-/// The text with control characters written as escapes, so that nobody's name commands a terminal. Lines stay lines.
+/// Returns the text with control characters written as escapes, so that no name can command a
+/// terminal. Lines stay lines.
 pub(crate) fn visible(text: &str) -> String {
     let is_command = |c: char| (c.is_control() && c != '\n') || is_formatting(c);
     let mut shown = String::with_capacity(text.len());
@@ -138,7 +139,7 @@ pub(crate) fn describe(error: &anyhow::Error) -> String {
     causes.join(": ")
 }
 
-/// What went wrong, without the number that the system has for it.
+/// Returns the message of an error, without the number that the system has for it.
 fn without_number(error: &(dyn std::error::Error + 'static)) -> String {
     let mut text = error.to_string();
     if text.ends_with(')')

@@ -1,4 +1,4 @@
-//! `rayfold dev`: the whole pipeline on this machine, until told to stop.
+//! `rayfold dev`: the whole pipeline on this machine, until it is stopped.
 //!
 //! An S3 server (the store built in, MinIO or SeaweedFS), the bucket, its notifications and the local invoker with the
 //! function binaries. Everything it started ends with it; the data stays, and the next start goes on from there. With a
@@ -32,10 +32,11 @@ use crate::values;
 use news::News;
 use stop::interrupted;
 
-/// How long the first lines wait for what was missed since the last run.
+/// The time for which the first lines wait for events that were missed since the last run.
 const CATCH_UP: Duration = Duration::from_secs(3);
 
-/// What the functions take from their environment about the largest script and animation; the stack sets the same.
+/// The variables from which the functions take the limits on the largest script and animation; the
+/// stack sets the same.
 const LIMITS: [&str; 7] = [
     "RAYFOLD_MAX_SCRIPT_BYTES",
     "RAYFOLD_MAX_OBJECTS",
@@ -212,12 +213,12 @@ async fn serve(args: &Args, order: Option<&Order>, console: &Console) -> anyhow:
         () = interrupted() => return Ok(Outcome::Interrupted),
     };
     let ended = attend(args, order, &mut platform, (&data, console)).await;
-    // Else whatever is still written comes back into a folder that is being removed.
+    // Otherwise a file that is still being written comes back into a folder that is being removed.
     platform.stop().await;
     ended
 }
 
-/// Does what is to be done on a running platform, until told to stop.
+/// Does the work that is due on a running platform, until it is stopped.
 async fn attend(
     args: &Args,
     order: Option<&Order>,
@@ -274,7 +275,7 @@ async fn attend(
     Ok(Outcome::Done)
 }
 
-/// What the other store keeps in the same data folder is not what is shown now.
+/// Says that the objects that the other store keeps in the same data folder are not shown now.
 fn left_alone(other: StoreKind, data: &Path) -> String {
     let flag = match other {
         StoreKind::BuiltIn => "without --store".to_owned(),
@@ -284,7 +285,7 @@ fn left_alone(other: StoreKind, data: &Path) -> String {
     format!("{} has objects of {other}, which stay there; they are shown {flag}", objects.display())
 }
 
-/// What makes every AWS tool speak with this S3; `eval`-able.
+/// Returns the variables with which every AWS tool uses this S3; `eval`-able.
 fn exports(platform: &Platform) -> String {
     let mut text = String::new();
     for (name, value) in platform.server().environment() {

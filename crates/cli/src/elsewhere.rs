@@ -1,8 +1,8 @@
-//! What a program without the feature `network` says of the subcommands that it lacks.
+//! The message of a program without the feature `network` about the subcommands that it lacks.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// What `network` has.
+/// The subcommands of the feature `network`.
 const SUBCOMMANDS: [&str; 8] = ["studio", "cost", "submit", "status", "fetch", "retry", "remove", "dev"];
 
 /// Ends the page of help.
@@ -18,7 +18,7 @@ whole program: `cargo install --path crates/cli`, or `cargo rayfold` in place of
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.";
 
-/// Where to find the subcommand that was asked for, if it is one that this program could have.
+/// Returns a message that says where the requested subcommand is, if it is one that this program could have.
 pub(crate) fn missing(error: &clap::Error) -> Option<String> {
     let name = match error.get(ContextKind::InvalidSubcommand) {
         Some(ContextValue::String(name)) if error.kind() == ErrorKind::InvalidSubcommand => name,
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn each_is_in_the_help_and_told_where_it_is() {
+    fn the_help_names_each_and_where_it_is() {
         for name in SUBCOMMANDS {
             assert!(HELP.contains(name), "{name}");
             assert!(

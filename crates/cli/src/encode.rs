@@ -33,7 +33,7 @@ mod video;
 use picture::Picture;
 
 /// The largest number of faulty files that are named.
-const MAX_TOLD: usize = 20;
+const MAX_LISTED: usize = 20;
 
 /// The largest memory for images that wait for the encoder, in bytes: two of 1920 x 1080.
 const AHEAD: u64 = 14 << 20;
@@ -258,6 +258,6 @@ fn pictures(files: &[PathBuf], console: &Console) -> anyhow::Result<HashMap<Path
     if faults.is_empty() {
         return Ok(pictures);
     }
-    faults.iter().take(MAX_TOLD).for_each(|fault| console.error(fault));
+    faults.iter().take(MAX_LISTED).for_each(|fault| console.error(fault));
     anyhow::bail!("{} of {} cannot be used", faults.len(), number(files.len() as u64, "file"))
 }

@@ -1,4 +1,4 @@
-//! What the user named as INPUT, as a list of scripts.
+//! The INPUT that the user named, as a list of scripts.
 //!
 //! A folder stands for its scripts (`*.txt`) in natural order and for the settings beside them; a file is a script
 //! whatever its name; `-` is a script on standard input. Reading and parsing are apart from listing, so that many or
@@ -20,11 +20,11 @@ use crate::outcome::Usage;
 /// Scripts in the order of their frames.
 #[derive(Debug, Default)]
 pub(crate) struct Input {
-    /// At least one.
+    /// At least one script, in the order of the frames.
     pub(crate) scripts: Vec<ScriptFile>,
-    /// Where a folder's settings lie, if it has any.
+    /// The path of a folder's settings, if it has any.
     pub(crate) settings: Option<PathBuf>,
-    /// What in a folder looks like a part of the animation and is not read.
+    /// Files in a folder that look like a part of the animation and are not read.
     pub(crate) not_read: Vec<NotRead>,
 }
 
@@ -49,7 +49,7 @@ impl Input {
         self.scripts.iter().filter_map(ScriptFile::path).chain(self.settings.as_deref())
     }
 
-    /// Of an animation: one folder, or scripts.
+    /// Lists the scripts of an animation: of one folder, or the named ones.
     ///
     /// # Errors
     /// When something is not there or not readable, a folder holds no script, or folders are mixed with others.
@@ -131,7 +131,7 @@ impl ScriptFile {
         }
     }
 
-    /// What it says, and all that is wrong with it.
+    /// Returns the parsed script, with all its faults.
     ///
     /// # Errors
     /// When the file cannot be read.

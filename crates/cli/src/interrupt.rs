@@ -107,7 +107,7 @@ pub(crate) fn stopping() -> bool {
     STOPPING.load(Ordering::SeqCst)
 }
 
-/// The same for those who take a flag to poll.
+/// Returns the flag behind [`stopping`], for callers that poll one.
 pub(crate) fn flag() -> &'static AtomicBool {
     &STOPPING
 }
@@ -145,8 +145,8 @@ impl Drop for Protected {
     }
 }
 
-/// Does what may wait for somebody else on a thread of its own, which is left alone when a signal comes: nothing else ends
-/// the reading of a terminal.
+/// Does work that may wait for another program or a user on a thread of its own, which is left alone when a signal
+/// comes: nothing else ends the reading of a terminal.
 ///
 /// # Errors
 /// When a signal came first, or the system refuses a thread.

@@ -1,4 +1,4 @@
-//! What the `rayfold` command does, as a library for its `main` alone.
+//! The `rayfold` command, as a library for its `main` alone.
 //!
 //! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the `Console`,
 //! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for

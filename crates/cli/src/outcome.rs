@@ -1,8 +1,7 @@
-//! How a run ends.
+//! The outcome of a run, as its exit code.
 //!
-//! 0: done. 1: the input or the rendering failed, and standard error says why. 2: the command line is wrong.
-//! 128 and the
-//! number of the signal (130, 143): interrupted; nothing half-written is left behind.
+//! 0: done. 1: the input or the rendering failed, and standard error says why. 2: the command line is wrong. 128 and
+//! the number of the signal (130, 143): interrupted; nothing half-written is left behind.
 
 use std::process::ExitCode;
 
@@ -13,9 +12,9 @@ use crate::interrupt;
 pub(crate) enum Outcome {
     /// It did what it was asked to.
     Done,
-    /// It could not, and has told why.
+    /// It could not, and has reported the reason.
     Failed,
-    /// It was told to stop.
+    /// The run was asked to stop.
     Interrupted,
 }
 
@@ -34,7 +33,7 @@ impl From<Outcome> for ExitCode {
 #[error("{0}")]
 pub(crate) struct Usage(pub(crate) String);
 
-/// Exit code of an error that nobody handled.
+/// Returns the exit code of an error that was not handled.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
     if error.is::<Usage>() { ExitCode::from(2) } else { Outcome::Failed.into() }
 }

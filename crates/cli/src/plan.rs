@@ -1,4 +1,4 @@
-//! Which frames there are, found out before the first is drawn.
+//! The plan of the frames, made before the first is drawn.
 //!
 //! Every script is parsed once to learn its faults and the shape of its frames. Small scripts are kept; beyond
 //! [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
@@ -42,7 +42,7 @@ pub(crate) struct Plan {
     size: Option<Screen>,
     samples: Option<Samples>,
     selected: RangeInclusive<u64>,
-    /// What the folder says about the animation.
+    /// The settings of the animation in the folder.
     pub(crate) settings: AnimationSettings,
     /// The numbers to compute with.
     pub(crate) precision: Precision,
@@ -79,7 +79,7 @@ struct Shape {
     objects: usize,
 }
 
-/// What the user wants of the frames.
+/// The frames that the user wants, and their options.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Wishes {
     /// Draw them in this size.
@@ -138,7 +138,7 @@ impl Plan {
     /// Parses everything, and says what is wrong. There is a plan, or why there is none, exactly if no script has an error.
     ///
     /// # Errors
-    /// Only when the run was told to stop.
+    /// An error only if the run was asked to stop.
     pub(crate) fn survey(
         input: &Input,
         limits: &Limits,
@@ -214,12 +214,12 @@ impl Plan {
         self.runs().any(|(_, _, shape)| shape.clear)
     }
 
-    /// How many frames are to be drawn.
+    /// Returns the number of frames that are to be drawn.
     pub(crate) fn len(&self) -> u64 {
         self.selected.end() + 1 - self.selected.start()
     }
 
-    /// How many frames there are, drawn or not.
+    /// Returns the number of frames, drawn or not.
     pub(crate) fn total(&self) -> u64 {
         self.parts.iter().map(|part| part.frames as u64).sum()
     }
@@ -247,7 +247,7 @@ impl Plan {
         }
     }
 
-    /// How many frames may be under way at once.
+    /// Returns the number of frames that may be under way at once.
     pub(crate) fn window(&self) -> usize {
         let bytes = |shape: &Shape| {
             let pixels = self.size.unwrap_or(shape.screen).pixels();
@@ -296,7 +296,7 @@ impl Plan {
         Ok(self.settings.clone().with_durations(own)?.shown_durations(self.len()))
     }
 
-    /// What a frame is drawn from.
+    /// Returns the scene that a frame is drawn from.
     ///
     /// # Errors
     /// When the script cannot be read again, or has changed for the worse since it was checked.
@@ -316,7 +316,7 @@ impl Plan {
     /// Draws a frame with `draw`, which gets it as it is in the middle of its exposure, and at other moments.
     ///
     /// # Errors
-    /// Those of [`Self::scene`].
+    /// The errors of [`Self::scene`].
     pub(crate) fn expose<T>(&self, job: &Job, draw: impl FnOnce(Exposure) -> T) -> anyhow::Result<T> {
         let scene = self.scene(job)?;
         let script = self.parts[job.part].script(&self.limits)?;
@@ -327,11 +327,11 @@ impl Plan {
         Ok(draw(Exposure::moving(&scene, &after)))
     }
 
-    /// Looks at the first, the middle and the last frame for light that their depth cuts off, and says which depth would show
-    /// it.
+    /// Looks at the first, the middle and the last frame for light that their depth cuts off, and says which
+    /// depth would show it.
     ///
     /// # Errors
-    /// Those of [`Self::scene`].
+    /// The errors of [`Self::scene`].
     pub(crate) fn light_cut_off(&self) -> anyhow::Result<Option<String>> {
         let last = self.len() - 1;
         let mut looked_at = vec![0, last / 2, last];
@@ -401,7 +401,7 @@ impl Part {
         Self { file, runs, frames, kept, used: Mutex::default() }
     }
 
-    /// Kept, or in use by another frame, or parsed anew.
+    /// Returns the script if it is kept or in use by another frame; otherwise parses it again.
     fn script(&self, limits: &Limits) -> anyhow::Result<Arc<Script>> {
         if let Some(script) = &self.kept {
             return Ok(Arc::clone(script));

@@ -1,4 +1,4 @@
-//! How an animation is shown when it has been written, for every subcommand that writes one.
+//! The flags for the playback of an animation, for every subcommand that writes one.
 
 use rayfold_movie::Plays;
 
@@ -20,12 +20,12 @@ pub(crate) struct Playback {
 }
 
 impl Playback {
-    /// Something was said.
+    /// Returns whether a flag was given.
     pub(crate) fn is_given(&self) -> bool {
         self.once || self.loops.is_some() || self.final_delay.is_some()
     }
 
-    /// How often to show it; `usual` where no flag says so.
+    /// Returns the number of repetitions; `usual` where no flag says so.
     pub(crate) fn plays(&self, usual: Plays) -> Plays {
         if self.once { Plays::Once } else { self.loops.map_or(usual, Plays::repeated) }
     }

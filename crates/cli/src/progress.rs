@@ -1,4 +1,4 @@
-//! How far a long run has come: a bar on a terminal, a plain line now and then elsewhere.
+//! The progress of a long run: a bar on a terminal, a plain line now and then elsewhere.
 
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -62,7 +62,7 @@ enum Shown {
 }
 
 impl Progress {
-    /// Of `total` things that are called `of`, in the plural; 0 if the total is not known.
+    /// Starts the progress of `total` things that are called `of`, in the plural; 0 if the total is not known.
     pub(crate) fn start(console: &Console, of: &'static str, total: u64) -> Self {
         Self::new(console, Unit::Each(of), total, None)
     }
@@ -192,7 +192,7 @@ impl Recent {
         }
     }
 
-    /// Things a second.
+    /// Returns the rate in things per second.
     fn rate(&self, now: Instant) -> f64 {
         let (Some((then, before)), Some((_, done))) = (self.0.front(), self.0.back()) else { return 0.0 };
         done.saturating_sub(*before) as f64 / now.duration_since(*then).as_secs_f64()
@@ -219,7 +219,7 @@ fn bar(unit: Unit, total: u64, color: bool, recent: Arc<Mutex<Recent>>) -> Progr
     bar
 }
 
-/// How fast it goes, in things a second, and what is left.
+/// The rate, in things a second, and the time that is left.
 type Pace = Option<(f64, Duration)>;
 
 /// `None` as long as nothing is done. `left` is the number of things that are not done.
@@ -228,7 +228,7 @@ fn pace(rate: f64, left: u64) -> Pace {
     is_known.then(|| (rate, Duration::try_from_secs_f64(left as f64 / rate).unwrap_or_default()))
 }
 
-/// What there is room for on one line of so many columns: the counts, what is left, how fast it goes, and a bar.
+/// Returns the parts that fit on one line of so many columns: the counts, what is left, the rate, and a bar.
 fn line(columns: usize, unit: Unit, done: u64, total: u64, pace: Pace, color: bool) -> String {
     // In the last column some terminals wrap already.
     let room = columns.saturating_sub(1);

@@ -1,4 +1,4 @@
-//! `rayfold studio`: scenes in a browser, until told to stop.
+//! `rayfold studio`: scenes in a browser, until it is stopped.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Looking at all scripts before anything is done with any of them, so that all faults are told in one go.
+//! Looks at all scripts before anything is done with any of them, so that all faults are reported in one go.
 
 use std::fmt::Display;
 use std::io::Read;
@@ -14,18 +14,18 @@ use crate::input::ScriptFile;
 use crate::interrupt;
 use crate::wording::number;
 
-/// What is wrong with a number of scripts, in their order.
+/// The faults of a number of scripts, in their order.
 #[derive(Debug, Default)]
 pub(crate) struct Faults {
-    /// What the parser says.
+    /// The diagnostics of the parser.
     pub(crate) diagnostics: Vec<Diagnostic>,
     /// Files that could not be read.
     pub(crate) unreadable: Vec<anyhow::Error>,
     /// Why scripts that are fine by themselves are no animation together, and files that are not read.
     pub(crate) conflicts: Vec<Conflict>,
-    /// How many files have an error.
+    /// The number of files that have an error.
     pub(crate) bad: usize,
-    /// How many were looked at.
+    /// The number of files that were looked at.
     pub(crate) files: usize,
 }
 
@@ -39,14 +39,14 @@ pub(crate) struct Conflict {
 }
 
 impl Faults {
-    /// How many errors there are in all.
+    /// Returns the number of errors in all files.
     pub(crate) fn errors(&self) -> usize {
         self.unreadable.len()
             + self.diagnostics.iter().filter(|d| d.is_error()).count()
             + self.conflicts_of(Severity::Error)
     }
 
-    /// How many warnings there are in all.
+    /// Returns the number of warnings in all files.
     pub(crate) fn warnings(&self) -> usize {
         self.diagnostics.iter().filter(|d| d.severity == Severity::Warning).count()
             + self.conflicts_of(Severity::Warning)
@@ -153,7 +153,7 @@ impl Faults {
 /// Parses all scripts side by side and takes each to what `map` makes of it, in their order.
 ///
 /// # Errors
-/// Only when the run was told to stop. A file that cannot be read is an error in its own place.
+/// An error only if the run was asked to stop. A file that cannot be read is an error in its own place.
 pub(crate) fn parse_all<T: Send>(
     scripts: &[ScriptFile],
     limits: &Limits,

@@ -1,4 +1,4 @@
-//! How many cores to use.
+//! The number of cores to use.
 
 use std::num::NonZeroUsize;
 

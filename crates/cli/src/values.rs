@@ -1,4 +1,4 @@
-//! How the values of flags are read, so that a wrong one is answered by what would be right.
+//! Parsers for the values of flags, whose errors say what would be right.
 
 use std::str::FromStr;
 
@@ -22,7 +22,7 @@ pub(crate) fn count<T: FromStr + Default + PartialEq>(text: &str) -> Result<T, S
     }
 }
 
-/// How often an animation is repeated; 0 is for ever.
+/// Parses the number of repetitions of an animation; 0 is for ever.
 ///
 /// # Errors
 /// The message says what was expected.
@@ -30,7 +30,7 @@ pub(crate) fn repetitions(text: &str) -> Result<u16, String> {
     text.parse().map_err(|_| format!("expected a whole number from 0, which is for ever, to {}", u16::MAX))
 }
 
-/// A number of any size and sign; whoever takes it knows its bounds.
+/// Parses a number of any size and sign; the caller knows its bounds.
 ///
 /// # Errors
 /// The message says what was expected.

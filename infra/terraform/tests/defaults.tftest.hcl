@@ -412,7 +412,7 @@ run "a_sweep_that_does_not_run_sets_off_an_alarm" {
       alarm.evaluation_periods == 2,
       alarm.treat_missing_data == "breaching",
     ])]) && length(aws_cloudwatch_metric_alarm.sweep) == 1
-    error_message = "silence of the schedule must be told"
+    error_message = "silence of the schedule must raise an alarm"
   }
 }
 

@@ -114,7 +114,7 @@ run "bucket_name" {
   }
   assert {
     condition     = alltrue([for function in aws_lambda_function.this : one(function.environment).variables["RAYFOLD_BUCKET"] == "films-of-mine"])
-    error_message = "the functions must be told the name given"
+    error_message = "the functions must get the name given"
   }
 }
 
@@ -326,7 +326,7 @@ run "bucket_policy_statements_without_effect" {
   expect_failures = [var.bucket_policy_statements]
 }
 
-run "told_of_finished_gifs" {
+run "events_of_finished_gifs" {
   variables {
     eventbridge_enabled = true
     finished_topic_arn  = "arn:aws:sns:eu-central-1:123456789012:films"
@@ -334,7 +334,7 @@ run "told_of_finished_gifs" {
 
   assert {
     condition     = aws_s3_bucket_notification.this.eventbridge
-    error_message = "EventBridge must be told"
+    error_message = "EventBridge must get the events"
   }
   assert {
     condition = alltrue([for topic in aws_s3_bucket_notification.this.topic : alltrue([
@@ -342,11 +342,11 @@ run "told_of_finished_gifs" {
       topic.events == toset(["s3:ObjectCreated:*"]),
       topic.filter_prefix == "animations/",
     ])]) && length(aws_s3_bucket_notification.this.topic) == 1
-    error_message = "the topic must be told of GIFs, and of nothing else"
+    error_message = "the topic must get the events of GIFs, and no others"
   }
   assert {
     condition     = length(aws_s3_bucket_notification.this.lambda_function) == length(jsondecode(file("routes.json")).routes)
-    error_message = "the functions must go on being told"
+    error_message = "the functions must keep their events"
   }
 }
 
@@ -725,7 +725,7 @@ run "limits" {
       RAYFOLD_MAX_PIXELS           = "1000000"
       RAYFOLD_MAX_SCRIPT_BYTES     = "1048576"
     }
-    error_message = "the render function must be told the limits given"
+    error_message = "the render function must get the limits given"
   }
 }
 
@@ -925,7 +925,7 @@ run "budget" {
       ACTUAL     = [80, "me@example.com", "arn:aws:sns:eu-central-1:123456789012:oncall"]
       FORECASTED = [100, "me@example.com", "arn:aws:sns:eu-central-1:123456789012:oncall"]
     }
-    error_message = "everybody must be told, before the money is gone"
+    error_message = "all recipients must get a message before the money is gone"
   }
 }
 

@@ -27,7 +27,7 @@ pub(super) struct Quality {
     pub(super) flicker_share: f64,
 }
 
-/// An intended frame.
+/// A frame as it should be shown.
 pub(super) struct Meant<'a> {
     pub(super) image: &'a RgbImage,
     pub(super) before: Option<&'a RgbImage>,

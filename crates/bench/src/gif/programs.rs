@@ -23,7 +23,6 @@ pub(super) struct Program {
 /// A function that returns the command for a job.
 type Build = dyn Fn(&Job<'_>) -> Command;
 
-/// Frames to encode.
 pub(super) struct Job<'a> {
     pub(super) frames: &'a [PathBuf],
     pub(super) size: (u32, u32),
@@ -37,7 +36,7 @@ impl Program {
         format!("{}.gif", self.name.replace([' ', ','], ""))
     }
 
-    /// Encodes and measures.
+    /// Encodes the frames of a job and measures it.
     ///
     /// # Errors
     /// Fails if the program cannot be started or fails.
@@ -58,8 +57,8 @@ pub(super) fn cost_of(command: &Command) -> anyhow::Result<Cost> {
         .args(command.get_args())
         .output()
         .with_context(|| format!("cannot start {}", command.get_program().display()))?;
-    let told = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "{} failed: {told}", command.get_program().display());
+    let messages = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{} failed: {messages}", command.get_program().display());
     Ok(serde_json::from_slice(&output.stdout)?)
 }
 

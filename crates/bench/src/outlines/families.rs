@@ -9,7 +9,7 @@ use rayfold_scene::{
 
 use crate::scenes::icosphere;
 
-/// What a scene shows.
+/// The content of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Family {
     Polyhedron,
@@ -22,7 +22,6 @@ pub(super) enum Family {
     Grazing,
 }
 
-/// All of them.
 pub(super) const FAMILIES: [Family; 8] = [
     Family::Polyhedron,
     Family::Ball,

@@ -1,8 +1,9 @@
 //! `rayfold-bench outlines`: dots at the outlines of bodies, as a person sees them, and pixels off at needles.
 //!
-//! `f32` places an outline some 0.0002 pixels off, which nobody sees. What is seen is a dot: a pixel that has nothing to do with any
-//! pixel around it in the exact picture. So what is counted is a pixel of `auto` that is more than `SEEN` levels from each of the
-//! nine pixels that the `f64` kernels draw around it. Everything random comes from the seed of the scene.
+//! `f32` places an outline some 0.0002 pixels off, which is invisible. What is visible is a dot: a pixel that has
+//! nothing to do with any pixel around it in the exact picture. So the count is of pixels of `auto` that are more
+//! than `SEEN` levels from each of the nine pixels that the `f64` kernels draw around them. Everything random comes
+//! from the seed of the scene.
 
 mod families;
 
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 
 use self::families::{FAMILIES, Family};
 
-/// What to draw.
+/// The scenes to draw.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder that receives outlines.md
@@ -47,10 +48,10 @@ const SEEN: u8 = 16;
 /// Share of pixels off by more than 2 levels that is asked for, in percent: of all pictures, and of the worst.
 const MOST: (f64, f64) = (0.01, 1.0);
 
-/// Dots of a family that are told one by one.
-const TOLD: usize = 5;
+/// Dots of a family that are listed individually.
+const MAX_LISTED: usize = 5;
 
-/// What was found in some scenes of a family.
+/// The findings in some scenes of a family.
 #[derive(Clone, Debug, Default)]
 struct Found {
     pictures: u64,
@@ -211,7 +212,7 @@ fn report(args: &Args, found: &[Found]) -> Result<String> {
     }
     let (off, pixels) = found.iter().fold((0, 0), |sum, found| (sum.0 + found.off, sum.1 + found.pixels));
     writeln!(text, "\nOff in all: {:.4} %.", 100.0 * off as f64 / pixels.max(1) as f64)?;
-    for (seed, x, y) in found.iter().flat_map(|found| found.dots.iter().take(TOLD)) {
+    for (seed, x, y) in found.iter().flat_map(|found| found.dots.iter().take(MAX_LISTED)) {
         writeln!(text, "\n- seed {seed}: a dot in column {x}, row {y} from the top")?;
     }
     Ok(text)

@@ -30,7 +30,6 @@ const PATIENCE: Duration = Duration::from_secs(1800);
 /// The program that makes the GIF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Compiled {
-    /// The assemble function.
     ByTheFunction,
     /// This process, from fetched frames.
     Here,
@@ -142,7 +141,7 @@ pub(crate) async fn run(
     }
     let end = Instant::now();
     platform.invoker().context("the invoker runs")?.idle().await;
-    let mut run = told(std::iter::from_fn(|| seen.try_recv().ok()), start);
+    let mut run = sum_up(std::iter::from_fn(|| seen.try_recv().ok()), start);
     run.total = end - start;
     run.after_upload = end - uploaded;
     if compiled == Compiled::Here {
@@ -185,7 +184,7 @@ async fn compile(store: &S3Store, animation: &Animation, folder: &Folder) -> Res
 }
 
 /// Sums up the observations of a run.
-fn told(seen: impl Iterator<Item = Observation>, start: Instant) -> Run {
+fn sum_up(seen: impl Iterator<Item = Observation>, start: Instant) -> Run {
     let mut stages = [0.0; 4];
     let (mut drawn, mut building, mut inits) = (0, 0, Vec::new());
     let mut requests: BTreeMap<Function, Requests> = BTreeMap::new();

@@ -11,7 +11,7 @@ pub(super) struct Point {
     pub(super) off: f64,
 }
 
-/// What a way to draw a work takes.
+/// The time and the error of a way to draw a work.
 pub(super) struct Curve {
     pub(super) work: &'static str,
     /// Whose way it is, where it is not ours: of all its ways the best counts.

@@ -10,7 +10,7 @@ use rayfold_tracer::{Drawing, Exposure, Means, Precision, RenderOptions};
 use super::scenes::Picture;
 use crate::cpu_time;
 
-/// What to measure.
+/// The parts of the report to measure.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder that receives sampling.md, sampling.csv and its plots
@@ -28,10 +28,10 @@ pub struct Args {
     /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
     #[arg(long)]
     pub(super) targets: bool,
-    /// What is smaller than a pixel, patterned floors and random scenes instead: sampling-small.md
+    /// Measure small objects, patterned floors and random scenes instead, for sampling-small.md
     #[arg(long)]
     pub(super) small: bool,
-    /// How many floors and how many scenes those are
+    /// The number of floors and of scenes for that page
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) scenes: u64,
     /// Only this effect
@@ -42,7 +42,7 @@ pub struct Args {
     pub(super) check: bool,
 }
 
-/// How often a picture is drawn; the shortest time counts.
+/// The number of times that a picture is drawn; the shortest time counts.
 pub(super) const ROUNDS: u32 = 3;
 
 /// A picture that was drawn.
@@ -62,7 +62,7 @@ pub(super) struct Drawn {
     pub(super) of_blocks: f64,
 }
 
-/// How the truth stands beside independent samples.
+/// The agreement of the truth with independent samples.
 pub(super) struct Agreement {
     pub(super) effect: &'static str,
     /// The mean square of the difference in standard errors, which is 1 for two estimates of the same thing.
@@ -82,7 +82,7 @@ pub(super) fn means(picture: &Picture, samples: Samples, options: &RenderOptions
     drawing.draw_means()?.context("no kernels for this picture")
 }
 
-/// The same as exactly as the kernels can.
+/// Returns the means as exactly as the kernels can.
 pub(super) fn truth(picture: &Picture, samples: u32) -> Result<Means> {
     let options = RenderOptions { precision: Precision::F64, ..RenderOptions::default() };
     means(picture, Samples::new(samples, 0.0)?, &options)

@@ -19,7 +19,7 @@ const PROGRAM: &str = include_str!("mitsuba_peer.py");
 /// Samples of its truth.
 const TRUTH: u32 = 2048;
 
-/// What it drew.
+/// The results of Mitsuba's samplers.
 pub(super) struct Drawn {
     /// One of each sampler.
     pub(super) curves: Vec<Curve>,
@@ -36,7 +36,7 @@ pub(super) struct Truth {
 
 /// Draws the scene with each of its samplers.
 pub(super) fn draw(work: &'static str, scene: &Scene) -> Result<Drawn> {
-    let answer = ask(PROGRAM, &told(scene)?)?;
+    let answer = ask(PROGRAM, &describe(scene)?)?;
     eprint!("{answer}");
     read(work, &answer).with_context(|| format!("the Mitsuba peer says {answer}"))
 }
@@ -64,7 +64,7 @@ fn read(work: &'static str, answer: &str) -> Option<Drawn> {
 
 /// The scene in numbers: light, matter and camera as they are here. Pixels are square there; they are higher by a
 /// thousandth here.
-fn told(scene: &Scene) -> Result<Value> {
+fn describe(scene: &Scene) -> Result<Value> {
     let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera is translated") };
     let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
     ensure!((a + b).length() < 1e-9, "only a window around the gaze is translated");
@@ -99,7 +99,7 @@ fn sun(light: &Light) -> Result<Value> {
 }
 
 fn shape(object: &Object, eye: DVec3) -> Result<Value> {
-    let mut told = surface(object.material())?;
+    let mut description = surface(object.material())?;
     let shape = match object {
         Object::Sphere(o) => {
             json!({"kind": "sphere", "center": o.center().to_array(), "radius": o.radius()})
@@ -118,10 +118,10 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
         }
         _ => anyhow::bail!("only spheres, boxes and triangles are translated"),
     };
-    if let (Value::Object(told), Value::Object(shape)) = (&mut told, shape) {
-        told.extend(shape);
+    if let (Value::Object(description), Value::Object(shape)) = (&mut description, shape) {
+        description.extend(shape);
     }
-    Ok(told)
+    Ok(description)
 }
 
 fn surface(material: &Material) -> Result<Value> {
@@ -136,11 +136,11 @@ mod tests {
     use crate::scenes::table;
 
     #[test]
-    fn the_scene_is_told_whole() {
-        let told = told(&table(512, 384).unwrap()).unwrap();
-        assert_eq!(told["shapes"].as_array().unwrap().len(), 26);
-        assert_eq!(told["suns"].as_array().unwrap().len(), 2);
-        assert!((told["fov"].as_f64().unwrap() - 57.72).abs() < 0.01);
+    fn the_description_has_the_whole_scene() {
+        let description = describe(&table(512, 384).unwrap()).unwrap();
+        assert_eq!(description["shapes"].as_array().unwrap().len(), 26);
+        assert_eq!(description["suns"].as_array().unwrap().len(), 2);
+        assert!((description["fov"].as_f64().unwrap() - 57.72).abs() < 0.01);
     }
 
     #[test]

@@ -140,26 +140,26 @@ def shape(numbers, folder):
     return {"type": "ply", "filename": path, "face_normals": True, **surface}
 
 
-told = json.load(sys.stdin)
-sky = {"type": "constant", "radiance": rgb(told["background"]), "sampling_weight": 0.0}
-path = {"type": "path", "max_depth": told["bounces"] + 2, "rr_depth": 1000}
+request = json.load(sys.stdin)
+sky = {"type": "constant", "radiance": rgb(request["background"]), "sampling_weight": 0.0}
+path = {"type": "path", "max_depth": request["bounces"] + 2, "rr_depth": 1000}
 with tempfile.TemporaryDirectory() as folder:
-    suns = {f"sun{k}": light(sun) for k, sun in enumerate(told["suns"])}
-    shapes = {f"shape{k}": shape(numbers, folder) for k, numbers in enumerate(told["shapes"])}
+    suns = {f"sun{k}": light(sun) for k, sun in enumerate(request["suns"])}
+    shapes = {f"shape{k}": shape(numbers, folder) for k, numbers in enumerate(request["shapes"])}
     scene = mitsuba.load_dict({"type": "scene", "integrator": path, "sky": sky, **suns, **shapes})
 
 
 def camera(sampler, count, size):
     width, height = size
     lens = {"type": "perspective"}
-    if told["lens"] > 0:
-        lens = {"type": "thinlens", "aperture_radius": told["lens"], "focus_distance": told["focus"]}
+    if request["lens"] > 0:
+        lens = {"type": "thinlens", "aperture_radius": request["lens"], "focus_distance": request["focus"]}
     return mitsuba.load_dict(
         {
             **lens,
-            "fov": told["fov"],
+            "fov": request["fov"],
             "fov_axis": "x",
-            "to_world": Transform().look_at(origin=told["eye"], target=told["target"], up=told["up"]),
+            "to_world": Transform().look_at(origin=request["eye"], target=request["target"], up=request["up"]),
             "film": {
                 "type": "hdrfilm",
                 "width": width,
@@ -199,18 +199,18 @@ def root_mean_square(errors):
     return math.sqrt((errors**2).mean())
 
 
-count, halves = drawn("multijitter", told["truth"] // 2, told["size"], [1000, 1001])
+count, halves = drawn("multijitter", request["truth"] // 2, request["size"], [1000, 1001])
 truth = (halves[0][1] + halves[1][1]) / 2
 print(mitsuba.__version__, 2 * count, root_mean_square(halves[0][1] - halves[1][1]) / 2, flush=True)
 
-seeds = range(told["rounds"] + 1)
+seeds = range(request["rounds"] + 1)
 # What Python does for a picture, however small.
 start = {sampler: least(drawn(sampler, COUNTS[0], [8, 6], seeds)[1]) for sampler in SAMPLERS}
 samplers = SAMPLERS
 for count in COUNTS:
     errors = {}
     for sampler in samplers:
-        taken, pictures = drawn(sampler, count, told["size"], seeds)
+        taken, pictures = drawn(sampler, count, request["size"], seeds)
         seconds = least(pictures) - start[sampler]
         off = pictures[-1][1] - truth
         errors[sampler] = root_mean_square(off)
@@ -218,5 +218,5 @@ for count in COUNTS:
         print(sampler, taken, seconds, errors[sampler], share, flush=True)
     if count >= ALL:
         samplers = sorted(errors, key=errors.get)[:GO_ON]
-        if errors[samplers[0]] < told["enough"]:
+        if errors[samplers[0]] < request["enough"]:
             break

@@ -86,8 +86,8 @@ fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let scene = Scene { samples: Samples::new(2, 0.0)?, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
     let plain = estimate(Exposure::moving(&scene, &after), args.independent, 1);
-    // Where all samples agree nothing is known of the error. What one of so many would change is counted as a quarter of that;
-    // the kernels' sums are of whole parts of a channel.
+    // If all samples agree, nothing is known of the error. The change by one of so many samples is counted as a
+    // quarter of that; the kernels' sums are of whole parts of a channel.
     let unseen = 0.25 / f64::from(args.independent) + 0.5 / PARTS;
     let (mut sum, mut count, mut largest) = (0.0, 0.0, 0f64);
     for ((mean, error), truth) in plain.means.iter().zip(&plain.errors).zip(&truth.means) {

@@ -109,7 +109,7 @@ fn slopes(drawn: &[Drawn]) -> String {
     text
 }
 
-/// What adaptive pictures took, beside pictures of as many samples everywhere.
+/// Returns the section on the rays of adaptive pictures, beside pictures of as many samples everywhere.
 fn rays_saved(drawn: &[Drawn]) -> String {
     let mut text = "## What adaptive pictures take\n\nAsked for at most *n* rays a pixel and an error of *e* levels. *Blocks* is the \
                     error of means of 4 x 4 pixels: noise leaves it a quarter of the error, bias more.\n\n\

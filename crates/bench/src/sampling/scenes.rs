@@ -64,7 +64,7 @@ macro_rules! table {
     };
 }
 
-/// What is measured.
+/// The effects that are measured.
 pub(super) const EFFECTS: [Effect; 8] = [
     Effect {
         name: "edges",

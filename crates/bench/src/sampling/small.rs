@@ -1,4 +1,4 @@
-//! What is smaller than a pixel, patterned floors and random scenes: the light and the error of adaptive pictures.
+//! Objects smaller than a pixel, patterned floors and random scenes: the light and the error of adaptive pictures.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ const ERRORS: [f64; 4] = [4.0, 1.0, 0.5, 0.25];
 /// Columns and rows of pictures that are drawn at random.
 const SIZE: (u32, u32) = (120, 90);
 
-/// What those may have in a pixel, and are asked for.
+/// The most samples per pixel of those pictures, and the errors that they are asked for.
 const MOST: u32 = 1024;
 const ASKED: [f64; 2] = [4.0, 1.0];
 
@@ -190,7 +190,7 @@ fn others(page: &mut String, truth: u32) -> Result<()> {
 struct Compared {
     error: f64,
     mean: f64,
-    /// Of blocks of 10 x 10 pixels: the root mean square, and the worst channel.
+    /// The root mean square of blocks of 10 x 10 pixels; `worst` is that of the worst channel.
     of_blocks: f64,
     worst: f64,
 }

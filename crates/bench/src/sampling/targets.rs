@@ -12,7 +12,7 @@ use super::{mitsuba, targets_page};
 use crate::backends::levels;
 use crate::speed::{self, povray};
 
-/// What pictures are asked for: at most so many rays a pixel, and an error.
+/// The limits of the pictures: the most rays per pixel, and an error.
 const ASKED: [(u32, f64); 10] = [
     (4, 0.0),
     (16, 0.0),

@@ -1,5 +1,5 @@
-//! What the times to an error are measured on: the scene of the report on speed with more and more in its pixels, and the ways in
-//! which POV-Ray is asked for it.
+//! The works on which the times to an error are measured: the scene of the report on speed with more and more in its
+//! pixels, and the ways in which POV-Ray is asked for it.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use rayfold_scene::Scene;
 use super::scenes::Picture;
 use crate::scenes::table;
 
-/// What is drawn, and how large.
+/// A scene that is drawn, with its size.
 pub(super) struct Work {
     pub(super) name: &'static str,
     pub(super) about: &'static str,

@@ -1,11 +1,11 @@
-//! How old something in a bucket is, for people.
+//! The age of something in a bucket, as text for people.
 
 use std::fmt;
 use std::time::Duration;
 
 use crate::wording::number;
 
-/// How old something is, in the unit that leaves a small number: `3 minutes`.
+/// An age in the unit that leaves a small number: `3 minutes`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Age(pub(crate) Duration);
 
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ages_are_told_in_one_unit() {
+    fn ages_are_shown_in_one_unit() {
         let ages =
             [1, 119, 120, 7_199, 7_200, 172_799, 172_800].map(|s| Age(Duration::from_secs(s)).to_string());
         assert_eq!(

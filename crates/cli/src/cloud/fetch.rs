@@ -45,7 +45,7 @@ pub(crate) struct Args {
     partial: bool,
 }
 
-/// What is to be fetched.
+/// The files to fetch.
 enum Wanted {
     Gif(PathBuf),
     Frames(Pattern, Format),

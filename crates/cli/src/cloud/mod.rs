@@ -24,7 +24,7 @@ pub(crate) mod retry;
 pub(crate) mod status;
 pub(crate) mod submit;
 
-/// Between two looks at whether the run was told to stop.
+/// The time between two looks at whether the run was asked to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Scripts that are named, at most.
@@ -38,16 +38,16 @@ pub(crate) struct BucketArgs {
     pub(crate) bucket: String,
 }
 
-/// Someone who uses a bucket of S3.
+/// The client of a bucket of S3.
 pub(crate) type Client<'a> = rayfold_client::Client<'a, S3Store, SystemClock>;
 
 /// A look at an animation in a bucket of S3.
 pub(crate) type Watch<'a> = rayfold_client::Watch<'a, S3Store, SystemClock>;
 
-/// Does `work` on the bucket; it is dropped when the run is told to stop.
+/// Does `work` on the bucket; it is dropped when the run is asked to stop.
 ///
 /// # Errors
-/// Those of the work, and when the environment does not say how to reach the bucket.
+/// The errors of the work, and one if the environment does not say how to reach the bucket.
 pub(crate) fn with_bucket<T>(
     args: &BucketArgs,
     work: impl AsyncFnOnce(Client<'_>) -> anyhow::Result<T>,
@@ -76,8 +76,8 @@ fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
     }
 }
 
-/// Shows `names`, or as many as people read, and what else there is to say; then asks whether to go on. `None` when there
-/// is nobody to ask.
+/// Shows `names`, or as many as people read, and what else there is to say; then asks whether to go on. Returns
+/// `None` when there is no user to ask.
 ///
 /// # Errors
 /// When the system refuses a thread.
@@ -92,7 +92,7 @@ async fn agree(names: &[String], question: &str, console: &Console) -> anyhow::R
         console.say(format_args!("  and {} more", names.len() - MAX_NAMED));
     }
     console.ask(&format!("{} [y/N]", visible(question)));
-    // On a thread that is left alone when the run is told to stop: nothing ends the reading of a terminal.
+    // On a thread that is left alone when the run is asked to stop: nothing ends the reading of a terminal.
     let (sender, receiver) = mpsc::channel();
     std::thread::Builder::new().name("answer".into()).spawn(move || {
         let mut answer = String::new();
@@ -121,7 +121,7 @@ fn named(names: &[String]) -> String {
     text
 }
 
-/// What a key is called in its animation's folder.
+/// Returns the names of keys in their animation's folder.
 fn names_of(keys: &[String], folder: &str) -> Vec<String> {
     keys.iter().map(|key| key.strip_prefix(folder).unwrap_or(key).to_owned()).collect()
 }

@@ -1,4 +1,4 @@
-//! What a manifest says, for people.
+//! The content of a manifest, as text for people.
 
 use rayfold_client::{Obstacle, obstacles};
 use rayfold_pipeline::manifest::{Manifest, Rejected};

@@ -77,7 +77,7 @@ struct Entry<'a> {
     faults: Vec<FaultEntry<'a>>,
 }
 
-/// What the manifest says in short.
+/// The summary in a manifest, if there is one.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Known<'a> {

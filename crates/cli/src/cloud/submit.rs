@@ -115,7 +115,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 pub(crate) struct Order {
     animation: Animation,
     submission: Submission,
-    /// Where the GIF goes.
+    /// The path of the GIF.
     output: PathBuf,
 }
 
@@ -186,7 +186,7 @@ fn name_of(folder: &Path) -> anyhow::Result<Animation> {
     Ok(Animation::new(name)?)
 }
 
-/// What the bucket's folder should hold.
+/// Returns the contents that the bucket's folder should have.
 fn submission(
     input: &Input,
     plan: &Plan,
@@ -239,7 +239,7 @@ async fn preview(
 /// Asks whether scripts that the folder does not have may be deleted.
 ///
 /// # Errors
-/// When they may not, or there is nobody to ask.
+/// When they may not, or there is no user to ask.
 async fn may_delete(
     args: &Args,
     submission: &Submission,
@@ -273,7 +273,7 @@ async fn send(
 ) -> rayfold_client::Result<Submitted> {
     let folder = address(bucket, &submission.animation().scripts());
     let mut progress: Option<Progress> = None;
-    let told = |sending| match sending {
+    let show = |sending| match sending {
         Sending::Deleted { scripts } => {
             console
                 .note(format_args!("{} that the folder does not have: deleted", number(scripts, "script")));
@@ -293,7 +293,7 @@ async fn send(
             }
         },
     };
-    client.submit(submission, told).await
+    client.submit(submission, show).await
 }
 
 /// Waits until what was uploaded has become a GIF or cannot, and tells how far that is; says why if there is none.
@@ -304,7 +304,7 @@ async fn wait(
     console: &Console,
 ) -> anyhow::Result<Option<String>> {
     let mut progress: Option<Progress> = None;
-    let told = |waiting| match waiting {
+    let show = |waiting| match waiting {
         Waiting::Frames { done, total } => {
             let bar = progress.get_or_insert_with(|| Progress::start(console, "frames", total));
             bar.resize(total);
@@ -315,7 +315,7 @@ async fn wait(
             quiet.as_secs()
         )),
     };
-    let Ended::Failed(manifest) = client.wait(animation, submitted, told).await? else { return Ok(None) };
+    let Ended::Failed(manifest) = client.wait(animation, submitted, show).await? else { return Ok(None) };
     report::show_faults(&manifest, console);
     Ok(Some(format!("{animation} is {} ({})", manifest.head.status, report::count(&manifest))))
 }

@@ -1,4 +1,4 @@
-//! How long the render function would take for the frames of a folder: some of them are drawn here.
+//! Estimates the time that the render function would take for the frames of a folder: some of them are drawn here.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -17,15 +17,15 @@ use crate::wording::{Size, number};
 /// Frames that are drawn, spread evenly over the animation.
 const SAMPLES: u64 = 8;
 
-/// How often each of them is drawn.
+/// The number of times that each of them is drawn.
 const TRIES: usize = 2;
 
-/// What is known of an animation once some of its frames have been drawn.
+/// The measurements of an animation after some of its frames have been drawn.
 #[derive(Debug)]
 pub(super) struct Measured {
     pub(super) frames: u64,
     pub(super) size: Screen,
-    /// Of the render function, a frame.
+    /// The time of the render function, per frame.
     pub(super) ms: f64,
     /// A frame's PNG, in the mean.
     pub(super) frame_kb: f64,

@@ -1,6 +1,7 @@
 //! `rayfold cost`: what an animation costs on AWS, before it is made.
 //!
-//! Asks nobody: the prices are a data file, the rest is arithmetic, and what drawing takes is measured here.
+//! Sends no requests: the prices are a data file, the rest is arithmetic, and the time that drawing
+//! takes is measured here.
 
 mod measure;
 
@@ -247,7 +248,7 @@ fn amount(value: f64) -> String {
 /// A number above 0.
 ///
 /// # Errors
-/// What was expected.
+/// The form that was expected.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),

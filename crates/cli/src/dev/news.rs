@@ -1,4 +1,4 @@
-//! What `rayfold dev` tells while it runs: each event as it ends, and how far each animation is.
+//! The lines that `rayfold dev` prints while it runs: each event as it ends, and the progress of each animation.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -15,24 +15,24 @@ use crate::console::Console;
 /// Between two looks at the manifests of animations in which something happened.
 const APART: Duration = Duration::from_millis(500);
 
-/// Tells what happens.
+/// Prints the events of a run.
 pub(crate) struct News<'a> {
     console: &'a Console,
     store: &'a S3Store,
     changed: BTreeSet<Animation>,
-    told: Vec<(Animation, String)>,
+    reported: Vec<(Animation, String)>,
     next: Instant,
-    /// Whether only what goes wrong is told.
+    /// Whether only what goes wrong is reported.
     is_brief: bool,
 }
 
 impl<'a> News<'a> {
     pub(crate) fn new(console: &'a Console, store: &'a S3Store) -> Self {
-        let (changed, told, next) = (BTreeSet::new(), Vec::new(), Instant::now());
-        Self { console, store, changed, told, next, is_brief: false }
+        let (changed, reported, next) = (BTreeSet::new(), Vec::new(), Instant::now());
+        Self { console, store, changed, reported, next, is_brief: false }
     }
 
-    /// Tells only what goes wrong: how far an animation is somebody else tells.
+    /// Prints only what goes wrong: the progress of an animation is printed elsewhere.
     pub(crate) fn brief(console: &'a Console, store: &'a S3Store) -> Self {
         Self { is_brief: true, ..Self::new(console, store) }
     }
@@ -111,10 +111,10 @@ impl<'a> News<'a> {
             let Ok(object) = self.store.get(&animation.manifest()).await else { continue };
             let Ok(manifest) = Manifest::decode(&animation, &object.body) else { continue };
             let text = state(&manifest);
-            self.told.retain(|(of, told)| *of != animation || *told == text);
-            if !self.told.iter().any(|(of, _)| *of == animation) {
+            self.reported.retain(|(of, last)| *of != animation || *last == text);
+            if !self.reported.iter().any(|(of, _)| *of == animation) {
                 self.console.note(&text);
-                self.told.push((animation, text));
+                self.reported.push((animation, text));
             }
         }
         self.next = Instant::now() + APART;
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wrong_is_told_once_and_in_words() {
+    fn faults_are_reported_once_and_in_words() {
         let rejected = json!({
             "level": "WARN", "message": "no script", "key": "scripts/../0.txt", "problem": "`..` is no name",
         });

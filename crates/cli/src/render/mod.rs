@@ -111,7 +111,7 @@ pub(crate) struct Args {
     max_pixels: u64,
 }
 
-/// `--precision`.
+/// The values of `--precision`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Numbers {
     #[default]
@@ -146,7 +146,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     }
 }
 
-/// What clap cannot rule out by itself.
+/// Checks the rules that clap cannot check by itself.
 fn check(args: &Args, target: &Target) -> Result<(), Usage> {
     let usage = |message: &str| Err(Usage(message.into()));
     match target {
@@ -220,7 +220,7 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     match target {
         Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
         Target::Animation(_, Place::StandardOutput) => {}
-        // Where all frames are there already nothing is written.
+        // If all frames are there already, nothing is written.
         Target::Images(..) if args.skip_existing => {}
         Target::Images(pattern, _) => pattern.probe(wishes.frames.0.unwrap_or(1))?,
     }
@@ -356,7 +356,7 @@ fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow:
     Ok(())
 }
 
-/// What has become of a frame that is to be a file.
+/// The result of a frame that is to be a file.
 enum Drawn {
     Written(u64),
     /// It was there already.

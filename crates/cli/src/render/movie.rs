@@ -80,15 +80,15 @@ impl Encoded {
     /// Puts it into its place.
     ///
     /// # Errors
-    /// The system's.
+    /// The errors of the system.
     pub(super) fn keep(self, place: &Place) -> Result<Written, MovieError> {
         self.sink.finish(place)?;
         Ok(self.written)
     }
 }
 
-/// Encodes an animation as [`write`] does, but puts it nowhere. It fails with [`MovieError::Full`] if it has more than
-/// `limit` bytes.
+/// Encodes an animation as [`write`] does, but puts it nowhere. It fails with [`MovieError::Full`] if it has
+/// more than `limit` bytes.
 ///
 /// # Errors
 /// The errors of [`write`].

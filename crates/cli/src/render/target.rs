@@ -16,7 +16,7 @@ use crate::wording::number;
 pub(crate) enum Target {
     /// One animation of all frames.
     Animation(Container, Place),
-    /// One frame.
+    /// A picture of one frame.
     Image(PathBuf, Format),
     /// A file for each frame.
     Images(Pattern, Format),
@@ -153,7 +153,7 @@ impl Pattern {
     /// Makes the folder of the files if it does not exist.
     ///
     /// # Errors
-    /// The system's errors.
+    /// The errors of the system.
     pub(crate) fn make_folder(&self) -> anyhow::Result<()> {
         let folder = &self.folder;
         if folder.as_os_str().is_empty() {

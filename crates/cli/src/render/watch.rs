@@ -1,8 +1,9 @@
 //! Drawing again whenever a script changes, or a file that a script names.
 //!
-//! Changes are found by looking at the files a few times a second, not by the system's notifications: those are silent on
-//! network drives and in folders that a virtual machine or a container shares, and lose a file that an editor replaces.
-//! What small files hold is compared, not when they were written: some file systems count in steps of two seconds.
+//! Changes are found by looking at the files a few times a second, not by the system's notifications: those are
+//! silent on network drives and in folders that a virtual machine or a container shares, and lose a file that
+//! an editor replaces. The contents of small files are compared, not their times: some file systems count in
+//! steps of two seconds.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,13 +18,13 @@ use crate::input::is_part_of_animation;
 use crate::interrupt;
 use crate::outcome::{Outcome, Usage};
 
-/// Between two looks.
+/// The time between two looks at the files.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Bytes of a file up to which it is read at each look.
 const SMALL: u64 = 64 << 10;
 
-/// Draws by `draw`, at first and whenever one of the scripts has changed, until the run is told to stop.
+/// Draws by `draw`, at first and whenever one of the scripts has changed, until the run is asked to stop.
 ///
 /// # Errors
 /// Wrong usage alone: what else is wrong is shown, and may be mended.
@@ -54,7 +55,7 @@ pub(super) fn draw_again(
                 return Ok(Outcome::Done);
             }
             let now = look(inputs);
-            // Two looks alike: nobody is in the middle of saving.
+            // Two looks alike: no editor is in the middle of saving.
             if now == last && now != drawn {
                 break;
             }
@@ -63,7 +64,7 @@ pub(super) fn draw_again(
     }
 }
 
-/// What the inputs are made of.
+/// The state of each input file.
 type Seen = BTreeMap<PathBuf, Option<State>>;
 
 #[derive(Debug, PartialEq)]
@@ -129,7 +130,7 @@ mod tests {
         write("notes.md", "not a script");
         write("a.txt", "Screen 4 3");
         assert!(!changes());
-        // Of the same size, within one tick of any clock.
+        // The file has the same size, within one tick of any clock.
         write("a.txt", "Screen 3 4");
         assert!(changes() && !changes());
         write("animation.json", "{}");

@@ -69,7 +69,7 @@ resource "aws_iam_policy" "user" {
   policy      = module.rayfold.user_policies[each.key]
 }
 
-# Who is told. Subscribe by `aws sns subscribe --protocol email --topic-arn ... --notification-endpoint you@example.com`.
+# The recipients of messages. Subscribe by `aws sns subscribe --protocol email --topic-arn ... --notification-endpoint you@example.com`.
 
 resource "aws_sns_topic" "alarms" {
   name              = "${var.name}-alarms"
