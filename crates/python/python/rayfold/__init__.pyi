@@ -91,6 +91,7 @@ class Material:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None: ...
     @property
     def name(self) -> str | None: ...
@@ -327,6 +328,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A sphere.
 
@@ -340,7 +342,7 @@ class Scene:
             the centre (`cx cy cz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def triangle(
@@ -359,6 +361,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A triangle.
 
@@ -374,7 +377,7 @@ class Scene:
             the vertex (`wx wy wz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def box(
@@ -392,6 +395,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A box along the axes.
 
@@ -405,7 +409,7 @@ class Scene:
             the corner (`vx vy vz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def plane(
@@ -423,6 +427,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """An infinite plane.
 
@@ -436,7 +441,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def disc(
@@ -455,6 +460,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A flat, round disc.
 
@@ -470,7 +476,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def cylinder(
@@ -489,6 +495,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A closed cylinder.
 
@@ -504,7 +511,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -526,6 +533,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A closed cone or truncated cone.
 
@@ -543,7 +551,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -565,6 +573,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A ring (torus).
 
@@ -582,7 +591,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `R` is greater than `r`.
@@ -603,6 +612,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> None:
         """A cylinder with round ends.
 
@@ -618,7 +628,42 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+            the clauses of a material, as those of `Material`.
+        """
+    def mesh(
+        self,
+        file: str,
+        material: Material | str | None = None,
+        smooth: FixedNumber | None = None,
+        flat: bool | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
+    ) -> None:
+        """The triangles of a model in a file.
+
+        In a script: `Mesh "FILE" [M] [smooth a or flat]`.
+
+        Parameters
+        ----------
+        file : str
+            the name of a file in the script's folder; of a scene that has none, in the current folder.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By default that of the file.
+        smooth : FixedNumber, optional
+            faces that meet at less than this angle in degrees, 0 to 180, look smooth.
+        flat : bool, optional
+            whether the normals of the file are left out.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def material(
@@ -634,6 +679,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
     ) -> Material:
         """A surface material with a name.
 
@@ -643,7 +689,7 @@ class Scene:
         ----------
         name : str
             the name of the new material.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
             the clauses of a material, as those of `Material`.
         """
     def group(
