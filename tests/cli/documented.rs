@@ -15,10 +15,6 @@ use crate::{Folder, RAYFOLD, decode_gif};
 /// Frames that are rendered of each animation.
 const FRAMES: usize = 3;
 
-/// Pictures of an earlier encoder that were not rendered again: each takes minutes. To be removed from
-/// here when they are.
-const NOT_RENEWED: [&str; 4] = ["marbles", "glass", "clockwork", "planets"];
-
 /// The largest difference of a level that a picture may have from its last frame, on average.
 const NEAR: f64 = 4.0;
 
@@ -91,10 +87,6 @@ fn documented_pictures_are_what_their_commands_write() {
         let path = root().join(format!("docs/images/{name}.gif"));
         if std::env::var_os("RAYFOLD_PICTURES").is_some() {
             render(&folder, &name, &flags, &path);
-            continue;
-        }
-        if NOT_RENEWED.contains(&name.as_str()) {
-            println!("NOT COMPARED: docs/images/{name}.gif, which is of an earlier encoder");
             continue;
         }
         let whole = std::fs::read(&path).unwrap();
