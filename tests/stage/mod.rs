@@ -98,8 +98,17 @@ impl Stage {
         self.platform.start_invoker(Some(sender)).await.unwrap();
     }
 
+    /// Puts an object. As from any client, a put that the store could not answer is sent again, up to five times.
     pub async fn put(&self, key: &str, body: impl Into<Bytes>) {
-        self.store().put(key, body.into(), PutOptions::always()).await.unwrap();
+        let body = body.into();
+        for attempt in 1.. {
+            match self.store().put(key, body.clone(), PutOptions::always()).await {
+                Err(error) if error.is_retryable() && attempt < 5 => {
+                    tokio::time::sleep(Duration::from_millis(200)).await;
+                }
+                put => return drop(put.unwrap()),
+            }
+        }
     }
 
     pub async fn upload(&self, animation: &str, files: &[(&str, String)]) {
