@@ -1,8 +1,9 @@
 //! Makes frames ahead of their consumer, which takes them in order.
 //!
-//! Frames are made side by side on the rayon pool while the caller's thread takes the finished ones in order; if that is
-//! one of the pool, it makes frames as well while it has none to take. How many may be made or waiting at once is
-//! bounded, so that memory does not grow with the number of frames, however slow the taker is.
+//! Frames are made side by side on the rayon pool, while the caller's thread takes the finished ones in order.
+//! If that thread is one of the pool, it makes frames as well while it has none to take. The number of frames
+//! that are being made or waiting is bounded, so that memory does not grow with the number of frames, however
+//! slow the taker is.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};

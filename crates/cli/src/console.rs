@@ -1,7 +1,7 @@
 //! The program's output: standard output for data, standard error for people.
 //!
-//! Knows what the global flags and the environment say about colour, progress and silence, so that no subcommand asks
-//! again. Errors are never silenced.
+//! It knows what the global flags and the environment say about colour, progress and silence, so that no subcommand
+//! asks again. Errors are never silenced.
 
 use std::io::{IsTerminal, Write};
 

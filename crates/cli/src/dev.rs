@@ -1,9 +1,10 @@
 //! `rayfold dev`: the whole pipeline on this machine, until it is stopped.
 //!
-//! An S3 server (the store built in, MinIO or SeaweedFS), the bucket, its notifications and the local invoker with the
-//! function binaries. Everything it started ends with it; the data stays, and the next start goes on from there. With a
-//! folder it has its data in a temporary one, submits the scripts, writes the GIF and ends. With an endpoint it runs the
-//! functions alone, on a bucket of another S3 server (`cluster`).
+//! It starts an S3 server (the built-in store, MinIO or SeaweedFS), makes the bucket and its notifications,
+//! and starts the local invoker with the function binaries. Everything that it started ends with it; the data
+//! stays, and the next start continues from there. With a folder it keeps its data in a temporary one,
+//! submits the scripts, writes the GIF and ends. With an endpoint it runs the functions alone, on a bucket of
+//! another S3 server (`cluster`).
 
 mod cluster;
 mod news;

@@ -1,9 +1,9 @@
-//! Stopping on a signal (Ctrl-C, SIGTERM, SIGHUP): the first time in order, the second time at once. A run that has not
-//! stopped in order after [`GRACE`] is ended at once, too, unless it has asked for [`patience`].
+//! Stops a run on a signal (Ctrl-C, SIGTERM, SIGHUP): in order at the first one, at once at the second. A run that
+//! has not stopped in order after [`GRACE`] is ended at once, too, unless it has asked for [`patience`].
 //!
-//! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary files
-//! on the way out. At once means that only those files are removed. What the system may let us wait for without end (a
-//! terminal, a pipe) is done by [`wait_for`], which comes back at the first signal.
+//! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary
+//! files on the way out. At once means that only those files are removed. A call in which the system may wait without
+//! end (for a terminal, a pipe) is made by [`wait_for`], which comes back at the first signal.
 //! Signals that were ignored when the program started stay ignored: `nohup`, and `&` in a script, ask for that.
 
 use std::path::PathBuf;

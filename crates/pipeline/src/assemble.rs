@@ -1,12 +1,13 @@
 //! The assembler makes the bucket agree with itself, whichever claim woke it.
 //!
-//! Each round reads the manifest, the GIF's version and generation, and lists, in this order; then it does what is due:
-//! commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of a set
-//! that is done and settled, removes the GIF of a set that can have none. It ends only on a round that wrote nothing,
-//! so that no GIF from an older listing stays, and no set that became whole while it worked is left. An assembler
-//! that waits or builds holds the animation's lease; another assembler that finds it taken leaves all to its holder.
+//! Each round reads the manifest and the GIF's version and generation, and lists, in this order. Then it does what is
+//! due: it commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of
+//! a set that is done and settled, removes the GIF of a set that can have none. The assembler ends only on a round
+//! that wrote nothing, so that no GIF from an older listing stays, and no set that became whole while it worked is
+//! left. An assembler that waits or builds holds the animation's lease; another assembler that finds it taken leaves
+//! all to its holder.
 //!
-//! A GIF that does not fit the time of one invocation is left to the next one where it stands (`build`).
+//! If a GIF does not fit the time of one invocation, the next invocation continues it (`build`).
 
 use std::time::Duration;
 

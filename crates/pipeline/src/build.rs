@@ -1,9 +1,10 @@
-//! Building a GIF, in one piece or in several.
+//! Builds a GIF, in one piece or in several.
 //!
-//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and what it writes goes
-//! out part by part. When the time of an invocation would not do for one more frame, the GIF is written down as it stands
-//! ([`checkpoint`](crate::checkpoint)) and left to the next invocation; both together write the bytes that one would have
-//! written. Each takes a frame at least; a set of which not even one fits, or that takes a day, is refused.
+//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and its output
+//! is sent part by part. If the time of an invocation does not suffice for one more frame, the invocation writes
+//! a [`checkpoint`](crate::checkpoint) and leaves the GIF to the next one; both together write the bytes that
+//! one would have written. Each takes at least one frame. A set of which not even one frame fits, or that takes
+//! a day, is refused.
 
 use std::time::Duration;
 

@@ -5,7 +5,8 @@
 //! there is a checkpoint, so an assembler that builds in one piece asks for none; one that no lease speaks of is
 //! litter, and the bucket's rules clear it away.
 //!
-//! The object: a line with the hash of the rest, a line of JSON, what is not sent yet of the GIF, and the encoder's state.
+//! The object is a line with the hash of the rest, a line of JSON, the bytes of the GIF that are not sent yet,
+//! and the encoder's state.
 
 use bytes::{Bytes, BytesMut};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! The fold: an invocation that has put a result commits manifests until one shows that result, and puts the claim for
-//! the revision that it has committed.
+//! The fold: an invocation that has put a result commits manifests until one shows that result, and puts the claim
+//! for the revision that it has committed.
 //!
 //! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
 //! 2. An invocation that has put a result selects by lot a frame that the manifest shows as pending. It leaves if that

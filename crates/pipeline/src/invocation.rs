@@ -1,8 +1,8 @@
 //! The environment of a step: the store, the clock, chance, its own name, and its patience.
 //!
-//! Requests go through here so that a busy store and a lost answer are met in one way: whatever may be repeated
-//! without harm is repeated a few times with growing random pauses. Conditional writes of the manifest and the GIF are
-//! not repeated; after a lost answer of one the steps look at what is there.
+//! Requests go through here, so that a busy store and a lost answer are handled in one way: a request that may be
+//! repeated without harm is repeated a few times, with growing random pauses. Conditional writes of the manifest and
+//! the GIF are not repeated; after a lost answer to one, the steps read what is there.
 
 use std::future::Future;
 use std::time::Duration;

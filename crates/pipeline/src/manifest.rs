@@ -1,10 +1,10 @@
-//! The manifest: what the bucket's listing amounts to, written down for people, the command line and the protocol.
+//! The manifest: the summary of the bucket's listing, for people, the command line and the protocol.
 //!
 //! `docs/manifest.md` describes the document field by field. The type knows no store: [`mod@crate::fold`] decides when one
 //! is written, [`crate::reconcile()`] what it says, [`crate::invariants`] what it may never say.
 //!
-//! Its first line is the [`Head`], whose size does not grow with the number of frames; the frames follow, a line each,
-//! and the first line tells where.
+//! Its first line is the [`Head`], whose size does not grow with the number of frames. The frames follow, a line
+//! each, and the first line says where.
 
 use std::collections::BTreeSet;
 use std::fmt;

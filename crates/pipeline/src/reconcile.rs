@@ -1,7 +1,7 @@
-//! From listings to a manifest: the fold that decides everything, as a pure function.
+//! Turns listings into a manifest: the fold that decides everything, as a pure function.
 //!
 //! A script's version resolves to a split, a frame or an error, in that order: a late frame beats a timeout's error.
-//! A frame of any pixel version will do, and the newest is used.
+//! A frame of any pixel version counts, and the newest is used.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;

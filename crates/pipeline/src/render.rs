@@ -1,8 +1,8 @@
 //! The render step: one event, one frame.
 //!
-//! An event only says where to look. The invocation reads the script as it is now, so that a superseded event is an
-//! event for the current version; looks whether that version has a result already; draws it, puts the result under a
-//! key that names script and version, only if it is not there yet; and folds. A frame that is too big for one invocation is
+//! An event only says where to look. The invocation reads the script as it is now, so a superseded event counts as
+//! one for the current version. If that version has no result yet, the invocation draws it and puts the result under
+//! a key that names script and version, only if absent. Then it folds. A frame that is too big for one invocation is
 //! drawn in bands (`bands`).
 
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! Drawing again, on demand: what `rayfold retry` does to the bucket.
+//! Draws frames again, on demand: the effect of `rayfold retry` on the bucket.
 //!
 //! Error receipts are deleted first, for a receipt is what makes an event find its work done; then the wakings that
 //! the sweep has counted; then each frame is woken again. Everything after that is the render function's.

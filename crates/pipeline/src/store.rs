@@ -1,7 +1,8 @@
 //! A bucket as the protocol sees it: objects under keys, conditional puts, listings.
 //!
-//! The trait is what the protocol needs of S3 and no more; it knows nothing of animations. Every call is one request
-//! (an [`Upload`] is several), and every `await` of one is a point at which an invocation may be killed.
+//! The trait has the operations of S3 that the protocol needs, and no more; it knows nothing of animations.
+//! Every call is one request (an [`Upload`] is several), and every `await` of one is a point at which an
+//! invocation may be killed.
 //!
 //! Every store guarantees this, and the suite `conformance` of `crates/simulation` holds it:
 //!

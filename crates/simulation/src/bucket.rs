@@ -1,4 +1,4 @@
-//! The simulated bucket: latency, faults, kills, and what the platform counts.
+//! The simulated bucket: latency, faults, kills, and the counts of the platform.
 //!
 //! A request takes effect at some moment between its start and its answer, whether or not its sender still lives.
 //! Listings are not atomic: each name is seen as it was at one of two moments within the request.

@@ -1,8 +1,9 @@
 //! Measurements for animations of any size and number: requests per frame, the time from the last result to the claim
 //! and from the first upload to the GIF, the waits for a free place, and the requests that the bucket refuses.
 //!
-//! No faults here but the bucket's limits, if they are asked for: the requests' latencies (GET 10-25 ms, PUT 25-60 ms, LIST
-//! 20-40 ms a page, and the time of the bodies), the platform's concurrency and the drawing times are all there is.
+//! There are no faults here but the bucket's limits, if they are asked for. All else is the requests' latencies
+//! (GET 10-25 ms, PUT 25-60 ms, LIST 20-40 ms a page, and the time of the bodies), the platform's concurrency
+//! and the drawing times.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,7 +1,7 @@
 //! The cost of a slow upload or a slow removal: scripts come or go one by one, and `animation.json` does not say how
 //! many there will be.
 //!
-//! No faults here. Each finished moment is claimed for; what counts is what the assemblers make of the claims.
+//! No faults here. Each finished moment is claimed for; the cost is what the assemblers make of the claims.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

@@ -1,7 +1,7 @@
-//! Animations in a bucket: sending scripts there, watching what becomes of them, and getting frames and GIFs back.
+//! Animations in a bucket: sends scripts there, watches their progress, and gets frames and GIFs back.
 //!
-//! One face of `rayfold-client`, which does the work: these subcommands have the flags and the words. Who and where comes
-//! from the standard AWS environment.
+//! These subcommands add flags and texts to `rayfold-client`, which does the work. Credentials, region and endpoint
+//! come from the standard AWS environment.
 
 use std::sync::mpsc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Drawing again whenever a script changes, or a file that a script names.
+//! Draws again whenever a script changes, or a file that a script names.
 //!
 //! Changes are found by looking at the files a few times a second, not by the system's notifications: those are
 //! silent on network drives and in folders that a virtual machine or a container shares, and lose a file that

@@ -1,4 +1,5 @@
-//! The manifest as bytes: what its first line holds, and where a frame's line is, so that neither needs all of it.
+//! The manifest as bytes: the contents of its first line, and the position of a frame's line, so that neither
+//! needs all of it.
 //!
 //! The first line is the [`Head`] and the `places`: for a script every so many bytes, the byte after the second
 //! line's end at which the lines about it begin. A reader that needs one frame reads the beginning, and then the few

@@ -1,6 +1,6 @@
-//! A listing in, a manifest out: the rules of `docs/pipeline.md`, row by row.
+//! The rules of `docs/pipeline.md`, row by row: each test turns a listing into a manifest.
 //!
-//! A listing is the keys as they lie in the bucket, a version after each script: `1.txt a`. What the manifest says is
+//! A listing is the keys as they lie in the bucket, with a version after each script: `1.txt a`. The manifest is
 //! written in short: its status, and for each frame script, version, part and state.
 
 use super::*;

@@ -9,8 +9,8 @@
 //! 3. An invocation that is woken for the frame itself wakes the bands that are missing, or puts
 //!    together what is there.
 //!
-//! A band's key has its script's version and the pixel version, so that bands of different pictures cannot meet; and a band is
-//! never cut. Which rows a band has, and what is in it, is the renderer's to know.
+//! A band's key has its script's version and the pixel version, so that bands of different pictures cannot meet; and
+//! a band is never cut. The renderer alone knows the rows of a band and its contents.
 //!
 //! Invariant: an invocation that leaves has listed after its own band was put, so the last one to put its band
 //! finds all of them.

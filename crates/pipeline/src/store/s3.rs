@@ -1,8 +1,8 @@
-//! A bucket of S3, or of what speaks S3.
+//! A bucket of S3, or of another server that speaks S3.
 //!
-//! AWS's types end here: callers see the [`Store`] trait and the pipeline's errors. Who and where is taken from the
-//! standard AWS environment (variables, profile, the function's role); whenever an endpoint is set, buckets are
-//! addressed by path, as MinIO wants it.
+//! AWS's types end here: callers see the [`Store`] trait and the pipeline's errors. Credentials and endpoint are
+//! taken from the standard AWS environment (variables, profile, the function's role). Whenever an endpoint is set,
+//! buckets are addressed by path, as MinIO requires.
 //!
 //! The client repeats a request up to three times, with exponential backoff and jitter, when the store is busy (503,
 //! 429), fails (500) or gives no answer. So a conditional put whose answer was lost may meet its own success and answer

@@ -1,10 +1,10 @@
 //! An invocation as a function: from the answers that it has got to the requests that it waits on, or to its end.
 //!
-//! The real steps run against a store that answers nothing by itself. What an invocation asks for next depends on its
-//! event, its request id, the moment that its clock shows, and the answers so far; on nothing else. So what it has come to
-//! is known by a hash of these, is worked out once ([`Memo`]), and states of the world can be copied and compared. At some
-//! places a step says what it goes on with ([`Invocation::forget_history_before`]): what has happened before is then forgotten, and
-//! two invocations that have come to the same on different ways are one.
+//! The real steps run against a store that answers nothing by itself. The next requests of an invocation depend on
+//! its event, its request id, the moment that its clock shows, and the answers so far; on nothing else. So its state
+//! is known by a hash of these and is worked out once ([`Memo`]), and states of the world can be copied and compared.
+//! At some places a step declares the values from which it continues ([`Invocation::forget_history_before`]): its
+//! history is then forgotten, and two invocations that have reached the same values in different ways are one.
 //! Clocks of invocations stand still, and pauses end at once: a pause only lets the next request of its invocation
 //! take effect later, and that is searched anyway.
 

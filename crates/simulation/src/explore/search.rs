@@ -1,4 +1,4 @@
-//! All states of a world, those first that few preemptions and faults lead to.
+//! Visits all states of a world, first those that need few preemptions and faults.
 //!
 //! A preemption is that a process goes on though the one that went on before still could. It is no preemption that
 //! the user pauses after an act, or that a process goes on where another one has ended or died. Errors of a protocol

@@ -1,7 +1,7 @@
-//! A state of a small world, what can happen next in it, and what must hold.
+//! A state of a small world, its possible next steps, and its invariants.
 //!
 //! A request takes effect and is answered at one moment. Its sender may be killed before it, after it, or so that the
-//! write lands later; its answer may get lost. Reads that are lost are sent again and are no other than late ones.
+//! write lands later; its answer may get lost. A read that is lost is sent again, which is the same as a late read.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
