@@ -50,7 +50,7 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 19] = [
+const OF_VERSION_2: [(&str, &str); 20] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
