@@ -6,8 +6,7 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use rayfold_scene::{Curve as SceneCurve, Key, Mode};
 
 use crate::describe::modes;
-use crate::place::{Place, color_of, shown};
-use crate::value::items_of;
+use crate::place::{Place, color_of, items_of, shown};
 
 /// A number that changes from frame to frame, made by `keys`.
 #[pyclass(frozen, module = "rayfold")]

@@ -1,11 +1,11 @@
-//! Places of values in calls, and values as messages show them.
+//! Places of values in calls, values as messages show them, and what several kinds of values share.
 
 use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PyIterator, PySet, PyString};
 use rayfold_scene::color_levels;
 
 /// The place of a value, for messages: `sphere(): radius`.
@@ -44,6 +44,18 @@ pub(crate) fn color_text<'a>(name: &'a Bound<'_, PyString>, place: Place<'_>) ->
         "{place} is a colour such as \"#c04020\" or (0.75, 0.25, 0.1), not {}",
         shown(name)
     )))
+}
+
+/// Returns the items of an array or an iterator; nothing for what holds no numbers in order, although Python iterates over
+/// it.
+pub(crate) fn items_of<'py>(value: &Bound<'py, PyAny>) -> Option<Bound<'py, PyIterator>> {
+    let has_no_numbers = value.is_instance_of::<PyString>()
+        || value.is_instance_of::<PyBytes>()
+        || value.is_instance_of::<PyByteArray>()
+        || value.is_instance_of::<PyDict>()
+        || value.is_instance_of::<PySet>()
+        || value.is_instance_of::<PyFrozenSet>();
+    if has_no_numbers { None } else { value.try_iter().ok() }
 }
 
 /// Returns a value as Python shows it, cut if it is long.

@@ -8,13 +8,11 @@ use std::ops::Range;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{
-    PyByteArray, PyBytes, PyDict, PyFloat, PyFrozenSet, PyInt, PyIterator, PyList, PySet, PyString, PyTuple,
-};
+use pyo3::types::{PyFloat, PyInt, PyList, PyString, PyTuple};
 use rayfold_scene::{Curve as SceneCurve, Field, Form, InvalidValue, Presence, Values};
 
 use crate::curve::Curve;
-use crate::place::{Place, color_of, shown};
+use crate::place::{Place, color_of, items_of, shown};
 use crate::signature::is_color;
 
 /// The largest count of numbers of a line: more than any command takes.
@@ -228,18 +226,6 @@ fn number_of(value: &Bound<'_, PyAny>) -> Option<Number> {
         return Some(Number::Constant(number));
     }
     value.cast::<Curve>().ok().map(|curve| Number::Moving(curve.get().curve.clone()))
-}
-
-/// Returns the items of an array or an iterator; nothing for what holds no numbers in order, although Python iterates over
-/// it.
-pub(crate) fn items_of<'py>(value: &Bound<'py, PyAny>) -> Option<Bound<'py, PyIterator>> {
-    let has_no_numbers = value.is_instance_of::<PyString>()
-        || value.is_instance_of::<PyBytes>()
-        || value.is_instance_of::<PyByteArray>()
-        || value.is_instance_of::<PyDict>()
-        || value.is_instance_of::<PySet>()
-        || value.is_instance_of::<PyFrozenSet>();
-    if has_no_numbers { None } else { value.try_iter().ok() }
 }
 
 /// Adds the shortest decimal that reads back as `x`, as scripts are written.
