@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use rayfold_scene::{Clause, is_name};
 
-use crate::place::{Place, color_text, quoted, shown};
+use crate::place::{Place, color_text, flag_of, quoted, shown};
 use crate::signature::{CLAUSES, Keyword};
 use crate::value::{Numbers, check_alone, refused};
 
@@ -309,6 +309,10 @@ fn read_clause(
 ) -> PyResult<Option<Other>> {
     let form = keyword.clause.form();
     let place = Place { method, parameter: &keyword.name };
+    // One without numbers is there or left out.
+    if keyword.entries.is_empty() && !flag_of(value, place)? {
+        return Ok(None);
+    }
     text.push(' ');
     *text += form.name;
     let mut numbers = Numbers::new();
@@ -318,8 +322,7 @@ fn read_clause(
         None => read_other(value, place, &keyword.name).map(|found| other = Some(found)),
     };
     match keyword.entries.len() {
-        0 if is_true(value, place)? => {}
-        0 => return Ok(None),
+        0 => {}
         1 => entry(0, value)?,
         count => {
             let tuple = value.cast::<PyTuple>().ok().filter(|tuple| tuple.len() == count);
@@ -340,17 +343,6 @@ fn read_clause(
         return Err(refused(&whole(), form, &names(), numbers.values(), fault));
     }
     Ok(other)
-}
-
-/// Takes the value of a clause without numbers.
-///
-/// # Errors
-/// Fails for anything but True: leaving it out is how it is switched off.
-fn is_true(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<bool> {
-    if value.extract::<bool>().is_ok_and(|value| value) {
-        return Ok(true);
-    }
-    Err(PyTypeError::new_err(format!("{place} is True or left out, not {}", shown(value))))
 }
 
 fn read_other(value: &Bound<'_, PyAny>, place: Place<'_>, keyword: &'static str) -> PyResult<Other> {

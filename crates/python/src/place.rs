@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PyIterator, PySet, PyString};
 use rayfold_scene::color_levels;
@@ -44,6 +44,16 @@ pub(crate) fn color_text<'a>(name: &'a Bound<'_, PyString>, place: Place<'_>) ->
         "{place} is a colour such as \"#c04020\" or (0.75, 0.25, 0.1), not {}",
         shown(name)
     )))
+}
+
+/// Returns a value that is True or False.
+///
+/// # Errors
+/// Fails for others, also if Python takes them for true.
+pub(crate) fn flag_of(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<bool> {
+    value
+        .extract::<bool>()
+        .map_err(|_| PyTypeError::new_err(format!("{place} is True or False, not {}", shown(value))))
 }
 
 /// Returns the items of an array or an iterator; nothing for what holds no numbers in order, although Python iterates over

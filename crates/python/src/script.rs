@@ -23,9 +23,9 @@ use crate::error::{Diagnostic, guarded, scene_error};
 use crate::material::{
     Given as Clause, Material, Materials, clause_of, name_from, surface_of, surface_of_color,
 };
-use crate::place::{Place, quoted, shown};
+use crate::place::{Place, flag_of, quoted, shown};
 use crate::signature::{METHODS, Role, Signature};
-use crate::value::{Numbers, check_alone, refused};
+use crate::value::{Numbers, check_alone, refused, write_number};
 
 /// The name of a script that has none.
 const UNNAMED: &str = "scene";
@@ -195,10 +195,15 @@ impl Script {
                 }
                 (Role::Material(_), value) => surface = Some(value.clone()),
                 (Role::Smooth, Some(value)) => options = smooth(value, place)?,
-                (Role::Flat, Some(value)) if value.is_truthy()? && !options.is_empty() => {
-                    return Err(PyTypeError::new_err(format!("{place}: a mesh is either smooth or flat")));
-                }
-                (Role::Flat, Some(value)) if value.is_truthy()? => options.push_str(" flat"),
+                (Role::Flat, Some(value)) => match (flag_of(value, place)?, options.is_empty()) {
+                    (true, true) => options.push_str(" flat"),
+                    (true, false) => {
+                        return Err(PyTypeError::new_err(format!(
+                            "{place}: a mesh is either smooth or flat"
+                        )));
+                    }
+                    (false, _) => {}
+                },
                 (Role::Name(_) | Role::Smooth | Role::Flat, _) => {}
             }
         }
@@ -530,7 +535,9 @@ fn smooth(angle: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
     if !(0.0..=180.0).contains(&degrees) {
         return Err(PyValueError::new_err(format!("{place}={degrees}: the angle must be from 0 to 180")));
     }
-    Ok(format!(" smooth {degrees}"))
+    let mut words = " smooth ".to_owned();
+    write_number(&mut words, degrees);
+    Ok(words)
 }
 
 /// Returns whether a word is the only argument.

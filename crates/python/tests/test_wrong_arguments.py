@@ -120,6 +120,13 @@ WRONG = {
 ANSWERS = (TypeError, ValueError, IndexError)
 
 
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """The current folder, with a model of the name that a right argument has."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "thing").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+
 def is_named(message, call, parameter):
     """Whether a message says the function and the parameter."""
     return re.search(rf"\b{re.escape(parameter)}\b", message) and re.search(rf"\b{re.escape(call)}\b", message)
@@ -164,8 +171,8 @@ def check_scene(scene, before, refused, about):
         assert str(scene) == before, f"{about}: nothing is added by a call that fails"
         return
     errors = [d for d in scene.check() if d.severity == "error"]
-    # What is open or of many frames is known at the drawing alone: curves, and groups that are not ended.
-    late = [d for d in errors if "group" not in d.message.lower() and "(" not in about]
+    # What is open, in a file or of many frames is known at the drawing alone: groups, models and curves.
+    late = [d for d in errors if not re.search("group|file", d.message, re.I) and "(" not in about]
     assert not late, f"{about}: accepted, but {late[0]}"
 
 
@@ -252,8 +259,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_wrong_arguments_of_functions(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_wrong_arguments_of_functions(name, monkeypatch):
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     for key in ("AWS_REGION", "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(key, "us-east-1")
