@@ -70,7 +70,7 @@ pub(crate) fn in_order<I: Send, T: Send>(
     })
 }
 
-/// Waits for what is sent, and works meanwhile on what the pool has to do, if this is a thread of it.
+/// Waits for the next item, and works meanwhile on the tasks of the pool, if this is a thread of it.
 fn next<T>(receiver: &Receiver<T>) -> anyhow::Result<T> {
     loop {
         match receiver.try_recv() {

@@ -99,7 +99,7 @@ fn correct(error: &mut clap::Error) {
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let mut args: Vec<OsString> = args.into_iter().collect();
     if args.get(1).is_some_and(|command| command == "help") {
-        // The help of `help` is that of what follows.
+        // The help of `help` is the help of the arguments after it.
         args.retain(|arg| arg != "--help" && arg != "-h");
     }
     let app = match App::try_parse_from(args) {

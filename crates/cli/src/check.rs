@@ -1,4 +1,4 @@
-//! `rayfold check`: what is wrong with scripts and settings, for people and for editors.
+//! `rayfold check`: the faults of scripts and settings, for people and for editors.
 
 use std::path::{Path, PathBuf};
 

@@ -26,7 +26,7 @@ pub(crate) enum Format {
     Json,
 }
 
-/// Resolved once from the flags, the environment and what the streams are attached to.
+/// Resolved once from the flags, the environment and the kinds of the streams.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Console {
     /// No progress and no remarks.
@@ -82,7 +82,7 @@ impl Console {
         self.say(format_args!("{}: {}: {}", self.label(), visible(what), visible(why)));
     }
 
-    /// Something that may not be what was meant, unless they asked for quiet.
+    /// Warns of a likely mistake, unless the user asked for quiet.
     pub(crate) fn warn(&self, text: impl std::fmt::Display) {
         if !self.quiet {
             let label = if self.color { "\x1b[1;33mwarning\x1b[0m" } else { "warning" };

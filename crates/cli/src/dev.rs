@@ -228,7 +228,7 @@ async fn attend(
 ) -> anyhow::Result<Outcome> {
     let (sender, mut seen) = unbounded_channel();
     let invoker = platform.start_invoker(Some(sender)).await?;
-    // So that the sweep that catches up does not meet what is uploaded next.
+    // So the sweep that catches up does not meet the next upload.
     let _ = tokio::time::timeout(CATCH_UP, invoker.idle()).await;
     if let Some(order) = order {
         let bucket = BucketArgs { bucket: args.bucket.clone() };
@@ -316,7 +316,8 @@ fn stuck_after(timeout: Duration) -> Duration {
     timeout + timeout / 10
 }
 
-/// MinIO's usual port, for either store, so that what another terminal has exported stays right from run to run.
+/// Returns MinIO's usual port, for either store, so that the variables that another terminal has exported stay right
+/// from run to run.
 fn usual_address() -> SocketAddr {
     let usual = SocketAddr::from(([127, 0, 0, 1], 9000));
     if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::any_port() }

@@ -156,7 +156,7 @@ pub(crate) fn stdin_once(inputs: &[PathBuf]) -> Result<(), Usage> {
     }
 }
 
-/// Reads what another program or a person writes, and comes back when a signal asks to stop.
+/// Reads the output of another program or of a person, and comes back when a signal asks to stop.
 fn read_patiently<R: Read>(
     open: impl FnOnce() -> std::io::Result<R> + Send + 'static,
     limits: &Limits,

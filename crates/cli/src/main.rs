@@ -1,6 +1,6 @@
 //! The `rayfold` command: all of it is in the library beside this file.
 //!
-//! So it is compiled while the tracer still is; what waits for the tracer is linking.
+//! So it is compiled while the tracer still is; only linking waits for the tracer.
 
 use std::process::ExitCode;
 

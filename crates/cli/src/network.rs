@@ -1,6 +1,6 @@
-//! The subcommands that serve, or talk to a bucket, and what an animation costs there: the feature `network`.
+//! The subcommands that serve, that talk to a bucket, or that estimate the cost of one: the feature `network`.
 //!
-//! They bring most of what a first build takes, so that the renderer can be built without them.
+//! They take most of the time of a first build, so the renderer can be built without them.
 
 use clap::Subcommand;
 

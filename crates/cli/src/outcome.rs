@@ -7,10 +7,10 @@ use std::process::ExitCode;
 
 use crate::interrupt;
 
-/// The end of a subcommand that has said all there is to say; what it has not said yet it returns as an error.
+/// The end of a subcommand that has reported everything; it returns an unreported error as an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// It did what it was asked to.
+    /// It did its work.
     Done,
     /// It could not, and has reported the reason.
     Failed,

@@ -25,7 +25,7 @@ const KEPT_TEXT: usize = 64 << 20;
 /// Memory that frames ahead of the encoder may take, in bytes: two images of 1920 x 1080 while they are drawn.
 const AHEAD: u64 = 192 << 20;
 
-/// Bytes of a pixel while it is drawn: its samples, its levels, and what these are encoded into.
+/// Bytes of a pixel while it is drawn: its samples, its levels, and its share of the encoded file.
 const OF_PIXEL: u64 = 48;
 
 /// The fewest frames at once: one is drawn while another is encoded.
@@ -34,7 +34,7 @@ const FEWEST: usize = 2;
 /// Pixels of a side that a GIF has room for.
 const LONGEST_SIDE: u32 = 65_535;
 
-/// Frames in order, and what they are drawn with.
+/// Frames in order, and the options that they are drawn with.
 #[derive(Debug)]
 pub(crate) struct Plan {
     parts: Vec<Part>,
@@ -84,9 +84,9 @@ struct Shape {
 pub(crate) struct Wishes {
     /// Draw them in this size.
     pub(crate) size: Option<Screen>,
-    /// Draw so many rays a pixel, whatever the scripts say.
+    /// The number of rays per pixel, in place of the scripts' own.
     pub(crate) samples: Option<Samples>,
-    /// First and last frame; beyond the ends of what there is, when they are not given.
+    /// The first and the last frame; `None` for the ends of the animation.
     pub(crate) frames: (Option<u64>, Option<u64>),
     /// The numbers to compute with.
     pub(crate) precision: Precision,
@@ -117,7 +117,7 @@ pub(crate) enum PlanError {
 }
 
 impl Plan {
-    /// Parses everything and shows what is wrong. The faults when a script has an error.
+    /// Parses everything and shows the faults. Returns the faults when a script has an error.
     ///
     /// # Errors
     /// When the scripts are fine but the wishes cannot be fulfilled.
@@ -135,7 +135,8 @@ impl Plan {
         })
     }
 
-    /// Parses everything, and says what is wrong. There is a plan, or why there is none, exactly if no script has an error.
+    /// Parses everything, and returns the faults. There is a plan, or the reason why there is none, exactly if no
+    /// script has an error.
     ///
     /// # Errors
     /// An error only if the run was asked to stop.
@@ -251,7 +252,7 @@ impl Plan {
     pub(crate) fn window(&self) -> usize {
         let bytes = |shape: &Shape| {
             let pixels = self.size.unwrap_or(shape.screen).pixels();
-            // Objects and what finds them quickly.
+            // The objects, and the structures that find them quickly.
             OF_PIXEL * pixels + 400 * shape.objects as u64
         };
         let largest = self.runs().map(|(_, _, shape)| bytes(shape)).max().unwrap_or(1);
@@ -396,7 +397,7 @@ impl Part {
             }
         }
         let frames = script.frame_count();
-        // What was read from standard input stays in memory anyhow.
+        // A script from standard input stays in memory anyhow.
         let kept = (keep || file.path().is_none()).then(|| Arc::new(script));
         Self { file, runs, frames, kept, used: Mutex::default() }
     }

@@ -15,8 +15,8 @@ use crate::console::Console;
 /// Between two plain lines.
 const LINES_APART: Duration = Duration::from_secs(5);
 
-/// The pace is that of so much time, and of so many things at least: a stall is soon forgotten, and one slow frame is not
-/// the pace of all.
+/// The pace is measured over this time, and over a least number of things: a stall is soon forgotten, and one slow
+/// frame is not the pace of all.
 const RECENT: Duration = Duration::from_secs(15);
 const RECENT_COUNT: u64 = 8;
 
@@ -104,7 +104,7 @@ impl Progress {
         }
     }
 
-    /// Returns what counts the work of a single frame, for the options of its drawing.
+    /// Returns the counter of the work of a single frame, for the options of its drawing.
     pub(crate) fn drawn(&self) -> Option<&Drawn> {
         self.drawn.as_ref()
     }
@@ -228,7 +228,7 @@ fn pace(rate: f64, left: u64) -> Pace {
     is_known.then(|| (rate, Duration::try_from_secs_f64(left as f64 / rate).unwrap_or_default()))
 }
 
-/// Returns the parts that fit on one line of so many columns: the counts, what is left, the rate, and a bar.
+/// Returns the parts that fit on one line of `columns` columns: the counts, what is left, the rate, and a bar.
 fn line(columns: usize, unit: Unit, done: u64, total: u64, pace: Pace, color: bool) -> String {
     // In the last column some terminals wrap already.
     let room = columns.saturating_sub(1);

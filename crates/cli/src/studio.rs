@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Opens what is chosen on the start page, each in a studio of its own.
+/// Opens the items that are chosen on the start page, each in a studio of its own.
 async fn from_start_page(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let folder = std::env::current_dir().context("there is no current folder")?;
     let mut start = Start::open(&Recent::of_user(), &folder, args.port).await?;

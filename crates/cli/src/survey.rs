@@ -62,13 +62,13 @@ impl Faults {
         self.conflicts.push(Conflict { input, severity, message });
     }
 
-    /// Notes what is wrong with the next script, which is `None` when it is of no use.
+    /// Notes the faults of the next script, which is `None` when it is of no use.
     pub(crate) fn script(&mut self, parsed: anyhow::Result<Parsed>) -> Option<Script> {
         let parsed = parsed.map(|parsed| (parsed.script, parsed.diagnostics));
         self.sort_out(parsed)
     }
 
-    /// Reads a folder's settings and notes what is wrong with them; they are `None` when they are of no use.
+    /// Reads a folder's settings and notes their faults; they are `None` when they are of no use.
     pub(crate) fn settings(&mut self, path: &Path) -> Option<AnimationSettings> {
         let name = path.display().to_string();
         let mut text = Vec::new();
@@ -90,7 +90,7 @@ impl Faults {
         let _: Option<()> = self.sort_out(Err(error));
     }
 
-    /// Notes what others found after what was noted here.
+    /// Appends the faults of another survey.
     pub(crate) fn add(&mut self, others: Self) {
         self.diagnostics.extend(others.diagnostics);
         self.unreadable.extend(others.unreadable);
@@ -150,7 +150,7 @@ impl Faults {
     }
 }
 
-/// Parses all scripts side by side and takes each to what `map` makes of it, in their order.
+/// Parses all scripts side by side and applies `map` to each, in their order.
 ///
 /// # Errors
 /// An error only if the run was asked to stop. A file that cannot be read is an error in its own place.

@@ -77,7 +77,7 @@ async fn failures<S: Store>(context: &Context<S>, call: &Call, messages: Vec<Mes
             }
         };
         if failures.is_empty() {
-            // For example one of the schedule: the next sweep does what this one would have done.
+            // For example one of the schedule: the next sweep does the work of this one.
             tracing::error!(request_id = %call.request_id, id, unhandled = true, "a failed event about no object");
         }
         for failure in failures {

@@ -136,7 +136,7 @@ impl Invoker {
         let hint = watcher.as_ref().map(Watcher::hint);
         let server = events::receive(listener, &settings.webhook_token, move |name, key, payload| {
             match &hint {
-                // What is listed is delivered, once and by one of the invokers.
+                // Each listed change is delivered once, by one of the invokers.
                 Some(hint) => hint.notify_one(),
                 None => hearing.take(name, key, payload),
             }

@@ -117,7 +117,7 @@ enum Running {
 impl S3Server {
     /// Starts a server on the folder `data` (made when missing), which is ready when this returns.
     ///
-    /// MinIO and SeaweedFS are found, or installed from source; `say` hears what takes time, a line at a time.
+    /// MinIO and SeaweedFS are found, or installed from source; `say` gets a line before each step that takes time.
     ///
     /// # Errors
     /// [`Error::DataInUse`], [`Error::MinioFolder`], and whatever keeps the server from starting.

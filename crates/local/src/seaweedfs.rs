@@ -58,7 +58,7 @@ fn write_identity(path: &Path, credentials: &Credentials) -> std::io::Result<()>
 fn arguments(address: SocketAddr, objects: &Path, config: &Path) -> Result<Vec<String>> {
     let ip = address.ip();
     let mut arguments = vec![
-        // What glog writes goes to the log alone.
+        // The output of glog goes to the log alone.
         "-logtostderr=true".to_owned(),
         "server".to_owned(),
         "-filer".to_owned(),

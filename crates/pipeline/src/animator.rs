@@ -22,7 +22,7 @@ pub trait Animator: Send + Sync {
 
 /// An animation being encoded: frames in, pieces of the file out.
 pub trait Encoding: Send {
-    /// Adds the next frame, a PNG, and gives what of the file is ready.
+    /// Adds the next frame, a PNG, and returns the bytes of the file that are ready.
     ///
     /// # Errors
     ///

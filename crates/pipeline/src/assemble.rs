@@ -415,7 +415,7 @@ mod tests {
         let (period, mut quiet) = (Duration::from_secs(5), Quiet::default());
         let second = |seconds: u64| Timestamp(seconds * 1_000);
         assert_eq!(quiet.left(period, second(10), second(12)), Duration::from_secs(3));
-        // The store's clock runs ahead of this one's: what was slept through counts.
+        // The store's clock runs ahead of this one's: the time that was slept through counts.
         assert_eq!(quiet.left(period, second(10), second(9)), Duration::from_secs(2));
         assert_eq!(quiet.left(period, second(10), second(9)), Duration::ZERO);
         // A newer script: all over again.

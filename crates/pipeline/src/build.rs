@@ -30,7 +30,7 @@ pub const MAX_PIECES: u32 = 90;
 pub(crate) enum Built<'a> {
     /// The GIF is put, as this version.
     Put(ETag),
-    /// It is left after so many frames, for the next invocation to go on with.
+    /// It is left after this number of frames, for the next invocation to continue.
     Left(u64),
     /// A frame is gone, or another assembler's GIF came first: look again.
     Stale,
@@ -44,7 +44,7 @@ pub(crate) enum Built<'a> {
 enum Encoded<'a> {
     /// It has taken all frames.
     All,
-    /// It has taken so many, and there is no time for more.
+    /// It has taken this number of frames, and there is no time for more.
     SoFar(u64),
     /// This ends the build.
     No(Built<'a>),
@@ -105,7 +105,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 return Ok(Built::Left(frames));
             }
             Ok(Encoded::No(ended)) => Ok(ended),
-            // What is written down stands: the next attempt goes on from there.
+            // The checkpoint stands: the next attempt continues from there.
             Err(error) if held.has_checkpoint && (error.is_retryable() || error.is_out_of_time()) => {
                 return Err(error);
             }
@@ -141,7 +141,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         };
         if let Err(error) = upload.write(rest).await {
             return match error {
-                // What is written down stands.
+                // The checkpoint stands.
                 error if held.has_checkpoint && error.is_retryable() => Err(error),
                 error if held.has_checkpoint && error.is_not_found() => {
                     self.give_up(upload, head, held, Ok(Built::Stale)).await
@@ -161,7 +161,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Fetches the frames that the encoder has not taken, a few ahead of it, and sends what it writes.
+    /// Fetches the frames that the encoder has not taken, a few ahead of it, and sends its output.
     async fn encode<'m, E: Encoding>(
         &self,
         made: &mut ResumedUpload<E, S::Upload>,

@@ -72,7 +72,7 @@ impl Checkpoint {
         Ok(body.freeze())
     }
 
-    /// `None` for what is damaged, or of another schema.
+    /// Returns `None` for a checkpoint that is damaged, or of another schema.
     fn decode(mut body: Bytes) -> Option<Self> {
         if body.len() <= HASH {
             return None;
@@ -138,7 +138,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             {
                 return Ok(Some(ResumedUpload { encoding, upload, frames: of.frames, pieces: of.pieces }));
             }
-            // What cannot be aborted is left to the bucket's rule for unfinished uploads.
+            // An upload that cannot be aborted is left to the bucket's rule for unfinished uploads.
             let _ = upload.abort().await;
         }
         self.drop_checkpoint(head, held).await?;
@@ -152,7 +152,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put(&key, body).await.map(drop)
     }
 
-    /// Removes what is written down, if there is something.
+    /// Removes the checkpoint, if there is one.
     pub(crate) async fn drop_checkpoint(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         if std::mem::take(&mut held.has_checkpoint) {
             self.delete(&head.animation.checkpoint()).await?;

@@ -23,7 +23,7 @@ impl Timestamp {
     }
 }
 
-/// A clock that one can also wait on.
+/// A clock on which a task can also wait.
 pub trait Clock: Send + Sync {
     /// The time. It need not be exact: ages are compared with seconds of tolerance.
     fn now(&self) -> Timestamp;

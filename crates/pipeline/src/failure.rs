@@ -90,7 +90,7 @@ pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
         .collect()
 }
 
-/// Does what is due for a failed event.
+/// Handles a failed event.
 ///
 /// # Errors
 ///

@@ -65,7 +65,8 @@ fn strip(name: &ScriptName, script: &[u8], part: Part, band: Band) -> String {
     format!("{band} of {}", picture(name, script, part))
 }
 
-/// Bands being laid one below the other. What they show is the picture if they are all of its bands; else it is torn.
+/// Bands being laid one below the other. The result is the picture if they are all of its bands;
+/// otherwise it is torn.
 pub struct Paste {
     picture: String,
     strips: Vec<String>,

@@ -1,8 +1,8 @@
 //! The fold: an invocation that has put a result commits manifests until one shows that result, and puts the claim
 //! for the revision that it has committed.
 //!
-//! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and is someone else's.
-//! 2. An invocation that has put a result selects by lot a frame that the manifest shows as pending. It leaves if that
+//! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and another invocation wrote it.
+//! 2. An invocation that has put a result selects at random a frame that the manifest shows as pending. It leaves if that
 //!    frame is still to come: its script has that version, and there is no result (`survey`). The invocation that draws
 //!    that frame folds later (below).
 //! 3. Pause a few times as long as it takes to read the manifest, and read it again, until no one has written it during a

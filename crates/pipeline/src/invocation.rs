@@ -18,13 +18,13 @@ use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 /// The numbers of the protocol. Each default has its reason; tests and the local invoker shorten some.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Policy {
-    /// The renderer's pixel version, for the tags of what is drawn and woken.
+    /// The renderer's pixel version, for the tags of frames that are drawn and woken.
     pub pixels: u32,
     /// The age that the newest script must have before a GIF is made, when `animation.json` does not say how many
     /// frames to wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
     pub quiet: Duration,
-    /// The longest pause before a listing, as so many times what a look at the manifest takes: with many finishers at once
-    /// one listing serves them all, and where requests are fast it is made soon.
+    /// The longest pause before a listing, as a multiple of the time that a read of the manifest takes: with many
+    /// finishers at once one listing serves them all, and where requests are fast it is made soon.
     pub pause_looks: u32,
     /// The longest pause whatever a look takes; with it the last finisher still claims within a second.
     pub pause_cap: Duration,
@@ -43,7 +43,7 @@ pub struct Policy {
     /// After how many wakings a pending frame is given up.
     pub attempts: u64,
     /// Whether the functions themselves have just been restarted: an attempt that was cut off with them does not
-    /// count, and a lease of before has no holder.
+    /// count, and an earlier lease has no holder.
     pub is_fresh_start: bool,
     /// The age of a superseded frame at which the sweep deletes it. A week: a script that is changed back
     /// finds its old frame.
@@ -106,7 +106,8 @@ pub struct Invocation<'a, S, C> {
     replay_state: Option<&'a ReplayState>,
 }
 
-/// The latest statement of an invocation about what the rest of its steps depends on. The search of small worlds reads it.
+/// The latest statement of an invocation about the values that the rest of its steps depends on. The search of
+/// small worlds reads it.
 #[cfg(any(test, feature = "simulation"))]
 #[derive(Debug, Default)]
 pub struct ReplayState(std::sync::Mutex<Option<String>>);
@@ -340,13 +341,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         found(self.persist(|| self.store.head(key)).await)
     }
 
-    /// Puts what may be put twice.
+    /// Puts an object that may be put twice.
     pub(crate) async fn put(&self, key: &str, body: Bytes) -> Result<ETag> {
         let options = || PutOptions::always().content_type("application/json");
         self.persist(|| self.store.put(key, body.clone(), options())).await
     }
 
-    /// Puts an image in place of what cannot be read.
+    /// Puts an image in place of one that cannot be read.
     pub(crate) async fn put_image(&self, key: &str, body: Bytes) -> Result<()> {
         let options = || PutOptions::always().content_type("image/png");
         self.persist(|| self.store.put(key, body.clone(), options())).await.map(drop)

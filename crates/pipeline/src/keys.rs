@@ -102,11 +102,11 @@ pub enum Key {
         /// The retry that woke the band; 0 if the invocation that cut the frame did.
         attempt: u64,
     },
-    /// Below `frames/`: what came of a script, a part, or of the whole.
+    /// Below `frames/`: the result of a script, a part, or of the whole.
     Receipt { animation: Animation, receipt: Receipt },
     /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
     Lease { animation: Animation },
-    /// `frames/<animation>/@sweep.json`: which sweep deletes what may have to be drawn again.
+    /// `frames/<animation>/@sweep.json`: the sweep that deletes results which may have to be drawn again.
     SweepLease { animation: Animation },
     /// `manifests/<animation>.json`
     Manifest { animation: Animation },
@@ -499,7 +499,7 @@ fn name_and_tag(text: &str) -> Option<(ScriptName, Tag)> {
 fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     let (above, file) = rest.rsplit_once('/')?;
     if file.contains('@') {
-        // A script's name may start with `@`, too; but what follows a generation is nothing more.
+        // A script's name may start with `@`, too; but nothing more follows a generation.
         let refused = file.strip_prefix('@').and_then(|file| file.strip_suffix(".error.json"));
         if let Some(generation) = refused.and_then(|text| Generation::new(text).ok()) {
             return Some((above, Receipt::Refusal { generation }));
@@ -516,7 +516,7 @@ fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     Some((animation, receipt_of_kind(name, tag, Some(canonical(number)?), kind)?))
 }
 
-/// By what follows the dot after the tag, or after the part's number.
+/// Parses the rest after the dot that follows the tag, or the part's number.
 fn receipt_of_kind(name: ScriptName, tag: Tag, part: Part, kind: &str) -> Option<Receipt> {
     let numbered = |what: &str| kind.strip_prefix(what).map(canonical);
     Some(match kind {

@@ -81,7 +81,8 @@ pub struct Head {
     /// When a script was last found to be gone, by the clock of the function that found it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<Timestamp>,
-    /// The last GIF that an assembler has seen or put; another one that says it is of the same generation is not that one.
+    /// The last GIF that an assembler has seen or put. Another GIF with the metadata of this generation
+    /// is not that one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gif: Option<Gif>,
     /// Every 1,000th script's name: where listings in ranges start.

@@ -1,5 +1,5 @@
-//! Listing an animation: both prefixes at once, in ranges side by side when it is large, and what the listing alone
-//! does not show (settings, the parts of split scripts, the reasons of faults).
+//! Lists an animation: both prefixes at once, in ranges side by side when it is large. Reads the things that the
+//! listing alone does not show (settings, the parts of split scripts, the reasons of faults).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU64;
@@ -31,7 +31,7 @@ pub(crate) struct Receipts {
     has_sweep_lease: bool,
 }
 
-/// A listing of an animation and what it amounts to.
+/// A listing of an animation and the manifest that follows from it.
 #[derive(Debug)]
 pub(crate) struct Observation {
     pub(crate) scripts: Scripts,
@@ -202,8 +202,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Listing::read(request, end.as_deref(), |request| self.list(request)).await?.objects)
     }
 
-    /// Reads `animation.json`, unless the manifest has it in this version and could read it: what an older function took
-    /// for faulty need not be.
+    /// Reads `animation.json`, unless the manifest has it in this version and could read it: settings that an older
+    /// function took for faulty need not be.
     async fn settings(
         &self,
         animation: &Animation,
@@ -229,7 +229,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn add_parts(&self, animation: &Animation, scripts: &Scripts, results: &mut Results) -> Result<()> {
         let current: BTreeMap<&ScriptName, &ETag> =
             scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
-        // Renderers of different pixels may both have split a script: what came of it is listed once.
+        // Renderers of different pixels may both have split a script: its results are listed once.
         let splits: BTreeMap<&ScriptName, (&Tag, u64)> = results
             .receipts
             .iter()
@@ -380,7 +380,7 @@ fn faults_mut(manifest: &mut Manifest) -> impl Iterator<Item = &mut Fault> {
     frames.chain(&mut manifest.head.refusal)
 }
 
-/// Whether it says what has come of a script's version, or of a part of it.
+/// Returns whether it is a result of a script's version, or of a part of it.
 pub(crate) fn is_result_of(found: &ReceiptFound, script: &ScriptName, version: &ETag, part: Part) -> bool {
     match &found.receipt {
         Receipt::Frame { name, tag, part: of } | Receipt::Fault { name, tag, part: of } => {

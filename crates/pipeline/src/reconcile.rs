@@ -196,10 +196,10 @@ impl<'a> Resolution<'a> {
     }
 }
 
-/// Hash of the sorted frames with what is used of each, and of the settings.
+/// Returns the hash of the sorted frames with their states, and of the settings.
 fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     let mut hash = Sha256::new();
-    // Lengths keep apart what concatenation would confuse.
+    // Without lengths, different fields could concatenate to the same bytes.
     let mut field = |bytes: &[u8]| {
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
@@ -226,7 +226,7 @@ fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     Generation::of_hash(digits)
 }
 
-/// Every so many scripts a name, in byte order.
+/// Returns the names of scripts at regular distances, in byte order.
 fn marks(scripts: &Scripts) -> Vec<ScriptName> {
     let count = scripts.found.len();
     if count <= MARK_EVERY {

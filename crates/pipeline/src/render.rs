@@ -65,7 +65,7 @@ pub trait Renderer: Send + Sync {
         band: Band,
     ) -> impl Future<Output = Result<Result<Bytes, Reason>>> + Send;
 
-    /// Begins to put a frame together of so many bands; the reason if there is no such frame.
+    /// Begins to join the bands of a frame; returns the reason if there is no such frame.
     ///
     /// # Errors
     ///
@@ -114,7 +114,7 @@ pub enum Outcome {
     Gone,
     /// The event was about settings.
     Settings,
-    /// The event was about a file that is not read, because of what is wrong with its name.
+    /// The event was about a file that is not read, because of this fault in its name.
     NearMiss(&'static str),
     /// A part of a version that is no longer current: another event draws the current one.
     Superseded,
@@ -397,7 +397,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Some(deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin))
     }
 
-    /// Works, but not beyond the deadline: what is killed cannot say why.
+    /// Works, but not beyond the deadline: a killed invocation cannot give a reason.
     pub(crate) async fn in_time<T>(
         &self,
         work: impl Future<Output = Result<T>>,

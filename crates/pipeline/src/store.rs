@@ -102,7 +102,7 @@ pub struct Object {
 /// When a put takes effect.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Condition {
-    /// In any case; replaces what is there.
+    /// In any case; replaces an existing object.
     #[default]
     Always,
     /// Only while there is no such object (`If-None-Match: *`); else `PreconditionFailed`.
@@ -132,7 +132,7 @@ impl PutOptions {
         }
     }
 
-    /// Puts only what is not there.
+    /// Puts the object only if it is absent.
     pub fn if_absent() -> Self {
         PutOptions { condition: Condition::IfAbsent, ..Self::always() }
     }
@@ -215,7 +215,7 @@ pub struct UnfinishedUpload {
     pub tail: Bytes,
 }
 
-/// A bucket. See the [module](self) for what it guarantees.
+/// A bucket. See the [module](self) for its guarantees.
 pub trait Store: Send + Sync {
     /// An object being written piece by piece.
     type Upload: Upload;

@@ -44,7 +44,7 @@ pub(crate) enum Next {
     Leave,
     /// The finisher waits, reads the manifest again, and lists.
     Wait,
-    /// The finisher commits what it has listed.
+    /// The finisher commits the manifest of its listing.
     Write(Box<Observation>),
 }
 

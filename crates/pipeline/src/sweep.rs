@@ -28,9 +28,9 @@ const VISITS: usize = 8;
 /// The result of a sweep.
 #[derive(Debug, Default)]
 pub struct Swept {
-    /// Each animation with what was done for it, in the order of the visits.
+    /// Each animation with the result of its visit, in the order of the visits.
     pub visits: Vec<(Animation, Result<Visit>)>,
-    /// Keys below `scripts/` that are meant as scripts but belong to no animation, with what is wrong with them.
+    /// Keys below `scripts/` that are meant as scripts but belong to no animation, with the reason.
     pub rejected: Vec<(String, &'static str)>,
     /// Old manifests, set aside because they could not be read, that were deleted.
     pub cleared: u64,
@@ -58,7 +58,7 @@ const MAX_DOUBLINGS: u64 = 6;
 ///
 /// # Errors
 ///
-/// When the animations cannot be listed. What goes wrong with one of them is in its visit, and the others go on.
+/// When the animations cannot be listed. An error of one of them is in its visit, and the others go on.
 pub async fn sweep<S: Store, C: Clock>(invocation: &Invocation<'_, S, C>) -> Result<Swept> {
     invocation.sweep().await
 }
@@ -158,11 +158,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(visit)
     }
 
-    /// Whether this sweep may delete what may have to be drawn again: only while it has the lease.
+    /// Returns whether this sweep may delete results that may have to be drawn again: only while it has the lease.
     async fn may_delete(&self, animation: &Animation, lease: &mut Option<SweepLease>) -> Result<bool> {
         if lease.is_none() {
             *lease = Some(match self.take_sweep_lease(animation).await? {
-                // What a dead sweep has deleted was not looked for: the lease stays, and the next visit finds it.
+                // The deletions of a dead sweep were not looked for: the lease stays, and the next visit finds them.
                 SweepLease::Left(_) => SweepLease::Anothers,
                 taken => taken,
             });
@@ -175,7 +175,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.clock.now().since(modified) >= self.policy.superseded_after
     }
 
-    /// Wakes what is pending, or gives it up. What a dead sweep may have deleted is woken however new its script is.
+    /// Wakes pending frames, or gives them up. A frame that a dead sweep may have deleted is woken however
+    /// new its script is.
     async fn wake(
         &self,
         animation: &Animation,
@@ -220,7 +221,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
-    /// Deletes what says that attempts at these frames have begun.
+    /// Deletes the receipts that say that attempts at these frames have begun.
     async fn forget_attempts(
         &self,
         animation: &Animation,
@@ -353,7 +354,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let old = |modified: Timestamp| self.is_old(modified);
         let mut doomed: Vec<Key> = Vec::new();
         let mut split_before = false;
-        // Bands have done what they were for once their frame is there.
+        // Bands are no longer needed once their frame is there.
         let is_used_up = |found: &&ReceiptFound| {
             banded_frame(found).is_some_and(|(name, version, part)| {
                 current.get(name) == Some(&version) && used.contains_key(&(name, part))
@@ -415,8 +416,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.wake_returned(animation, &gone, visit).await
     }
 
-    /// A script may have come back to a version while what came of that was being deleted, and its event may have found
-    /// the result still there: wakes whatever is current again.
+    /// A script may have come back to a version while the results of that were being deleted, and its event may have
+    /// found the result still there: wakes each frame that is current again.
     async fn wake_returned(
         &self,
         animation: &Animation,

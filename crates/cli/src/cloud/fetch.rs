@@ -1,4 +1,4 @@
-//! `rayfold fetch`: what the bucket has of an animation, to this machine.
+//! `rayfold fetch`: downloads the frames or the GIF of an animation from the bucket.
 
 use std::io;
 use std::path::{Path, PathBuf};

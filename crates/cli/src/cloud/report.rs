@@ -21,7 +21,7 @@ fn missing_scripts(manifest: &Manifest) -> u64 {
     manifest.head.missing() - manifest.head.pending
 }
 
-/// Shows everything that keeps the animation from being done, and what is not read because of its name.
+/// Shows everything that keeps the animation from being done, and the files that are not read because of their names.
 pub(crate) fn show_faults(manifest: &Manifest, console: &Console) {
     for Rejected { key, problem } in &manifest.head.warnings {
         console.warn(format_args!("{key}: not read: {problem}"));

@@ -82,7 +82,7 @@ struct Entry<'a> {
 #[serde(untagged)]
 enum Known<'a> {
     Seen(Box<Head>),
-    /// No function has looked at it yet, or what it wrote cannot be read.
+    /// No function has looked at it yet, or the manifest cannot be read.
     New {
         animation: &'a Animation,
         status: &'static str,
@@ -96,7 +96,7 @@ struct Gif<'a> {
     version: &'a str,
     /// When it was written, in milliseconds since 1970.
     modified_ms: u64,
-    /// It shows what the manifest says.
+    /// Whether the GIF shows the frames of the manifest.
     current: bool,
 }
 
@@ -175,7 +175,7 @@ fn show(
     }
 }
 
-/// Shows what is not what was shown last, which time alone does not make it; says whether it was.
+/// Shows the state if it differs from the one shown last by more than ages; returns whether it does.
 fn show_if_new(
     watches: &[Watch<'_>],
     overview: Option<&Overview>,

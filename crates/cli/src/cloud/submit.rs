@@ -1,6 +1,6 @@
 //! `rayfold submit`: a folder of scripts to the bucket, and the animation back.
 //!
-//! Nothing is remembered here: what was interrupted is picked up from what the bucket shows.
+//! Nothing is remembered here: an interrupted submission continues from the contents of the bucket.
 
 use std::path::{Path, PathBuf};
 
@@ -215,7 +215,7 @@ fn submission(
     Ok(Submission::new(animation.clone(), scripts, settings)?)
 }
 
-/// Says what would be done, a line a file.
+/// Shows the uploads and deletions that a submission would make, a line a file.
 async fn preview(
     client: Client<'_>,
     submission: &Submission,
@@ -296,7 +296,8 @@ async fn send(
     client.submit(submission, show).await
 }
 
-/// Waits until what was uploaded has become a GIF or cannot, and tells how far that is; says why if there is none.
+/// Waits until the uploaded scripts have become a GIF or cannot, and shows the progress. Returns the reason if
+/// there is no GIF.
 async fn wait(
     client: Client<'_>,
     animation: &Animation,

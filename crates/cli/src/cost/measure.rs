@@ -31,7 +31,7 @@ pub(super) struct Measured {
     pub(super) frame_kb: f64,
 }
 
-/// Draws some frames of `input`, for functions of so many MB on so many places.
+/// Draws some frames of `input`, for functions of `memory_mb` on this number of places.
 ///
 /// # Errors
 /// When a script has an error, or the scripts are no animation.

@@ -24,7 +24,7 @@ use measure::measure;
 /// The longest that assembling may take, in seconds: invocations of the assemble function, of 15 minutes each.
 const MAX_ASSEMBLING_S: f64 = MAX_PIECES as f64 * 900.0;
 
-/// US dollars that are shown as 0.0001; what costs less is summed up.
+/// The least amount that is shown, as 0.0001 US dollars; smaller ones are summed up.
 const LEAST_SHOWN: f64 = 0.000_05;
 
 /// Estimate what an animation costs on AWS
@@ -176,7 +176,7 @@ fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
     })
 }
 
-/// All but what is paid once, which is the first section.
+/// Returns the sum without the costs that are paid once, which are the first section.
 fn later_month(sections: &[Section]) -> f64 {
     sections.iter().skip(1).map(|section| section.usd).sum()
 }

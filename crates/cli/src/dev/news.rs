@@ -22,7 +22,7 @@ pub(crate) struct News<'a> {
     changed: BTreeSet<Animation>,
     reported: Vec<(Animation, String)>,
     next: Instant,
-    /// Whether only what goes wrong is reported.
+    /// Whether only trouble is reported.
     is_brief: bool,
 }
 
@@ -32,12 +32,12 @@ impl<'a> News<'a> {
         Self { console, store, changed, reported, next, is_brief: false }
     }
 
-    /// Prints only what goes wrong: the progress of an animation is printed elsewhere.
+    /// Prints only trouble: the progress of an animation is printed elsewhere.
     pub(crate) fn brief(console: &'a Console, store: &'a S3Store) -> Self {
         Self { is_brief: true, ..Self::new(console, store) }
     }
 
-    /// Returns when it is time to look at what has changed; never while nothing has.
+    /// Returns when it is time to look at the changed animations; never while none has changed.
     pub(crate) async fn tick(&self) {
         if self.changed.is_empty() {
             std::future::pending::<()>().await;
@@ -121,11 +121,11 @@ impl<'a> News<'a> {
     }
 }
 
-/// A warning or an error in a function's log, with what it is about and why.
+/// Returns the text of a warning or an error in a function's log, with its subject and its reason.
 fn trouble(line: &Value) -> Option<String> {
     let text = |field: &str| line[field].as_str().unwrap_or_default();
     let (level, message) = (text("level"), text("message"));
-    // The runtime says in Rust's words what the function has said in its own.
+    // The runtime repeats in Rust's words an error that the function has logged in its own.
     if !matches!(level, "ERROR" | "WARN") || message.starts_with("Failed([") {
         return None;
     }

@@ -48,7 +48,7 @@ struct TooLarge;
 pub(crate) struct Written {
     pub(crate) frames: u64,
     pub(crate) container: Container,
-    /// Left out because what shows the container has no time for them.
+    /// The number of frames that are left out because viewers of the container have no time for them.
     pub(crate) dropped: u64,
     pub(crate) size: (u32, u32),
     pub(crate) bytes: u64,
@@ -118,7 +118,7 @@ pub(super) fn encode(
     Ok(Encoded { written, sink })
 }
 
-/// Says what was written.
+/// Reports the file that was written.
 pub(crate) fn tell(place: &Place, written: &Written, fps: f64, took: Duration, console: &Console) {
     let name = match place {
         Place::File(path) => path.display().to_string(),
@@ -158,7 +158,7 @@ fn error_at(place: &Place, source: io::Error) -> MovieError {
     }
 }
 
-/// Counts what goes to a file or to standard output.
+/// Counts the bytes that go to a file or to standard output.
 struct Sink {
     to: To,
     bytes: u64,
@@ -189,7 +189,7 @@ impl Sink {
         Ok(Self { to, bytes: 0, limit: limit.unwrap_or(u64::MAX) })
     }
 
-    /// Writes what belongs to the start of the file.
+    /// Writes the bytes that belong to the start of the file.
     fn complete(&mut self, finished: Finished) -> io::Result<()> {
         match (&mut self.to, finished.length) {
             (To::File(file), Some((at, length))) => file.overwrite(at, &length)?,

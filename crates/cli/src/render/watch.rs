@@ -27,7 +27,7 @@ const SMALL: u64 = 64 << 10;
 /// Draws by `draw`, at first and whenever one of the scripts has changed, until the run is asked to stop.
 ///
 /// # Errors
-/// Wrong usage alone: what else is wrong is shown, and may be mended.
+/// Wrong usage alone: every other error is shown, and may be corrected.
 pub(super) fn draw_again(
     inputs: &[PathBuf],
     console: &Console,

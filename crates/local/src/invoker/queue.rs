@@ -1,4 +1,5 @@
-//! Invocations on their way: what is queued, by whom, how many are not done, and those that failed for good.
+//! Invocations on their way: the queued ones with their callers, the number that are not done, and those
+//! that failed for good.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

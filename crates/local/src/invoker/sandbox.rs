@@ -30,7 +30,7 @@ pub(crate) struct Sandbox {
     pub(crate) idle_since: Instant,
 }
 
-/// An attempt's end, and what it cost.
+/// The end of an attempt, with its cost.
 pub(crate) struct End {
     pub(crate) outcome: Outcome,
     pub(crate) took: Duration,

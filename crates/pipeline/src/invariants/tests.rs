@@ -1,4 +1,4 @@
-//! A manifest that keeps all rules, and what each rule refuses.
+//! A manifest that keeps all rules, and the manifests that each rule refuses.
 
 use std::num::NonZeroU64;
 

@@ -21,7 +21,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// The bands of a frame that is cut into so many, from the top.
+    /// Returns the bands of a frame that is cut into `count`, from the top.
     pub fn all(count: NonZeroU64) -> impl Iterator<Item = Band> + Clone {
         (1..=count.get()).filter_map(NonZeroU64::new).map(move |number| Band { number, of: count })
     }
@@ -36,7 +36,8 @@ impl Band {
         self.of
     }
 
-    /// Its rows, counted from the top, of a frame of so many; none of them if there are more bands than rows.
+    /// Returns its rows in a frame of `height` rows, counted from the top; none of them if there are
+    /// more bands than rows.
     pub fn rows(self, height: u32) -> Range<u32> {
         let before = |bands: u64| {
             let rows = u128::from(bands) * u128::from(height) / u128::from(self.of.get());

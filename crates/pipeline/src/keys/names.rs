@@ -1,4 +1,5 @@
-//! Keys that users and their programs write: what is not a script or settings has no [`Key`], but is not always nothing.
+//! Keys that users and their programs write: one that is no script or settings has no [`Key`], but may
+//! still have a meaning.
 
 use rayfold_scene::Name;
 
@@ -93,8 +94,9 @@ pub fn misplaced(key: &str, bytes: u64) -> Option<&'static str> {
     (is_like_scripts && is_meant).then_some("expected a key that begins with scripts/, in small letters")
 }
 
-/// Says whether an object below `scripts/` goes when the animation is removed: its scripts and settings, also those that
-/// are misnamed, and what systems have left beside them. What lies in the folder of one of the `others` does not.
+/// Returns whether an object below `scripts/` goes when the animation is removed: its scripts and settings,
+/// also those that are misnamed, and leftovers of systems beside them. An object in the folder of one of
+/// the `others` does not.
 pub fn goes_with(animation: &Animation, key: &str, others: &[Animation]) -> bool {
     let Some(path) = key.strip_prefix(&animation.scripts()) else { return false };
     let Some((folders, file)) = path.rsplit_once('/') else {

@@ -1,4 +1,4 @@
-//! Keys parse, format back to themselves, and say what is wrong with them.
+//! Keys parse, format back to themselves, and have errors that name the fault.
 
 use super::*;
 

@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// Spread over all of them, and never so many that the head does not fit what is read at first.
+    /// The frames are spread over all of them, and never so many that the head does not fit the first read.
     #[test]
     fn the_beginning_of_a_large_document_tells_some_frames_to_come() {
         let manifest = manifest(60);

@@ -199,7 +199,7 @@ fn the_generation_tells_what_a_gif_shows_and_nothing_else() {
             assert_eq!(other, None, "{listing} with {settings}");
         }
     }
-    // Lengths keep apart what concatenation would confuse.
+    // Without lengths, different fields could concatenate to the same bytes.
     assert_ne!(generation("ab.txt c", ""), generation("a.txt bc", ""));
 }
 

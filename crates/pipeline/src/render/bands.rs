@@ -105,7 +105,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.wake_bands(subject, tag, Band::all(count).collect(), 0).await
     }
 
-    /// Works on an event of a frame that is cut already: wakes what is missing of it, or puts it together.
+    /// Works on an event of a frame that is cut already: wakes its missing bands, or puts it together.
     pub(crate) async fn follow_cut<R: Renderer>(
         &self,
         renderer: &R,

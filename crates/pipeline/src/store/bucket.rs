@@ -74,7 +74,8 @@ impl Bucket {
         Ok(etag)
     }
 
-    /// Makes an object of an upload's parts and what follows them. When the condition does not hold the upload is gone.
+    /// Makes an object of an upload's parts and the bytes after them. When the condition does not hold
+    /// the upload is gone.
     pub fn complete_upload(
         &mut self,
         now: Timestamp,

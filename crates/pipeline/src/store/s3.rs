@@ -250,7 +250,7 @@ impl Store for S3Store {
             .set_delimiter(request.delimiter.then(|| "/".to_owned()))
             .set_start_after(request.start_after)
             .set_continuation_token(request.continuation)
-            // Keys may hold what XML cannot.
+            // Keys may hold characters that XML cannot.
             .encoding_type(EncodingType::Url)
             .max_keys(PAGE as i32)
             .send()

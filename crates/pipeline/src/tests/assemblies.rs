@@ -275,7 +275,7 @@ async fn an_assembler_leaves_the_gif_to_one_that_has_just_taken_the_lease() {
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
 }
 
-/// `rayfold dev` was stopped while an assembler waited, and started again: no assembler of before is alive.
+/// `rayfold dev` was stopped while an assembler waited, and started again: no earlier assembler is alive.
 #[tokio::test]
 async fn a_restarted_platform_waits_for_no_assembler_of_before() {
     for (until, is_freed) in [(599, true), (600, false), (700, false)] {
@@ -340,7 +340,7 @@ async fn an_unfinished_gif_that_nobody_needs_any_more_is_given_up() {
         assert_eq!(world.store.bucket.lock().unwrap().unfinished_uploads(), 1);
         world.deadline = None;
         if is_gone {
-            // All of it, but for what was left.
+            // The whole bucket, except the keys that were left.
             for key in world.keys("") {
                 if key != LEASE && key != CHECKPOINT {
                     world.store.bucket.lock().unwrap().delete(&key);

@@ -303,7 +303,7 @@ async fn bands_are_swept_once_their_frame_is_there_and_not_before() {
     let there = |world: &World| (world.keys("frames/").len(), world.keys("parts/").len());
     assert_eq!(there(&world), (2, 3));
     world.draw_bands(&[woken(&version, "2-of-3", 0), woken(&version, "3-of-3", 0)]).await;
-    // The cut, its bands, and what woke them.
+    // The cut, its bands, and the objects that woke them.
     assert_eq!(world.visit().await.deleted, 7);
     assert_eq!((world.keys("frames/"), world.keys("parts/")), (vec![World::frame_key(&version)], vec![]));
     // Those of a version that is no longer current stay for as long as its frame would.

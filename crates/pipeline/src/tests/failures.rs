@@ -10,7 +10,7 @@ impl World {
         self.put(SCRIPT, "frame 1")
     }
 
-    /// So many retries of a frame have been put, and to so many of them an invocation has begun.
+    /// Puts `attempts` retries of a frame, to `begun` of which an invocation has begun.
     fn tried(&self, of: &str, attempts: u64, begun: u64) {
         for attempt in 1..=attempts {
             self.put(&format!("retries/film/{of}/{attempt}"), "");

@@ -59,7 +59,7 @@ async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
         let folded = world.fold(&Fact::Version(name(), version), age).await;
         assert_eq!(folded == Folded::Covered, leaves, "{glimpse}, {age:?}");
         assert_eq!(listed.load(Ordering::Relaxed) == 0, leaves, "{glimpse}, {age:?}");
-        // What it does not show is listed for.
+        // A frame that it does not show is listed for.
         let listed = world.count("list ");
         let folded = world.fold(&Fact::Version(name(), ETag::new("other")), age).await;
         assert_eq!((folded, listed.load(Ordering::Relaxed)), (Folded::Agreed, 2), "{glimpse}, {age:?}");
@@ -101,7 +101,7 @@ async fn lines_of_another_manifest_show_nothing() {
     }
 }
 
-/// The listing of the second revision after the one that was read has seen the fact, or what came later.
+/// The listing of the second revision after the one that was read has seen the fact, or a later one.
 #[tokio::test]
 async fn a_fold_leaves_when_the_second_revision_is_written_and_not_before() {
     let version = Fact::Version(name(), ETag::new("never shown"));
@@ -304,7 +304,7 @@ async fn a_part_that_another_renderer_may_have_drawn_is_left_for_by_nobody() {
     }
 }
 
-/// Settings, deletions and splits change what people wait for.
+/// Settings, deletions and splits change the set that people wait for.
 #[tokio::test]
 async fn what_is_no_frames_result_is_written_down_whatever_is_to_come() {
     for (key, text) in [
@@ -480,7 +480,7 @@ async fn a_page_is_written_down_only_over_the_manifest_that_was_read_before_it()
         }
     });
     assert_eq!(finishes(&world).await.0, Folded::Committed);
-    // With the page of before it would have been another revision, and one more that mends it.
+    // With the earlier page it would have been another revision, and one more that corrects it.
     let head = world.manifest().head;
     assert_eq!((head.done, head.revision), (1, 3));
 }

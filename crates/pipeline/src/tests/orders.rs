@@ -1,5 +1,5 @@
-//! The order of requests: a request that comes too early is answered by what is not there yet, and an invocation that
-//! is killed between two of them leaves what heals.
+//! The order of requests: a request that comes too early meets the state before the other, and an invocation that is
+//! killed between two of them leaves a state that heals.
 
 use super::assemblies::{CHECKPOINT, GIF, LEASE, seconds};
 use super::*;

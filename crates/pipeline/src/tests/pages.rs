@@ -1,4 +1,4 @@
-//! Listings of more than a page: what is on the second one counts as much.
+//! Listings of more than a page: objects on the second one count as much.
 
 use super::*;
 use crate::store::PAGE;
@@ -9,7 +9,7 @@ const SCRIPT: &str = "scripts/film/1.txt";
 /// A page, and some more.
 const MANY: usize = PAGE + 100;
 
-/// The part whose name is the last one of so many.
+/// The number of the part whose name is the last one in the listing.
 const LAST: u64 = 999;
 
 impl World {
@@ -105,7 +105,7 @@ async fn all_that_came_of_an_older_version_goes_however_much_it_is() {
     }
     world.upload("1.txt", "frame 1").await;
     world.later(Duration::from_secs(8 * 24 * 3600)).await;
-    // The frames, what woke them, and the split.
+    // The frames, the objects that woke them, and the split.
     assert_eq!(world.visit().await.deleted, 2 * MANY as u64 + 1);
     assert!(world.keys("parts/").is_empty() && world.keys("frames/").len() == 1);
 }

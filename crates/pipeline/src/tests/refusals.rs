@@ -36,7 +36,7 @@ const LEASE: &str = "frames/film/@assembler.json";
 const PUT_LEASE: &str = "put frames/film/@assembler.json";
 const PUT_MANIFEST: &str = "put manifests/film.json";
 
-/// The first put is that of a new lease, the second one takes over what is there.
+/// The first put is that of a new lease, the second one takes over an existing one.
 #[tokio::test]
 async fn a_lease_that_is_over_is_taken_though_the_first_attempt_at_it_fails() {
     for error in passing() {

@@ -43,7 +43,7 @@ async fn a_sweep_visits_whatever_is_uploaded_or_has_a_manifest() {
         "manifests/d.json",
         "scripts/1.txt",
         "scripts/notes.md",
-        // What systems leave makes no animation.
+        // Leftovers of systems make no animation.
         "scripts/e/",
         "scripts/f/.old.txt",
         "scripts/g/.ipynb_checkpoints/1.txt",
@@ -184,7 +184,7 @@ async fn error_receipts_that_cannot_be_read_go_and_their_frames_are_woken() {
     }
     let older = "frames/film/2@0-p1.error.json".to_owned();
     world.put(&older, "garbage of another version");
-    // The manifest says what there is.
+    // The manifest shows the receipts.
     world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
     assert_eq!(world.manifest().head.status, Status::Failed);
     let before = world.keys("frames/");
@@ -288,10 +288,10 @@ async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
         assert_eq!(world.visit().await.deleted, deleted);
         assert_eq!(world.left(&["frames/", "parts/"]), kept);
     };
-    // The error, and what says that it has begun.
+    // The error, and the receipt of its beginning.
     world.later(2 * DAY).await;
     check(&ETag::new("0"), 2).await;
-    // The split, its two frames, what says that one has begun, and both parts.
+    // The split, its two frames, the receipt that one has begun, and both parts.
     world.until(&new_part, 7 * DAY).await;
     check(&before, 6).await;
 }
@@ -363,7 +363,7 @@ async fn an_attempt_counts_once_however_often_its_script_was_split() {
     assert_eq!(world.visit().await, woken(2));
 }
 
-/// Scripts that were uploaded at once are drawn one after the other: what is not drawn yet is not stuck.
+/// Scripts that were uploaded at once are drawn one after the other: a frame that is not drawn yet is not stuck.
 #[tokio::test]
 async fn as_long_as_frames_are_drawn_nothing_is_stuck() {
     let world = World::new();
@@ -489,7 +489,8 @@ async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
     assert!(world.visit().await.claimed);
 }
 
-/// Its assembler died when it had put it; the manifest named that of an older set, and what was cut off later stayed.
+/// Its assembler died when it had put it; the manifest named that of an older set, and a GIF that was
+/// cut off later stayed.
 #[tokio::test]
 async fn a_gif_that_a_dead_assembler_has_put_is_named_so_that_one_in_its_place_is_noticed() {
     let world = World::new();
@@ -534,7 +535,7 @@ async fn a_claim_is_put_where_the_manifest_does_not_show_that_the_set_is_refused
 }
 
 impl World {
-    /// A sweep deletes what has come of the script that is `text` again by then, and dies before its next request.
+    /// A sweep deletes the results of the script that is `text` again by then, and dies before its next request.
     async fn dies_deleting(&self, text: &'static str, request_id: &str) {
         let (bucket, clock, mut has_deleted) = (self.store.bucket.clone(), self.store.clock.clone(), false);
         self.refuse(move |request| {

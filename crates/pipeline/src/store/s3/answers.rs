@@ -11,7 +11,7 @@ pub(super) fn status<E>(error: &SdkError<E, HttpResponse>) -> Option<u16> {
     error.raw_response().map(|response| response.status().as_u16())
 }
 
-/// Sorts a failed request by what the caller may do about it.
+/// Sorts a failed request by the action that the caller may take.
 pub(super) fn error_of<E>(key: &str, error: SdkError<E, HttpResponse>) -> Error
 where
     E: ProvideErrorMetadata + std::error::Error + Send + Sync + 'static,
@@ -49,7 +49,7 @@ where
     Error::Refused { key, source: described(error) }
 }
 
-/// The innermost words, which say what happened; the layers around them say only where.
+/// Returns the innermost message, which names the fault; the layers around it only name its place.
 fn described<E>(error: SdkError<E, HttpResponse>) -> crate::Cause
 where
     E: ProvideErrorMetadata + std::error::Error + Send + Sync + 'static,

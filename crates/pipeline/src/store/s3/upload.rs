@@ -139,7 +139,7 @@ impl Upload for S3Upload {
             Err(error) => Err(error),
         };
         if finished.is_err() {
-            // What cannot be aborted either is left to the bucket's rule for unfinished uploads.
+            // If the upload cannot be aborted either, it is left to the bucket's rule for unfinished uploads.
             let _ = self.give_up(&id).await;
         }
         finished
