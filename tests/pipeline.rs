@@ -452,7 +452,7 @@ async fn a_frame_that_fits_in_no_number_of_bands_is_named_with_what_it_takes() {
     .await;
 }
 
-/// The webhook says that there is news; what it is comes from the listing.
+/// The webhook says that there is news; the listing shows the objects.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_webhook_hastens_the_listing() {
     let mut stage = stage(StoreKind::BuiltIn, |_| {}).await;

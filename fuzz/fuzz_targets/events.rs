@@ -1,4 +1,4 @@
-//! Any JSON as what wakes a function.
+//! Any JSON as the event of a function.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

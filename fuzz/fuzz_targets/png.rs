@@ -8,7 +8,7 @@ use rayfold_lambda::animator::GifAnimator;
 use rayfold_pipeline::{Animator, Encoding};
 use tokio::runtime::{Builder, Runtime};
 
-/// The most that a frame may have here: what takes longer is not found faster.
+/// The most pixels that a frame may have here: a larger one finds nothing faster.
 const MOST_PIXELS: u64 = 1 << 16;
 
 static RUNTIME: LazyLock<Runtime> =

@@ -45,7 +45,7 @@ fuzz_target!(|text: &[u8]| {
         let alone = parse("only.txt", only.to_string().as_bytes(), &limits).script;
         assert_eq!(alone.as_ref(), Some(&only), "{only}");
         assert_eq!(only.frame(0).as_ref(), Some(&scene), "{only}");
-        // What is turned is written as angles, which round.
+        // Turned objects are written as angles, which round.
         if !scene.objects.iter().any(|object| matches!(object, Object::Instance(_))) {
             let alone = parse("scene.txt", scene.to_string().as_bytes(), &limits).script;
             assert_eq!(alone.expect("a scene is a script").frame(0), Some(scene));

@@ -39,7 +39,8 @@ struct Import {
 /// A module, and for each module that it uses a path by which it names it.
 type Uses = BTreeMap<Vec<String>, BTreeMap<Vec<String>, String>>;
 
-/// Returns what each module of the crate with the root file `root` uses. `read` returns the text of a file, if it exists.
+/// Returns the modules that each module of the crate with the root file `root` uses. `read` returns the text of a
+/// file, if it exists.
 fn uses(root: &Path, read: &dyn Fn(&Path) -> Option<String>) -> Uses {
     let mut modules = Modules::new();
     let text = read(root).unwrap_or_else(|| panic!("no file {}", root.display()));

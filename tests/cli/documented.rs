@@ -1,4 +1,4 @@
-//! The pictures of `scenes/README.md` are what the commands beside them write.
+//! The commands beside the pictures of `scenes/README.md` write these pictures.
 //!
 //! The first frames of each animation are rendered. The part of a GIF for a frame depends only on the frames up to
 //! it, so the beginning of the file must be the same, byte for byte, up to the last of these frames. Then the rest

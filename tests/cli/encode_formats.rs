@@ -1,4 +1,4 @@
-//! `rayfold encode` of what other programs write: JPEG, WebP, animations and videos, also from standard input.
+//! `rayfold encode` of files that other programs write: JPEG, WebP, animations and videos, also from standard input.
 
 use image::codecs::gif::GifEncoder;
 use image::{Delay, DynamicImage, Frame, ImageFormat, Rgb, RgbImage};

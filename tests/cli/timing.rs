@@ -173,7 +173,7 @@ fn a_file_fits_into_the_size_that_is_given() {
     for ending in ["gif", "webp"] {
         folder.rayfold(&format!("encode {images} -o whole.{ending}")).assert().code(0);
         let whole = folder.read(&format!("whole.{ending}")).len();
-        // What fits is not changed.
+        // A file that fits is not changed.
         folder.rayfold(&format!("encode {images} -o same.{ending} --max-size 1M")).assert().code(0);
         assert!(folder.read(&format!("same.{ending}")) == folder.read(&format!("whole.{ending}")));
         let limit = whole * 7 / 10;

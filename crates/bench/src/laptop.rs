@@ -31,7 +31,7 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// An animation on so many places.
+/// An animation on a number of places.
 struct Row {
     name: String,
     frames: usize,

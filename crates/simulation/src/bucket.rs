@@ -156,7 +156,7 @@ pub(super) struct SimEnvironment {
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
     /// Called at the moments at which a change is most awkward.
     pub(super) moments: Mutex<Option<Arc<MomentListener>>>,
-    /// By GIF: the moment from which the oldest listing is that one was made from. Equal files are one GIF.
+    /// By GIF: the moment of the oldest listing from which one was made. Equal files are one GIF.
     gifs: Mutex<BTreeMap<ETag, u64>>,
     /// A GIF gave way to one from an older listing.
     pub(super) set_back: Mutex<Option<String>>,
@@ -585,7 +585,7 @@ fn take(slot: &Mutex<Option<Result<Answer>>>, key: String) -> Result<Answer> {
     lock(slot).take().unwrap_or_else(|| Err(Error::Ambiguous { key, source: "no effect, no answer".into() }))
 }
 
-/// Replaces about half of the names of a page by what was there at a later moment.
+/// Replaces about half of the names of a page by those of a later moment.
 fn tear(page: &mut ListPage, later: ListPage, salt: u64) {
     if page.next.is_some() || later.next.is_some() {
         return;

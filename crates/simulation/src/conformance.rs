@@ -128,7 +128,7 @@ pub async fn if_match_replaces_only_that_version<S: Store>(store: &S, prefix: &s
     store.put(&key, Bytes::from_static(b"4"), PutOptions::if_match(second)).await.unwrap();
 }
 
-/// Side by side: the losers see a conflict (409 or 412), and what is there is the winner's.
+/// Side by side: the losers see a conflict (409 or 412), and the object is the winner's.
 pub async fn of_many_writers_one_wins<S: Store>(store: &S, prefix: &str) {
     let absent = format!("{prefix}/race-absent");
     let matched = format!("{prefix}/race-match");
@@ -292,7 +292,8 @@ pub async fn uploads_keep_their_condition<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// Left after any number of bytes, by way of what a process can write down, the body is the same; the condition holds still.
+/// An upload is left after any number of bytes and resumed from values that a process can write down: the body is the
+/// same, and the condition still holds.
 pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-left");
     let body: Vec<u8> = (0..26_000_000_u32).map(|n| (n % 253) as u8).collect();
@@ -322,7 +323,7 @@ pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// Two processes that go on from the same place with the same bytes: one finishes, and what is there is whole.
+/// Two processes go on from the same place with the same bytes: one finishes, and the object is whole.
 pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-twice");
     let piece = |byte: u8| Bytes::from(vec![byte; 9_000_000]);

@@ -37,7 +37,7 @@ pub use pieces::{Pieces, PiecesReport, in_pieces};
 pub use scale::{Scale, ScaleReport, measure};
 pub use slow::{Slow, SlowReport, slowly};
 
-/// The pixel version of what is drawn here.
+/// The pixel version of the frames drawn here.
 const PIXELS: u32 = 1;
 
 /// A guarantee that did not hold.
@@ -78,7 +78,7 @@ pub fn run(seed: u64, mutation: Option<Mutation>) -> Result<Run, Violation> {
     story::run(seed, mutation, None).map_err(|what| Violation { seed, what })
 }
 
-/// Runs one seed and writes down what happened, a line a request.
+/// Runs one seed and records its history, a line a request.
 ///
 /// # Errors
 ///

@@ -29,11 +29,11 @@ const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 pub struct Pieces {
     /// The number of frames in the animation.
     pub frames: u64,
-    /// The first script is overwritten when so many checkpoints have been put, counted from 1.
+    /// The number of the checkpoint, from 1, at whose put the first script is overwritten.
     pub overwritten_at: Option<u64>,
     /// It is then changed back at once.
     pub is_changed_back: bool,
-    /// One invocation in so many is killed, and its event tried again.
+    /// One in this number of invocations is killed, and its event tried again.
     pub kill: u64,
     /// A rule that is broken.
     pub mutation: Option<Mutation>,

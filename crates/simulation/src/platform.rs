@@ -1,5 +1,5 @@
-//! The functions' platform: events that come late, twice or never, invocations that run side by side up to a limit,
-//! are killed and tried again under the same request id, and what is given up and recorded.
+//! The functions' platform: events come late, twice or never; invocations run side by side up to a limit, are killed
+//! and tried again under the same request id; an event that is given up is recorded.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::Ordering;

@@ -54,7 +54,7 @@ impl Scale {
         Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed }
     }
 
-    /// On AWS, as far as it is modelled: what is uploaded comes at so many scripts a second.
+    /// On AWS, as far as it is modelled: `uploaded` scripts are uploaded per second.
     pub fn on_aws(frames: u64, animations: u64, uploaded: u64, concurrency: usize, push: Duration) -> Self {
         let upload_ms = frames * animations * 1_000 / uploaded.max(1);
         let (limits, draw_ms) = (Some(Limits::S3), (800, 1_200));

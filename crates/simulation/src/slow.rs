@@ -55,7 +55,7 @@ pub struct SlowReport {
     pub whole: Duration,
 }
 
-/// Lives through a slow upload, and a slow removal if asked for; what is counted is the last of them.
+/// Lives through a slow upload, and a slow removal if asked for; the counts are of the last of them.
 ///
 /// # Errors
 ///

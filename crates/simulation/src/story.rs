@@ -29,7 +29,7 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 /// For how long things happen and go wrong.
 const TROUBLES: Duration = Duration::from_secs(45);
 
-/// Sets apart what strangers do from the rest of a story.
+/// Keeps the random numbers of strangers apart from the rest of a story.
 const STRANGERS: u64 = 0x0067_6172_626c_6572;
 
 /// Sets apart which frames are too big from the rest of a story.
@@ -112,7 +112,7 @@ fn begin(
     Ok(Judge { engine, env, platform, animation, watch })
 }
 
-/// The protocol's numbers: those that decide what a small world can show.
+/// The protocol's numbers: those that decide which cases a small world can show.
 fn policy(random: &Randomness) -> Policy {
     Policy {
         quiet: Duration::from_millis([100, 1_000, 5_000][pick(random, 3)]),
@@ -218,7 +218,7 @@ fn write_story(
     }
 }
 
-/// A user who changes a script at the worst moment, mostly to what it was before.
+/// A user who changes a script at the worst moment, mostly back to its earlier text.
 fn awkward_user(random: &Randomness, env: &Arc<SimEnvironment>) -> Arc<dyn Fn(Moment) + Send + Sync> {
     let random = Randomness::seeded(random.bits());
     let (left, patience) = (AtomicU64::new(1 + random.below(4)), 1 + random.below(6));
@@ -262,7 +262,7 @@ fn awkward_user(random: &Randomness, env: &Arc<SimEnvironment>) -> Arc<dyn Fn(Mo
     })
 }
 
-/// Few contents, so that changes are often back to what was.
+/// Few contents, so that a change often goes back to an earlier one.
 fn content(random: &Randomness) -> String {
     let number = random.below(2);
     match random.below(24) {
@@ -444,7 +444,7 @@ impl Judge {
             self.check().map_err(|what| format!("without a sweep: {what}"))?;
         }
         self.sweep_until_rest()?;
-        // A user may change the script while the command looks: then it has retried what is gone.
+        // A user may change the script while the command looks: then it has retried a frame that is gone.
         for _ in 0..MAX_RETRIES {
             if self.wrongly_given_up() == 0 {
                 break;

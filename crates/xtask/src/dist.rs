@@ -18,7 +18,7 @@ use crate::toolchain::{self, say};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The programs. The last two are what `rayfold dev` runs, which is there on Unix alone.
+/// The programs. `rayfold dev`, which is there on Unix alone, runs the last two.
 const PROGRAMS: &[&str] =
     if cfg!(unix) { &["rayfold", "rayfold-render", "rayfold-assemble"] } else { &["rayfold"] };
 const TEXTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];

@@ -1,4 +1,4 @@
-//! The families of scenes: closed bodies of triangles that turn, and what is hard for narrow numbers at their edges.
+//! The families of scenes: closed bodies of triangles that turn, and shapes whose edges are hard for narrow numbers.
 
 use anyhow::Result;
 use fastrand::Rng;
@@ -47,7 +47,7 @@ impl Family {
         }
     }
 
-    /// Whether what is counted is how many pixels are off, and not dots at outlines.
+    /// Returns whether the count is of pixels that are off, and not of dots at outlines.
     pub(super) fn is_of_needles(self) -> bool {
         matches!(self, Self::Fan | Self::Grazing)
     }

@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Draws one scene and prints each dot, the exact pixels around it, and what the ray through it meets.
+/// Draws one scene and prints each dot, the exact pixels around it, and the hit of the ray through it.
 fn replay(seed: u64) -> Result<()> {
     let drawn = Drawn::new(seed)?;
     let (width, height) = SIZE;
@@ -227,7 +227,7 @@ mod tests {
         let exact = RgbImage::from_fn(8, 6, |x, _| if x < 4 { Rgb([200; 3]) } else { Rgb([100, 90, 90]) });
         let mut image = exact.clone();
         assert!(dots(&image, &exact).is_empty());
-        // An outline that is a pixel off is none; what is dark is.
+        // An outline that is a pixel off is no dot; a dark pixel is.
         image.put_pixel(3, 2, Rgb([100, 90, 90]));
         image.put_pixel(4, 0, Rgb([190, 200, 210]));
         image.put_pixel(4, 3, Rgb([60, 90, 90]));
@@ -235,7 +235,8 @@ mod tests {
         assert_eq!(dots(&image, &exact), [(4, 3), (0, 5)]);
     }
 
-    /// A ray in a mirror or in the light passed another side of an outline than the exact one, by what `f32` made of its start.
+    /// A ray in a mirror or in the light passed another side of an outline than the exact one, because `f32`
+    /// had rounded its start.
     #[test]
     fn where_dots_were_there_are_none() {
         let crowds = [1_000_602, 1_001_490, 1_001_914, 1_002_074, 1_002_530];

@@ -25,7 +25,7 @@ impl Curve {
     pub(super) fn time(&self, error: f64) -> Option<f64> {
         let mut points: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms, point.error)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // What is slower and no better does not count.
+        // A slower point that is no better does not count.
         let mut best = f64::INFINITY;
         points.retain(|&(_, error)| error < best && ((best = error), true).1);
         if points.first().is_some_and(|&(_, first)| first <= error) {

@@ -1,4 +1,5 @@
-//! Mitsuba 3 as a peer, where Python has it: the scene as it is given to its path tracer, and what that takes.
+//! Mitsuba 3 as a peer, where Python has it: the scene for its path tracer, and the time and the
+//! error of its pictures.
 //!
 //! Its kernels need a newer LLVM than some systems have: 19 does, 15 lacks an instruction. `DRJIT_LIBLLVM_PATH` says where.
 
@@ -109,7 +110,7 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
         }
         Object::Triangle(o) => {
             let [u, mut v, mut w] = *o.vertices();
-            // What it emits leaves its front alone.
+            // The light that it emits leaves its front alone.
             if (v - u).cross(w - u).dot(eye - u) < 0.0 {
                 (v, w) = (w, v);
             }

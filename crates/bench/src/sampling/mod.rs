@@ -27,7 +27,7 @@ use self::scenes::{EFFECTS, Effect};
 /// Rays a pixel of pictures that are not adaptive.
 const COUNTS: [u32; 7] = [2, 4, 8, 16, 32, 64, 256];
 
-/// Errors that adaptive pictures are asked for, with at most so many rays a pixel.
+/// Errors that adaptive pictures are asked for, with the most rays per pixel.
 const ERRORS: [(u32, f64); 6] = [(16, 4.0), (64, 2.0), (64, 1.0), (256, 1.0), (256, 0.5), (1024, 0.25)];
 
 /// Measures, and writes the report.
@@ -81,7 +81,7 @@ const PARTS: f64 = 65535.0;
 /// A small picture by the plain tracer, beside the kernels' truth at that size.
 fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let picture = effect.picture((48, 36))?;
-    // As many, so that what is left is the error of the independent ones.
+    // As many samples, so that the rest is the error of the independent ones.
     let truth = truth(&picture, args.truth.max(args.independent))?;
     let scene = Scene { samples: Samples::new(2, 0.0)?, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);

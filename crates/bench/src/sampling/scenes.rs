@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use rayfold_scene::{Limits, Scene, Script, parse};
 
-/// A picture and what it is for.
+/// A picture and its purpose.
 pub(super) struct Effect {
     pub(super) name: &'static str,
     pub(super) about: &'static str,
@@ -38,7 +38,7 @@ impl Effect {
     }
 }
 
-/// Balls, bricks and a tent on a floor, two lights, a mirror: what edges are measured on, and everything together.
+/// Balls, bricks and a tent on a floor, two lights, a mirror: the scene for edges, and for everything together.
 macro_rules! table {
     ($sun:literal, $lamp:literal, $camera:literal, $ball:literal) => {
         concat!(

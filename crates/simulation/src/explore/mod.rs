@@ -51,7 +51,7 @@ pub struct Explored {
     pub states: u64,
     /// States in which nothing is left to happen.
     pub rests: u64,
-    /// Situations that differ: what the bucket holds, and what every invocation asks for next.
+    /// The number of different situations: the contents of the bucket, and the next request of every invocation.
     pub situations: u64,
     /// A hash of all these.
     pub all_situations: u64,
@@ -114,7 +114,7 @@ pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Resul
 
 /// When something goes wrong that may.
 enum Aim {
-    /// Once in so many steps.
+    /// Once in this number of steps.
     Anywhere(u64),
     /// In this write, counted from 0.
     Write(u64),

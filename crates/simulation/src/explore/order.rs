@@ -105,7 +105,7 @@ impl Order {
         }
     }
 
-    /// Says what has been chosen.
+    /// Records the choice that was made.
     pub(super) fn done(&mut self, state: &State, choice: Choice) {
         if let Choice::User(_) = choice {
             match self {

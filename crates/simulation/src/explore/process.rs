@@ -82,9 +82,9 @@ pub(super) struct Standing {
     pub(super) requests: Vec<(u32, Request)>,
     /// The end of the invocation; an error is what the platform sees.
     pub(super) end: Option<Result<(), End>>,
-    /// A hash of what it asks for.
+    /// The hash of its requests.
     pub(super) asks: u64,
-    /// A hash of what it goes on with, if the last answer has led to where it says so.
+    /// The hash of the values that it continues from, if the last answer has led to a place where it declares them.
     carried: Option<u64>,
 }
 
@@ -131,7 +131,7 @@ pub(super) struct Process {
 #[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
-    /// By the hash of what had happened before, and of an answer.
+    /// By the hash of all that had happened before, and of an answer.
     answered: BTreeMap<u64, Arc<Process>>,
     manner: Manner,
 }
@@ -259,7 +259,7 @@ impl Memo {
 }
 
 impl Process {
-    /// Hashes what has happened from this answer on.
+    /// Hashes all that has happened from this answer on.
     fn rehash_from(&mut self, place: usize) {
         let before = place.checked_sub(1).and_then(|before| self.history.get(before));
         let mut hash = before.map_or(self.begun, |event| event.hash);

@@ -86,7 +86,7 @@ impl Frontier {
     }
 }
 
-/// The hashes of what has been seen, which need not be hashed again.
+/// The hashes of the visited states, which need not be hashed again.
 #[expect(clippy::disallowed_types, reason = "nothing is drawn by lot here, and there are many millions")]
 type Seen = std::collections::HashSet<u64, BuildHasherDefault<AsItIs>>;
 
@@ -159,7 +159,7 @@ pub fn explore(
 }
 
 impl Search<'_> {
-    /// Judges a state in which nothing is left to happen; of another one notes what can happen next.
+    /// Judges a state in which nothing is left to happen; notes the choices of any other state.
     fn visit(&mut self, state: State, way: Way) -> Result<(), Box<Counterexample>> {
         if !self.seen.insert(state.hash()) {
             return Ok(());

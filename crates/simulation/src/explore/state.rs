@@ -52,7 +52,7 @@ pub(super) enum Choice {
 pub(super) struct Offer {
     /// Each of them alone.
     pub(super) choices: Vec<Choice>,
-    /// They are what can come of one request, which meets no other.
+    /// They are the outcomes of one request, which meets no other.
     pub(super) is_alone: bool,
 }
 
@@ -143,7 +143,8 @@ impl State {
         hash_of(&(self.contents.hash, acted, ahead, budget, needs_sweep, gif_of, processes, ghosts))
     }
 
-    /// Tells apart what can be seen from outside: what the bucket holds, and what every invocation asks for next.
+    /// Returns a hash of all that can be seen from outside: the contents of the bucket, and the next
+    /// request of every invocation.
     pub(super) fn hash_of_situation(&self) -> u64 {
         let asks =
             |process: &Arc<Process>| hash_of(&(&process.request_id, process.attempt, process.standing.asks));
@@ -182,7 +183,8 @@ impl State {
         Offer { choices, is_alone: false }
     }
 
-    /// Whether nothing that can happen to the world's end changes what the request finds, or finds what it changes.
+    /// Returns whether nothing that can happen until the world's end changes the answer to the request,
+    /// or sees its effect.
     fn meets_no_other(&self, world: &World, request: &Request) -> bool {
         let user_is_done = self.acted == world.acts.len();
         match request {
@@ -326,7 +328,7 @@ impl State {
         Ok(())
     }
 
-    /// Has a request take effect, and fires what follows.
+    /// Lets a request take effect, and fires the events that follow.
     fn apply(
         &mut self,
         memo: &mut Memo,
@@ -465,7 +467,7 @@ impl State {
         Err("the world does not come to rest".to_owned())
     }
 
-    /// Returns the actor of a choice: the user, an attempt at an event, or what a dead one has left.
+    /// Returns the actor of a choice: the user, an attempt at an event, or the write that a dead one has left.
     pub(super) fn actor(&self, choice: Choice) -> u64 {
         match choice {
             Choice::User(_) => USER,

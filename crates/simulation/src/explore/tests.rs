@@ -35,7 +35,7 @@ fn worlds_hold_whatever_happens_in_whatever_order_and_nothing_is_missed_by_forge
     assert_eq!(small, SMALL_WORLDS);
 }
 
-/// The search finds what breaks without the rule, and it is a story: the same search with the rule finds nothing.
+/// The search finds the error without the rule, and it is a story: the same search with the rule finds nothing.
 #[track_caller]
 fn notices(rule: Mutation, name: &str, most: u64) {
     let found = explore(&world(name), Some(rule), most).expect_err("a broken rule is noticed");
@@ -72,7 +72,7 @@ fn missing_claims_are_noticed() {
 }
 
 /// An assembler wrote down that a frame was pending which was there again, and left. The invocation that had brought
-/// the frame back had found the manifest of before.
+/// the frame back had found the earlier manifest.
 #[test]
 fn assemblers_that_leave_early_are_noticed() {
     notices(Mutation::AssemblerLeavesEarly, "the second of two frames comes, goes and comes back", 20_000);
@@ -101,7 +101,7 @@ fn unconditional_gifs_are_noticed() {
 }
 
 /// An assembler that had found the lease taken took it when it was handed over, as one that none wanted, and gave up
-/// what was unfinished; the claim's assembler found it taken, and none built.
+/// the unfinished GIF; the claim's assembler found the lease taken, and none built.
 #[test]
 fn a_lease_that_is_handed_over_is_not_taken_by_who_has_left_the_gif_to_its_holder() {
     for name in ["two frames in two pieces, a kill", "two frames in two pieces, the first overwritten"] {
@@ -124,8 +124,8 @@ fn schedules_find_nothing_where_all_rules_hold() {
     }
 }
 
-/// Two rules that few seeds notice, so they are named here; the report of `rayfold-bench explore`
-/// lists what notices them.
+/// Two rules that few seeds notice, so they are named here; the report of `rayfold-bench explore` lists the
+/// worlds that notice them.
 #[test]
 fn rules_that_few_schedules_notice_are_noticed() {
     let worlds = provoking();

@@ -1,4 +1,4 @@
-//! The small worlds: what users do in them, and what may go wrong.
+//! The small worlds: the acts of their users, and the faults that may happen.
 
 use super::Budget;
 
@@ -48,7 +48,7 @@ fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<
     World { name, acts, past, is_claimed_again: false, is_cut: false, budget, remembers: false }
 }
 
-/// Between the past and what follows an assembler is woken that has nothing to do: events may come late, and again.
+/// Between the past and the acts an assembler is woken that has nothing to do: events may come late, and again.
 fn claimed_again(world: World) -> World {
     World { is_claimed_again: true, ..world }
 }
