@@ -339,6 +339,23 @@ mod tests {
     }
 
     #[test]
+    fn a_mesh_keeps_its_file_and_its_options() {
+        let mesh = line("Mesh \"a #1, b.obj\" red smooth 40  # pot");
+        let words = mesh.words().unwrap();
+        assert_eq!(mesh.subject(), Some("\"a #1, b.obj\""));
+        assert_eq!(words.parameters.iter().map(|word| mesh.word(word)).collect::<Vec<_>>(), ["red"]);
+        assert_eq!(mesh.name().as_deref(), Some("pot"));
+        assert_eq!(mesh.named("").unwrap().text(), "Mesh \"a #1, b.obj\" red smooth 40");
+        assert_eq!(mesh.named("cup").unwrap().text(), "Mesh \"a #1, b.obj\" red smooth 40  # cup");
+        let bare = mesh.cut(0).unwrap();
+        assert_eq!(bare.text(), "Mesh \"a #1, b.obj\" smooth 40  # pot");
+        let dressed = bare.with_words(&[(0, "blue".into())]).unwrap();
+        assert_eq!(dressed.text(), "Mesh \"a #1, b.obj\" blue smooth 40  # pot");
+        assert_eq!(line("Mesh \"a.obj\" flat").named("x").unwrap().text(), "Mesh \"a.obj\" flat   # x");
+        assert_eq!(line("Mesh \"a.obj\" #ff8000 #ff8000 flat").words().unwrap().parameters.len(), 6);
+    }
+
+    #[test]
     fn the_command_is_the_first_word() {
         let lines = [
             "Trace",

@@ -3,7 +3,7 @@
 //! Knows commands only by the forms of their parameters. Invariant: an unchanged number keeps its notation.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, parse_curve};
+use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, Parameter, Presence, parse_curve};
 
 use crate::line::{Line, Words, written};
 use crate::tables::{fields, of_kind};
@@ -90,6 +90,10 @@ pub(crate) fn curve(line: &Line, words: &Words, at: usize) -> Option<Curve> {
 /// Returns the default of an omitted number.
 fn default(command: Command, at: usize) -> Option<f64> {
     let (_, field) = field_of(command, at)?;
+    // What has no colour in a model's file.
+    if command == Command::Mesh && field.presence == Presence::Required {
+        return Some(if field.parameter == Parameter::Ambient { 0.08 } else { 0.72 });
+    }
     field.presence.default()?.parse().ok()
 }
 
@@ -118,6 +122,10 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
         && let Some((first, field)) = field_of(command, end - 1)
     {
         end = end.max(first + field.names.len());
+    }
+    // A surface of numbers in place of that of the file is written whole.
+    if count == 0 && command.form().takes(0) && command.form().surface().is_some() {
+        end = end.max(command.form().required());
     }
     let mut changes = Vec::new();
     for at in start..end {
@@ -182,6 +190,22 @@ mod tests {
 
     fn after(text: &str, first: usize, to: &[f64], keying: Keying) -> String {
         changed(&Line::new(text), first, to, keying).unwrap().text()
+    }
+
+    #[test]
+    fn the_surface_of_a_mesh_is_written_whole() {
+        let mesh = "Mesh \"a.obj\" smooth 40 # pot";
+        let values = Values::of(&Line::new(mesh), 1.0).unwrap();
+        assert_eq!(
+            (values.number(0), values.number(3), values.number(6)),
+            (Some(0.08), Some(0.72), Some(0.0))
+        );
+        let numbers = "Mesh \"a.obj\" 0.08 0.08 0.08 0.5 0.72 0.72 smooth 40 # pot";
+        assert_eq!(after(mesh, 3, &[0.5], Keying::ALWAYS), numbers);
+        assert_eq!(
+            after("Mesh \"a.obj\"", 6, &[0.1], Keying::ALWAYS),
+            "Mesh \"a.obj\" 0.08 0.08 0.08 0.72 0.72 0.72 0.1 0 0"
+        );
     }
 
     #[test]

@@ -3,6 +3,8 @@
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
+import { writeFileSync } from "node:fs";
+import { join } from "node:path";
 import { test } from "node:test";
 
 import { audit, drag, open, over, program, clickRow, shot, until } from "./stage.mjs";
@@ -45,6 +47,7 @@ test("every parameter of every command is reached on the page", async (t) => {
   const language = table();
   assert.ok(language.commands.length > 20);
   const studio = await open(t, { text: SCENE, size: [1440, 900] });
+  writeFileSync(join(studio.folder, "corner.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const { page } = studio;
   const inspector = page.locator(".panel.inspector");
   const line = async (command) => (await studio.saved()).split("\n").findLast((line) => words(line)[0] === command);
@@ -53,7 +56,10 @@ test("every parameter of every command is reached on the page", async (t) => {
     await page.locator(".viewport").focus();
     await page.keyboard.press("Escape");
     let within = inspector;
-    if (subject) {
+    if (subject?.role === "quotes") {
+      // A mesh is made of a model beside the script.
+      await page.locator(".tile", { has: page.getByText(name, { exact: true }) }).click();
+    } else if (subject) {
       // What refers to a name is made with it: here a group, from an object.
       await page.locator(".tile", { hasText: "Sphere" }).click();
       await page.locator(".item.object[aria-selected=true]").waitFor();

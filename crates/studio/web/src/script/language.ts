@@ -41,14 +41,16 @@ export const defined = computed(() => {
   return found;
 });
 
-const WORD = /#[\da-f]{6}(?![^\s,#():])|#.*|\([^)#]*\)?|[^\s,(#]+/gi;
+const WORD = /"(?:\\.|[^"\\])*"?|#[\da-f]{6}(?![^\s,#():])|#.*|\([^)#]*\)?|[^\s,(#]+/gi;
 
 /** Whether a colour such as `#ff8000` may stand after some numbers of a command or clause. */
 function takesColor(entry: LanguageEntry | null, given: number, behindColor: boolean): boolean {
   let first = 0;
   for (const parameter of entry?.parameters ?? []) {
     const isColor = parameter.names.length === 3 && (parameter.kind === "colour" || parameter.kind === "coefficients");
-    if (first === given && isColor && (behindColor || parameter.presence === "required")) return true;
+    // Behind the file of a mesh a colour may stand.
+    const mayStand = parameter.presence === "required" || (given === 0 && entry?.subject?.role === "quotes");
+    if (first === given && isColor && (behindColor || mayStand)) return true;
     first += parameter.names.length;
   }
   return false;
