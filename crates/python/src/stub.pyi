@@ -126,7 +126,8 @@ class Scene:
         """Draws a frame, counted from 1.
 
         Returns an array of height x width x 3: levels from 0 to 255 as `uint8`, or with `linear` the light before `tone`
-        and rounding, from 0 to 1, as `float32`.
+        and rounding, from 0 to 1, as `float32`. A scene with `background("none")` has a fourth channel, alpha; `linear` light
+        is premultiplied by it.
         """
 
     def save(self, path: str | PathLike[str], frame: int = 1) -> None:
@@ -223,7 +224,8 @@ def gif(
 ) -> bytes | None:
     """Encodes arrays of height x width x 3 (`uint8`) as a GIF. Returns its bytes, or writes them to `path`.
 
-    Arrays of height x width are greys. Frames are taken one by one: memory does not grow with their number.
+    Arrays of height x width x 4 have alpha, of which a GIF shows a pixel or does not. Arrays of height x width are greys. Frames
+    are taken one by one: memory does not grow with their number.
     """
 
 def parse(text: str, name: str = "scene") -> Scene:
