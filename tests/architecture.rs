@@ -61,7 +61,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-client",
         ],
     ),
-    ("rayfold-xtask", &["rayfold-scene"]),
+    ("rayfold-xtask", &["rayfold-files", "rayfold-scene"]),
     (
         "rayfold-bench",
         &[

@@ -17,6 +17,9 @@ pub(crate) const PAGE: &str = "docs/language.md";
 /// The folder of its pictures, relative to the root of the repository.
 pub(crate) const PICTURES: &str = "docs/images/language";
 
+/// The folder of the models that its scripts name, relative to the root of the repository.
+pub(crate) const MODELS: &str = "docs/models";
+
 /// The name of the block that incomplete examples share.
 const STAGE: &str = "stage";
 /// The prefix of examples that show how a number changes rather than a scene.
@@ -84,7 +87,8 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    use rayfold_scene::{Command, Limits, parse};
+    use rayfold_files::library_beside;
+    use rayfold_scene::{Command, Limits, parse_with_files};
 
     use super::*;
 
@@ -118,7 +122,8 @@ mod tests {
     fn every_script_of_the_page_is_in_order() {
         let (_, examples) = page();
         for Example { name, script } in &examples {
-            let parsed = parse(name, script.as_bytes(), &Limits::default());
+            let models = library_beside(&root().join(MODELS).join("script.txt"));
+            let parsed = parse_with_files(name, script.as_bytes(), &Limits::default(), &models);
             // The stage defines more materials than each example uses. One example shows what one ray per pixel does.
             let is_meant = |message: &str| {
                 message.contains("this material is not used")

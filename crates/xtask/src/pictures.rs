@@ -9,9 +9,10 @@ use std::process::Command;
 
 use anyhow::{Context, bail, ensure};
 use image::{DynamicImage, ImageFormat};
-use rayfold_scene::{Limits, Script, parse};
+use rayfold_files::library_beside;
+use rayfold_scene::{Limits, Script, parse_with_files};
 
-use crate::manual::{Example, PAGE, PICTURES, examples};
+use crate::manual::{Example, MODELS, PAGE, PICTURES, examples};
 use crate::plot;
 use crate::toolchain::say;
 
@@ -30,7 +31,7 @@ pub(crate) struct Args {
 /// # Errors
 /// Fails if a script has an error, a name is unknown, or a file cannot be written.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = root();
     let page = fs::read_to_string(root.join(PAGE)).context(PAGE)?;
     let examples = examples(&page).context(PAGE)?;
     if let Some(unknown) =
@@ -52,6 +53,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
 /// Returns the bytes of the picture's file.
 fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     let script = script(example)?;
@@ -61,6 +66,10 @@ fn draw(example: &Example, rayfold: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("script.txt");
     fs::write(&path, &example.script)?;
+    for model in fs::read_dir(root().join(MODELS)).context(MODELS)? {
+        let model = model?;
+        fs::copy(model.path(), folder.path().join(model.file_name()))?;
+    }
     let status = match rayfold {
         Some(program) => Command::new(program),
         None => cargo_run(),
@@ -87,7 +96,8 @@ fn cargo_run() -> Command {
 }
 
 fn script(example: &Example) -> anyhow::Result<Script> {
-    let parsed = parse(&example.name, example.script.as_bytes(), &Limits::default());
+    let models = library_beside(&root().join(MODELS).join("script.txt"));
+    let parsed = parse_with_files(&example.name, example.script.as_bytes(), &Limits::default(), &models);
     let faults = || parsed.diagnostics.iter().map(|d| d.render(false)).collect::<String>();
     parsed.script.with_context(faults)
 }

@@ -243,7 +243,10 @@ mod tests {
         let objects = "Material pane glass .9 .7 .5 1.5\nMaterial soap glass 1 1 .8 1.1\nSphere 1 -.6 0 0 pane\n\
                        Box .2 -.6 -1 1.3 .9 .4 soap\nDisc .7 .4 .3 1.4 0 .2 1 pane\nSphere .4 -.4 .2 -2 .2 .2 .2 .5 .5 .5\n\
                        Torus .5 .15 1.2 -.8 .5 0 1 1 .1 .1 .1 .2 .2 .2 .4 .4 .4\nIlight .7 .7 .7 -1 -2 -1\n";
-        for settings in ["", "Tone srgb\nDepth 9\n", "Fog .4 .5 .6 8\n", "Depth 1\n"] {
+        // With one bounce, only the disc is seen through.
+        for (settings, least) in
+            [("", 40), ("Tone srgb\nDepth 9\n", 40), ("Fog .4 .5 .6 8\n", 40), ("Depth 1\n", 4)]
+        {
             let text =
                 format!("Screen 24 18\nLook .3 .4 5 0 0 0 40\nBackground none\n{settings}{objects}Trace\n");
             let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
@@ -263,7 +266,7 @@ mod tests {
                 );
                 partial += usize::from((0.05..0.95).contains(&cover));
             }
-            assert!(partial > 40, "{partial}");
+            assert!(partial > least, "{settings} {partial}");
         }
     }
 }
