@@ -82,7 +82,7 @@ fn at_put_of(ending: &'static str, fate: Fate) -> (Fates, Arc<AtomicUsize>) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_frame_in_bands_is_put_together_whichever_invocation_is_killed() {
+async fn a_frame_in_bands_is_put_together_after_a_kill_of_any_invocation() {
     on_every_store(async |store| {
         for ending in [".cut-4", ".band-0.json", ".band", ".png"] {
             for fate in [Fate::KillBefore, Fate::KillAfter, Fate::LoseAnswer] {

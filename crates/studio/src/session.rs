@@ -330,7 +330,7 @@ impl Session {
             }
             ClientMessage::Paste { text } => {
                 if let Some(keys) = tracks::keys_of_text(&text) {
-                    return Some(self.paste_keys(project, &text, keys, tell));
+                    return Some(self.paste_keys_of_text(project, &text, &keys, tell));
                 }
                 let shown = self.shown(project);
                 let (splices, places) = arrange::paste(self.file_lines(project), &shown.source_map, &text);

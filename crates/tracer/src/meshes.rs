@@ -51,7 +51,7 @@ struct Run {
     is_filled: bool,
 }
 
-/// What a face adds to the surface of a hit.
+/// The normals and colours that a face adds to the surface of a hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shading {
     /// The unit normal that light and highlights see. It faces the ray.

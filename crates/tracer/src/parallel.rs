@@ -40,7 +40,7 @@ pub(crate) fn bands<T>(
     Ok(RgbImage::from_raw(size.0, size.1, bytes).unwrap_or_default())
 }
 
-/// The same of pixels that are `EACH` values.
+/// Draws bands as [`bands`] does, of pixels that are `EACH` values.
 pub(crate) fn bands_of<T, P: Copy + Default + Send, const EACH: usize>(
     screen: Screen,
     rows: Range<u32>,

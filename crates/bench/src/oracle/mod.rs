@@ -105,7 +105,7 @@ impl Path {
     }
 }
 
-/// What a ray brings: a colour, and the share of its pixel that it leaves clear.
+/// The light of a ray: its colour, and the share of its pixel that it leaves clear.
 struct Seen {
     color: Vector,
     clear: f64,

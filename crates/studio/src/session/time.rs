@@ -110,7 +110,8 @@ impl Session {
                 return Change::Nothing;
             }
             TimelineEdit::Paste => {
-                set(tracks::pasted(lines, &self.copied, time, self.selection.last().copied()))
+                let keys = self.copied.clone();
+                return self.paste_keys(project, &keys, tell);
             }
             TimelineEdit::Ease { keys, mode, cycle } => {
                 let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
@@ -134,18 +135,23 @@ impl Session {
         Change::Still
     }
 
-    /// Pastes the keys of a text, the first at the shown frame. The text of the keys that were copied last stands for
-    /// those, whose lines may have moved since.
-    pub(super) fn paste_keys(
+    /// Pastes the keys of a text. The text of the keys that were copied last stands for those, whose lines may have moved
+    /// since.
+    pub(super) fn paste_keys_of_text(
         &mut self,
         project: &mut Project,
         text: &str,
-        keys: Vec<Copied>,
+        keys: &[Copied],
         tell: &mut ServerMessage,
     ) -> Change {
+        let copied = (text == self.copied_text).then(|| self.copied.clone());
+        self.paste_keys(project, copied.as_deref().unwrap_or(keys), tell)
+    }
+
+    /// Pastes keys, the first at the shown frame.
+    fn paste_keys(&mut self, project: &mut Project, keys: &[Copied], tell: &mut ServerMessage) -> Change {
         let time = self.time(project);
         let lines = self.file_lines(project);
-        let keys = if text == self.copied_text { &self.copied } else { &keys };
         let changed = tracks::pasted(lines, keys, time, self.selection.last().copied());
         if changed.is_empty() {
             let name = keys.first().map_or("", |key| key.command.name());

@@ -41,11 +41,11 @@ struct Path {
     /// The absolute value of the product of all factors so far.
     weight: DVec3,
     has_met_glass: bool,
-    /// How much of the pixel stays clear if the ray reaches nothing; `None` for rays that see the surroundings.
+    /// The share of the pixel that stays clear if the ray reaches nothing; `None` for rays that see the surroundings.
     clear: Option<f64>,
 }
 
-/// What a ray brings.
+/// The light of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     /// The colour, unclamped.

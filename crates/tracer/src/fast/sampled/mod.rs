@@ -139,7 +139,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         self.develop(&film, drawn.start, rows)
     }
 
-    /// The same of a scene without background.
+    /// Returns the light and the cover of rows of a scene without background.
     pub(super) fn lit_rows(&self, rows: Range<u32>, margin: u32) -> Result<Vec<Lit>, RenderError> {
         let drawn = self.drawn_with(&rows, margin);
         let film = self.expose(drawn.clone(), |_| Ok(()))?;

@@ -103,7 +103,7 @@ impl<'a, E: Real> Workspace<'a, E> {
     }
 }
 
-/// What has been drawn of a tile.
+/// The drawn samples of a tile.
 pub(super) struct Drawn<'a, 'b> {
     /// The sums of its pixels.
     pub(super) pixels: &'a mut Vec<Pixel>,
