@@ -97,7 +97,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         }
         cloud.write("film/notes.md", "not a script");
         let said = cloud.says("submit film", 0);
-        assert!(said.contains("scripts/film/: 3 scripts uploaded"), "{said}");
+        assert!(said.contains("scripts/film/: 3 files uploaded"), "{said}");
         cloud.rayfold("render film -o local.gif", 0);
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
         assert_eq!(cloud.work().await, (3, 1), "no quiet period was waited for, nothing done twice");
@@ -116,7 +116,7 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
         cloud.delete("film/f1.txt");
         let said = cloud.says("submit film --delete", 0);
         assert!(said.contains("1 script that the folder does not have: deleted"), "{said}");
-        assert!(said.contains("2 scripts uploaded") && said.contains("unchanged"), "{said}");
+        assert!(said.contains("2 files uploaded") && said.contains("unchanged"), "{said}");
         cloud.rayfold("render film -o local.gif", 0);
         assert!(cloud.read("film.gif") == cloud.read("local.gif"), "the GIF is not the local one");
         assert_eq!(cloud.work().await.0, 2);

@@ -17,9 +17,9 @@ use rayfold_local::routes::Function;
 use rayfold_pipeline::keys::ScriptName;
 use rayfold_pipeline::manifest::{FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{ListRequest, Store};
-use rayfold_pipeline::{Drawing, Renderer};
+use rayfold_pipeline::{Drawing, Files, Renderer, Source};
 use stage::stores::on_every_store;
-use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene};
+use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene, scene_of_a_model};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
@@ -53,6 +53,58 @@ async fn hello_uploaded_file_by_file_is_the_gif_that_is_made_locally() {
         stage.until_gif_of("hello", &files).await;
         let seen = stage.seen();
         assert_eq!((drawn(&seen), built(&seen)), (50, 1));
+    })
+    .await;
+}
+
+/// The model, the library of its colours and the scripts, in an order in which each comes after what needs it.
+#[tokio::test(flavor = "multi_thread")]
+async fn files_beside_scripts_may_come_late_change_and_go() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let model =
+            |x: f64| format!("mtllib corner.mtl\nusemtl a\nv {x} 2 -9\nv 20 2 -9\nv 12 16 -9\nf 1 2 3\n");
+        let color = |red: f64| format!("newmtl a\nKd {red} .6 .2\n");
+        let mut files = vec![
+            ("f1.txt", scene_of_a_model(0.1)),
+            ("f2.txt", scene_of_a_model(0.4)),
+            ("f3.txt", scene(12.0)),
+            ("corner.obj", model(4.0)),
+            ("corner.mtl", color(0.9)),
+        ];
+        stage.upload("film", &files[..3]).await;
+        let manifest = stage.until("film", Status::Waiting).await;
+        assert_eq!((manifest.head.done, manifest.head.waiting), (1, 2), "{manifest:?}");
+        let waits = manifest.frames.iter().find_map(|frame| match &frame.state {
+            FrameState::Waiting(fault) => fault.reason.as_ref(),
+            _ => None,
+        });
+        let message = &waits.unwrap().message;
+        assert_eq!(message, "f1.txt:4:6: there is no file `corner.obj` in the script's folder");
+
+        // Without its library the model has the colour .8, and with it the scripts are drawn again.
+        stage.upload("film", &files[3..4]).await;
+        stage.until_gif_of("film", &files[..4]).await;
+        stage.upload("film", &files[4..]).await;
+        stage.until_gif_of("film", &files).await;
+        stage.seen();
+
+        files[4].1 = color(0.2);
+        stage.upload("film", &files[4..]).await;
+        stage.until_gif_of("film", &files).await;
+        let seen = stage.seen();
+        assert_eq!((drawn(&seen), built(&seen)), (2, 1), "{:?}", outcomes(&seen));
+
+        // What no script names is nothing.
+        stage.upload("film", &[("notes.md", "later".to_owned())]).await;
+        stage.settle().await;
+        assert_eq!(outcomes(&stage.seen()).get("nothing that is read"), Some(&1));
+
+        stage.remove("film", "corner.obj").await;
+        stage.until("film", Status::Waiting).await;
+        files[3].1 = model(6.0);
+        stage.upload("film", &files[3..4]).await;
+        stage.until_gif_of("film", &files).await;
     })
     .await;
 }
@@ -420,8 +472,9 @@ async fn a_frame_too_big_for_one_invocation_is_drawn_in_bands_with_the_same_byte
             let there = stage.store().get(&key).await.unwrap().body;
             let (_, text) = files.iter().find(|(file, _)| file.starts_with(frame.script.as_str())).unwrap();
             let name = ScriptName::new(frame.script.as_str()).unwrap();
-            let script = text.clone().into();
-            let whole = RayTracer::default().draw(&name, script, frame.part, None).await.unwrap();
+            let (script, files) = (text.clone().into(), Files::default());
+            let source = Source { name, script, files, part: frame.part };
+            let whole = RayTracer::default().draw(source, None).await.unwrap();
             let Drawing::Frame(whole) = whole else { panic!("{key}") };
             assert!(there == whole, "{key}");
         }

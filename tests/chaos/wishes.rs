@@ -188,7 +188,9 @@ pub(crate) async fn given_up(store: &S3Store, name: &str, files: &[(&str, String
         |script: &str| files.iter().any(|(file, text)| *file == format!("{script}.txt") && text != FAULTY);
     let faults = manifest.frames.iter().filter_map(|frame| match &frame.state {
         FrameState::Failed(fault) if is_good(frame.script.as_str()) => Some(fault),
-        FrameState::Failed(_) | FrameState::Pending | FrameState::Done { .. } => None,
+        FrameState::Failed(_) | FrameState::Pending | FrameState::Waiting(_) | FrameState::Done { .. } => {
+            None
+        }
     });
     let faults = faults.chain(&manifest.head.refusal);
     let named = |fault: &Fault| fault.reason.as_ref().map(|reason: &Reason| reason.message.clone());

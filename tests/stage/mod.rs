@@ -22,7 +22,8 @@ use rayfold_pipeline::assemble::is_current;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
-use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse, parse_settings};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse_settings, parse_with_files};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// A value for `RAYFOLD_SPARE_FRAMES`: the time to keep free, in frames, so that an assembler adds one frame and leaves
@@ -261,6 +262,11 @@ pub fn scene(x: f64) -> String {
     )
 }
 
+/// Returns a frame of `corner.obj` in front of the sky, which depends on `red`.
+pub fn scene_of_a_model(red: f64) -> String {
+    format!("Screen 24 18\nBackground {red} .2 .3\nIlight 1 1 1  .2 -.3 -1\nMesh \"corner.obj\"\nTrace\n")
+}
+
 /// Returns a frame that functions of [`SMALL_MB`] megabytes draw in four bands. It depends on `x`.
 pub fn big_scene(x: f64) -> String {
     format!(
@@ -281,12 +287,18 @@ pub fn frames(count: usize) -> (&'static str, String) {
 pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
     let limits = Limits::default();
     let mut settings = AnimationSettings::default();
+    let mut beside = MemoryFiles::default();
+    for (name, text) in files {
+        beside.insert(name, text.as_bytes().to_vec());
+    }
+    let library = Library::new(beside);
     let mut scripts = Vec::new();
     for (name, text) in files {
         if *name == "animation.json" {
             settings = parse_settings(name, text.as_bytes()).settings.unwrap();
-        } else {
-            scripts.push((*name, parse(name, text.as_bytes(), &limits).script.unwrap()));
+        } else if name.ends_with(".txt") {
+            let parsed = parse_with_files(name, text.as_bytes(), &limits, &library);
+            scripts.push((*name, parsed.script.unwrap()));
         }
     }
     scripts.sort_by(|(a, _), (b, _)| natural_cmp(a, b));

@@ -22,7 +22,7 @@ pub enum AssetError {
         why: String,
     },
     /// Files cannot be read here at all.
-    #[error("files are read by `rayfold render` and `rayfold studio` alone: `{name}` cannot be read here")]
+    #[error("files are not read here: `{name}` is one")]
     NotHere {
         /// The wanted name.
         name: String,

@@ -72,8 +72,11 @@ impl File {
 
     /// Returns the options with which the file is put.
     pub(crate) fn options(&self, key: &str) -> PutOptions {
-        let is_json = key.ends_with(".json");
-        let media_type = if is_json { "application/json" } else { "text/plain; charset=utf-8" };
+        let media_type = match key.rsplit_once('.') {
+            Some((_, "json")) => "application/json",
+            Some((_, "txt")) => "text/plain; charset=utf-8",
+            _ => "application/octet-stream",
+        };
         PutOptions::always().content_type(media_type).metadata(DIGEST, &self.digest)
     }
 }

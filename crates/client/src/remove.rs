@@ -1,11 +1,12 @@
 //! Removal of an animation from the bucket, with everything that was made of it.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use rayfold_pipeline::Clock;
-use rayfold_pipeline::keys::{Animation, Key, Uploaded, goes_with};
+use rayfold_pipeline::keys::{Animation, Key, NameHash, Receipt, Uploaded, goes_with};
 use rayfold_pipeline::manifest::Status;
-use rayfold_pipeline::store::{ListRequest, Store};
+use rayfold_pipeline::store::{ListRequest, Listed, Store};
 
 use crate::client::Client;
 use crate::error::{Error, Result};
@@ -39,9 +40,9 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// # Errors
     /// [`Error::NoAnimation`], and the errors of the store.
     pub async fn contents(&self, animation: &Animation) -> Result<Contents> {
-        let scripts = self.uploaded_of(animation).await?;
         // Listed before anything is deleted: a caller who may not list all of an animation deletes nothing of it.
         let made = self.made_of(animation).await?;
+        let scripts = self.uploaded_of(animation, &made).await?;
         if scripts.is_empty() && made.is_empty() {
             return Err(Error::NoAnimation(animation.clone()));
         }
@@ -74,13 +75,25 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
     }
 
-    /// Returns the scripts and settings, including misnamed ones and files that operating systems leave there.
-    async fn uploaded_of(&self, animation: &Animation) -> Result<Vec<String>> {
+    /// Returns the scripts and settings, including misnamed ones, the files that a result was drawn from, and files that
+    /// operating systems leave there. `made` are the keys of the results.
+    async fn uploaded_of(&self, animation: &Animation, made: &[String]) -> Result<Vec<String>> {
+        let lists = made.iter().filter_map(|key| match key.parse() {
+            Ok(Key::Receipt { receipt: Receipt::Files { list, .. }, .. }) => Some(list),
+            _ => None,
+        });
+        let named: BTreeSet<NameHash> = lists.flat_map(|list| list.entries).map(|(name, _)| name).collect();
         let listed = self.list(ListRequest::all(animation.scripts())).await?.objects;
         let all = listed.iter().filter_map(|object| Uploaded::of(&object.key, object.size).animation());
         let mut others: Vec<Animation> = all.filter(|other| other != animation).collect();
         others.dedup();
-        let ours = listed.into_iter().filter(|object| goes_with(animation, &object.key, &others));
+        let is_named = |object: &Listed| {
+            matches!(Uploaded::of(&object.key, object.size), Uploaded::File(of, name)
+                if of == *animation && named.contains(&NameHash::of(&name)))
+        };
+        let ours = listed
+            .into_iter()
+            .filter(|object| is_named(object) || goes_with(animation, &object.key, &others));
         Ok(ours.map(|object| object.key).collect())
     }
 
@@ -117,6 +130,11 @@ fn is_pending<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::num::NonZeroU64;
+
+    use rayfold_pipeline::keys::{FileList, ScriptName, Tag};
+    use rayfold_pipeline::store::ETag;
+
     use super::*;
     use crate::world::World;
 
@@ -128,6 +146,22 @@ mod tests {
         world.put("scripts/film/2.txt", "bad").await;
         world.functions().await;
         world
+    }
+
+    #[tokio::test]
+    async fn the_files_of_its_scripts_go_with_an_animation() {
+        let world = World::new();
+        for name in ["1.txt", "earth.png", "notes.md"] {
+            world.put(&format!("scripts/film/{name}"), "a").await;
+        }
+        let (name, tag) = ("1", "v+0123456789abcdef");
+        let earth = NameHash::of("earth.png");
+        let list = FileList { number: NonZeroU64::MIN, of: NonZeroU64::MIN, entries: vec![(earth, None)] };
+        let tag = Tag { version: ETag::new(tag), pixels: 1 };
+        let receipt = Receipt::Files { name: ScriptName::new(name).unwrap(), tag, list };
+        world.put(&world.film().receipt(&receipt), "").await;
+        world.client().remove(&world.film(), |_| {}).await.unwrap();
+        assert_eq!(world.keys("").await, ["scripts/film/notes.md"]);
     }
 
     #[tokio::test]

@@ -51,7 +51,7 @@ pub fn obstacles(manifest: &Manifest) -> Vec<Obstacle<'_>> {
     let excess = head.excess.as_ref();
     let excess = excess.map(|reason| Obstacle { what: head.animation.to_string(), reason: Some(reason) });
     let frames = manifest.frames.iter().filter_map(|frame| match &frame.state {
-        FrameState::Failed(fault) => {
+        FrameState::Failed(fault) | FrameState::Waiting(fault) => {
             Some(Obstacle { what: frame_name(frame), reason: fault.reason.as_ref() })
         }
         FrameState::Pending | FrameState::Done { .. } => None,

@@ -1,14 +1,14 @@
 //! Submission: makes an animation's folder in the bucket equal to a local one, with as few uploads as possible.
 //!
-//! The order matters: scripts are deleted first, then the new number of frames is put, then the new scripts. So the
-//! animation is never complete before it is as wanted.
+//! The order matters: scripts are deleted first, then the new number of frames is put, then the files that scripts name,
+//! then the new scripts. So the animation is never complete before it is as wanted, and no script waits for its files.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use rayfold_pipeline::Clock;
-use rayfold_pipeline::keys::{Animation, Key, ScriptName};
+use rayfold_pipeline::keys::{Animation, Key, ScriptName, Uploaded};
 use rayfold_pipeline::store::{ETag, ListRequest, Listed, Store};
 use rayfold_scene::AnimationSettings;
 
@@ -41,7 +41,7 @@ enum Deletable {
 /// The changes that a submission would make.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Preview {
-    /// The keys of the scripts and settings that would be uploaded.
+    /// The keys of the scripts, files and settings that would be uploaded.
     pub upload: Vec<String>,
     /// The keys of the scripts that would be deleted.
     pub delete: Vec<String>,
@@ -57,7 +57,7 @@ pub enum Sending {
         /// The number of deleted scripts.
         scripts: u64,
     },
-    /// Scripts are being uploaded.
+    /// Files are being uploaded.
     Uploading {
         /// The number of uploaded files.
         done: u64,
@@ -120,6 +120,22 @@ impl Submission {
             files.insert(key, file);
         }
         Ok(Self { animation, files, deletable: Deletable::None })
+    }
+
+    /// Adds the files that the scripts name, by their names.
+    ///
+    /// # Errors
+    /// The pipeline's [`Key`](rayfold_pipeline::Error::Key) if scripts cannot name such a file.
+    pub fn with_files(mut self, files: impl IntoIterator<Item = (String, File)>) -> Result<Self> {
+        for (name, file) in files {
+            let key = format!("{}{name}", self.animation.scripts());
+            if !is_file(&key) {
+                let problem = "scripts name no such file";
+                return Err(rayfold_pipeline::Error::Key { key, problem }.into());
+            }
+            self.files.insert(key, file);
+        }
+        Ok(self)
     }
 
     /// Allows it to delete the scripts with these keys if it does not contain them.
@@ -185,8 +201,13 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let total = changed.len() as u64;
         if total > 0 {
             report(Sending::Uploading { done: 0, total });
-            versions
-                .extend(self.send(&changed, files, |done| report(Sending::Uploading { done, total })).await?);
+        }
+        let (first, last): (Vec<String>, Vec<String>) = changed.into_iter().partition(|key| is_file(key));
+        let mut sent = 0;
+        for keys in [first, last] {
+            let show = |done| report(Sending::Uploading { done: sent + done, total });
+            versions.extend(self.send(&keys, files, show).await?);
+            sent += keys.len() as u64;
         }
         report(Sending::Finished { uploaded: total, unchanged });
         Ok(Submitted { versions })
@@ -262,6 +283,10 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
         Ok(())
     }
+}
+
+fn is_file(key: &str) -> bool {
+    matches!(Uploaded::of(key, 1), Uploaded::File(..))
 }
 
 #[cfg(test)]
@@ -347,6 +372,29 @@ mod tests {
         let expected =
             ["delete scripts/film/0.txt", "put scripts/film/animation.json", "put scripts/film/1.txt"];
         assert_eq!(seen, expected);
+    }
+
+    #[tokio::test]
+    async fn files_that_scripts_name_go_before_the_scripts() {
+        let world = World::new();
+        let wanted = |earth: &str| {
+            let files = [("earth.png".to_owned(), File::of_text(earth))];
+            submission(&[("1", "a")], "{}").with_files(files).unwrap()
+        };
+        let puts = |world: &World| {
+            let mut seen = world.requests.seen();
+            seen.retain(|request| request.starts_with("put"));
+            seen
+        };
+        world.client().submit(&wanted("blue"), |_| {}).await.unwrap();
+        let order = ["animation.json", "earth.png", "1.txt"].map(|name| format!("put scripts/film/{name}"));
+        assert_eq!(puts(&world), order);
+        world.requests.clear();
+        world.client().submit(&wanted("green"), |_| {}).await.unwrap();
+        assert_eq!(puts(&world), ["put scripts/film/earth.png"], "nothing else has changed");
+        let hidden = [(".earth".to_owned(), File::of_text(""))];
+        let refused = submission(&[], "{}").with_files(hidden).unwrap_err();
+        assert!(refused.to_string().contains("scripts name no such file"), "{refused}");
     }
 
     /// With customer-managed encryption or parts, the entity tag is not the MD5. The memory store's never is.

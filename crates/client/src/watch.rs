@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use rayfold_pipeline::assemble::is_current;
-use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::keys::{Animation, Key, Uploaded};
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ETag, ListRequest, ObjectInfo, Store};
-use rayfold_pipeline::{Clock, Timestamp, found};
+use rayfold_pipeline::{Clock, Timestamp, found, script_versions};
 
 use crate::client::Client;
 use crate::error::{Error, Result};
@@ -213,12 +213,19 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Returns the versions of the animation's scripts and settings, by key.
+    /// Returns the versions of the animation's scripts, with their files, and settings, by key.
     async fn versions(&self, animation: &Animation) -> Result<BTreeMap<String, ETag>> {
-        let listing = self.list(ListRequest::level(animation.scripts())).await?;
-        let is_ours = |key: &str| matches!(key.parse::<Key>(), Ok(Key::Script { .. } | Key::Settings { .. }));
-        let ours = listing.objects.into_iter().filter(|object| is_ours(&object.key));
-        Ok(ours.map(|object| (object.key, object.etag)).collect())
+        let scripts = self.list(ListRequest::level(animation.scripts())).await?.objects;
+        let has_files =
+            scripts.iter().any(|object| matches!(Uploaded::of(&object.key, object.size), Uploaded::File(..)));
+        let receipts = match has_files {
+            true => self.list(ListRequest::level(animation.frames())).await?.objects,
+            false => Vec::new(),
+        };
+        let versions = script_versions(animation, &scripts, &receipts);
+        let versions = versions.into_iter().map(|(name, version)| (animation.script(&name), version));
+        let settings = scripts.into_iter().filter(|object| object.key == animation.settings());
+        Ok(versions.chain(settings.map(|object| (object.key, object.etag))).collect())
     }
 
     /// Waits until the submission has become a GIF, or the manifest says why it will not. Reports
@@ -240,12 +247,17 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
                 last_change = self.clock.now();
             }
             if let Some(manifest) = watch.manifest()
-                && stands_for(manifest, animation, &submitted.versions)
+                && is_of_scripts(manifest, animation, &submitted.versions)
             {
                 let head = &manifest.head;
-                let total = head.total + head.missing() - head.pending;
+                let total = head.total + head.not_uploaded();
                 report(Waiting::Frames { done: head.done + head.failed, total });
+                // The files may have changed since, and the functions not have seen it.
+                let is_whole = !head.is_terminal()
+                    || !manifest.frames.iter().any(|frame| frame.version.has_files())
+                    || stands_for(manifest, animation, &self.versions(animation).await?);
                 match (head.status, watch.gif()) {
+                    _ if !is_whole => {}
                     (Status::Done, Some(gif)) if watch.is_current() => return Ok(Ended::Gif(gif.clone())),
                     (Status::Failed | Status::Refused, _) => {
                         return Ok(Ended::Failed(Box::new(manifest.clone())));
@@ -280,7 +292,18 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     }
 }
 
-/// Returns whether the manifest is about exactly these versions of exactly these files.
+/// Returns whether the manifest is about exactly these scripts and settings, whatever the files that the scripts name.
+fn is_of_scripts(manifest: &Manifest, animation: &Animation, versions: &BTreeMap<String, ETag>) -> bool {
+    let without_files = |version: &ETag| ETag::new(version.script());
+    let frames = manifest.frames.iter();
+    let mut seen: BTreeMap<String, ETag> =
+        frames.map(|frame| (animation.script(&frame.script), without_files(&frame.version))).collect();
+    seen.extend(manifest.head.settings.version.iter().map(|version| (animation.settings(), version.clone())));
+    let is_file = |key: &str| matches!(Uploaded::of(key, 1), Uploaded::File(..));
+    seen.iter().eq(versions.iter().filter(|(key, _)| !is_file(key)))
+}
+
+/// Returns whether the manifest is about exactly these versions of exactly these scripts and settings.
 fn stands_for(manifest: &Manifest, animation: &Animation, versions: &BTreeMap<String, ETag>) -> bool {
     let mut seen: BTreeMap<String, &ETag> =
         manifest.frames.iter().map(|frame| (animation.script(&frame.script), &frame.version)).collect();

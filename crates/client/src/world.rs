@@ -9,15 +9,15 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
-use rayfold_pipeline::keys::{Animation, Band, Key, Part, ScriptName};
+use rayfold_pipeline::keys::{Animation, Band, Key, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::store::{
     ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions, Store,
     UnfinishedUpload,
 };
 use rayfold_pipeline::{
-    Animator, BandJoiner, Clock, Drawing, Encoding, Invocation, Policy, Randomness, Renderer, Result,
-    Timestamp, Unfit, assemble, render_frame,
+    Animator, BandJoiner, Clock, Drawing, Encoding, Files, Invocation, Policy, Randomness, Renderer, Result,
+    Source, Timestamp, Unfit, assemble, render_frame,
 };
 use rayfold_scene::AnimationSettings;
 
@@ -236,8 +236,16 @@ impl Renderer for OneLine {
         1_000
     }
 
-    async fn draw(&self, name: &ScriptName, script: Bytes, _: Part, _: Option<Duration>) -> Result<Drawing> {
-        let text = String::from_utf8_lossy(&script);
+    fn most_file_bytes(&self) -> u64 {
+        1_000
+    }
+
+    async fn missing(&self, _: &ScriptName, _: Bytes, _: Files) -> Result<Vec<String>> {
+        Ok(Vec::new())
+    }
+
+    async fn draw(&self, source: Source, _: Option<Duration>) -> Result<Drawing> {
+        let (name, text) = (&source.name, String::from_utf8_lossy(&source.script));
         Ok(match text.as_ref() {
             "bad" => Drawing::Fault(Reason::new(format!("{name}.txt: bad"))),
             text => Drawing::Frame(format!("{name}: {text}").into()),
@@ -245,17 +253,11 @@ impl Renderer for OneLine {
     }
 
     /// No frame is too big in these tests.
-    async fn draw_band(
-        &self,
-        _: &ScriptName,
-        _: Bytes,
-        _: Part,
-        band: Band,
-    ) -> Result<Result<Bytes, Reason>> {
+    async fn draw_band(&self, _: Source, band: Band) -> Result<Result<Bytes, Reason>> {
         Ok(Err(Reason::new(format!("no frame has a band {band}"))))
     }
 
-    async fn join(&self, _: &ScriptName, _: Bytes, _: Part, _: NonZeroU64) -> Result<Result<Whole, Reason>> {
+    async fn join(&self, _: Source, _: NonZeroU64) -> Result<Result<Whole, Reason>> {
         Ok(Err(Reason::new("no frame has bands")))
     }
 }

@@ -70,7 +70,7 @@ impl Context<S3Store> {
             None => getrandom::u64().context("no randomness from the system")?,
         };
         let variable = |name: &str| env::var(name).ok();
-        let renderer = RayTracer { limits: limits(variable)?, capacity: capacity(variable)? };
+        let renderer = RayTracer::new(limits(variable)?, capacity(variable)?);
         let animator = GifAnimator { most_pixels: renderer.limits.max_pixels };
         Ok(Self { store, bucket, renderer, animator, policy, random: Randomness::seeded(seed) })
     }

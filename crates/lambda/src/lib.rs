@@ -15,6 +15,7 @@ pub mod assemble;
 pub mod capacity;
 pub mod context;
 pub mod event;
+mod given;
 pub mod joining;
 mod limits;
 mod logs;

@@ -10,13 +10,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use rayfold_pipeline::keys::{Band, Part, ScriptName};
+use rayfold_pipeline::keys::{Band, ScriptName};
 use rayfold_pipeline::manifest::Reason;
-use rayfold_pipeline::{Drawing, Error, Renderer, Result};
-use rayfold_scene::{Limits, Scene, Script};
+use rayfold_pipeline::{Drawing, Error, File, Files, Renderer, Result, Source};
+use rayfold_scene::diagnostic::{Code, Diagnostic};
+use rayfold_scene::{Limits, Scene, Script, assets};
 use rayfold_tracer::{Drawing as Picture, Exposure, RenderError, RenderOptions};
 
 use crate::capacity::{Capacity, Extent, FEW_RAYS, Measured, STOP_SHARE, STRIP, Verdict, strips};
+use crate::given::Kept;
 use crate::joining::PngJoining;
 use crate::{png, pool};
 
@@ -35,10 +37,12 @@ const MEASURING_SHARE: f64 = 0.1;
 ///
 /// ```
 /// use rayfold_lambda::raytracer::RayTracer;
-/// use rayfold_pipeline::{Drawing, Renderer, keys::ScriptName};
+/// use rayfold_pipeline::{Drawing, Files, Renderer, Source, keys::ScriptName};
 /// # #[tokio::main(flavor = "current_thread")] async fn main() -> rayfold_pipeline::Result<()> {
 /// let script = "Screen 4 3\nSphere 1 0 0 -5 1 0 0 0 0 0\nTrace";
-/// let drawing = RayTracer::default().draw(&ScriptName::new("red")?, script.into(), None, None).await?;
+/// let name = ScriptName::new("red")?;
+/// let source = Source { name, script: script.into(), files: Files::default(), part: None };
+/// let drawing = RayTracer::default().draw(source, None).await?;
 /// assert!(matches!(drawing, Drawing::Frame(png) if png.starts_with(b"\x89PNG")));
 /// # Ok(()) }
 /// ```
@@ -48,6 +52,14 @@ pub struct RayTracer {
     pub limits: Limits,
     /// The resources of an invocation.
     pub capacity: Capacity,
+    kept: Kept,
+}
+
+impl RayTracer {
+    /// Makes a renderer that has drawn nothing yet.
+    pub fn new(limits: Limits, capacity: Capacity) -> Self {
+        RayTracer { limits, capacity, kept: Kept::default() }
+    }
 }
 
 impl Renderer for RayTracer {
@@ -57,17 +69,38 @@ impl Renderer for RayTracer {
         self.limits.max_script_bytes as u64
     }
 
-    async fn draw(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        left: Option<Duration>,
-    ) -> Result<Drawing> {
+    fn most_file_bytes(&self) -> u64 {
+        assets::limits::FILE_BYTES
+    }
+
+    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        // Names of files are in quotes.
+        if !script.contains(&b'"') {
+            return Ok(Vec::new());
+        }
+        let (kept, limits, file) = (self.kept.clone(), self.limits, format!("{name}.txt"));
+        run(name, move || {
+            Ok(kept.with(files, |given| {
+                rayfold_scene::parse_with_files(&file, &script, &limits, &given.library);
+                given.take_missing()
+            }))
+        })
+        .await
+    }
+
+    fn kept(&self, key: &str) -> Option<File> {
+        self.kept.file(key)
+    }
+
+    fn keep(&self, key: &str, file: &File) {
+        self.kept.keep(key, file);
+    }
+
+    async fn draw(&self, source: Source, left: Option<Duration>) -> Result<Drawing> {
         let stop = CancelOnDrop::default();
-        let (flag, limits, file) = (stop.0.clone(), self.limits, format!("{name}.txt"));
+        let (flag, name, reader) = (stop.0.clone(), source.name.clone(), self.clone());
         let time = Time { began: Instant::now(), left, capacity: self.capacity };
-        let drawing = run(name, move || match Shot::read(&file, &script, part, &limits) {
+        let drawing = run(&name, move || match reader.shot(&source) {
             Ok(shot) => shot.draw(&time, &flag),
             Err(other) => Ok(other),
         });
@@ -83,34 +116,22 @@ impl Renderer for RayTracer {
         }
     }
 
-    async fn draw_band(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        band: Band,
-    ) -> Result<Result<Bytes, Reason>> {
+    async fn draw_band(&self, source: Source, band: Band) -> Result<Result<Bytes, Reason>> {
         let stop = CancelOnDrop::default();
-        let (flag, limits, file) = (stop.0.clone(), self.limits, format!("{name}.txt"));
-        run(name, move || match Shot::read(&file, &script, part, &limits) {
+        let (flag, name, reader) = (stop.0.clone(), source.name.clone(), self.clone());
+        run(&name, move || match reader.shot(&source) {
             Ok(shot) => shot.draw_band(band, &flag),
-            Err(other) => Ok(Err(no_single_frame(&file, other))),
+            Err(other) => Ok(Err(no_single_frame(&format!("{}.txt", source.name), other))),
         })
         .await
     }
 
-    async fn join(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        count: NonZeroU64,
-    ) -> Result<Result<PngJoining, Reason>> {
-        let (limits, file) = (self.limits, format!("{name}.txt"));
-        run(name, move || {
-            Ok(match Shot::read(&file, &script, part, &limits) {
+    async fn join(&self, source: Source, count: NonZeroU64) -> Result<Result<PngJoining, Reason>> {
+        let (name, reader) = (source.name.clone(), self.clone());
+        run(&name, move || {
+            Ok(match reader.shot(&source) {
                 Ok(shot) => PngJoining::begin(shot.size(), shot.scene.background.is_none(), count),
-                Err(other) => Err(no_single_frame(&file, other)),
+                Err(other) => Err(no_single_frame(&format!("{}.txt", source.name), other)),
             })
         })
         .await
@@ -129,7 +150,7 @@ async fn run<T: Send + 'static>(
 /// Returns the reason why a band has no frame. A script that was cut does not change, so it should have one.
 fn no_single_frame(file: &str, drawing: Drawing) -> Reason {
     match drawing {
-        Drawing::Fault(reason) => reason,
+        Drawing::Waits(reason) | Drawing::Fault(reason) => reason,
         Drawing::Split(count) => Reason::new(format!("{file} has {count} frames, each of which has bands")),
         Drawing::Frame(_) | Drawing::Cut(_) => Reason::new(format!("{file} has no bands")),
     }
@@ -152,25 +173,34 @@ struct Shot {
     scene: Scene,
 }
 
-impl Shot {
+impl RayTracer {
     /// Reads a script. Returns the result of the drawing if there is no frame to draw.
-    fn read(file: &str, script: &[u8], part: Part, limits: &Limits) -> std::result::Result<Self, Drawing> {
-        let parsed = rayfold_scene::parse(file, script, limits);
+    fn shot(&self, source: &Source) -> std::result::Result<Shot, Drawing> {
+        let file = format!("{}.txt", source.name);
+        let parsed = self.kept.with(source.files.clone(), |given| {
+            rayfold_scene::parse_with_files(&file, &source.script, &self.limits, &given.library)
+        });
         let Some(script) = parsed.script else {
-            return Err(Drawing::Fault(Reason::from_diagnostics(parsed.diagnostics)));
+            let mut errors = parsed.diagnostics.iter().filter(|diagnostic| diagnostic.is_error());
+            // A script with other errors as well would fail with its files, too.
+            let waits = errors.all(|error: &Diagnostic| error.code == Code::AbsentFile);
+            let reason = Reason::from_diagnostics(parsed.diagnostics);
+            return Err(if waits { Drawing::Waits(reason) } else { Drawing::Fault(reason) });
         };
         let count = script.frame_count() as u64;
-        let number = match (part, NonZeroU64::new(count)) {
+        let number = match (source.part, NonZeroU64::new(count)) {
             (None, Some(count)) if count.get() > 1 => return Err(Drawing::Split(count)),
             (part, _) => part.map_or(1, NonZeroU64::get),
         };
         let place = usize::try_from(number - 1).unwrap_or(usize::MAX);
         match script.frame(place) {
-            Some(scene) => Ok(Shot { file: file.to_owned(), script, place, scene }),
+            Some(scene) => Ok(Shot { file, script, place, scene }),
             None => Err(Drawing::Fault(Reason::new(format!("{file} has {count} frames, no frame {number}")))),
         }
     }
+}
 
+impl Shot {
     /// Returns columns and rows.
     fn size(&self) -> (u32, u32) {
         (self.scene.screen.width(), self.scene.screen.height())
@@ -313,8 +343,9 @@ mod tests {
 
     use super::*;
 
-    fn name() -> ScriptName {
-        ScriptName::new("big").unwrap()
+    fn source(script: &Bytes) -> Source {
+        let name = ScriptName::new("big").unwrap();
+        Source { name, script: script.clone(), files: Files::default(), part: None }
     }
 
     /// A script of balls on a floor, seen in mirrors.
@@ -335,14 +366,14 @@ mod tests {
 
     async fn draw(script: &Bytes, left_ms: Option<u64>) -> Drawing {
         let left = left_ms.map(Duration::from_millis);
-        patient().draw(&name(), script.clone(), None, left).await.unwrap()
+        patient().draw(source(script), left).await.unwrap()
     }
 
     async fn put_together(script: &Bytes, count: NonZeroU64) -> Bytes {
         let tracer = patient();
-        let mut joining = tracer.join(&name(), script.clone(), None, count).await.unwrap().unwrap();
+        let mut joining = tracer.join(source(script), count).await.unwrap().unwrap();
         for band in Band::all(count) {
-            let image = tracer.draw_band(&name(), script.clone(), None, band).await.unwrap().unwrap();
+            let image = tracer.draw_band(source(script), band).await.unwrap().unwrap();
             joining.push(image).await.unwrap();
         }
         joining.finish().await.unwrap()
@@ -394,7 +425,7 @@ mod tests {
             ..RayTracer::default()
         };
         let left = Some(Duration::from_secs(600));
-        let drawn = tracer.draw(&name(), script("40 30", "4 0"), None, left).await.unwrap();
+        let drawn = tracer.draw(source(&script("40 30", "4 0")), left).await.unwrap();
         assert!(matches!(drawn, Drawing::Frame(_)));
     }
 }

@@ -57,7 +57,10 @@ fn described(outcome: &Came) -> String {
         Came::Split(parts) => format!("split into {parts}"),
         Came::Cut(bands) => format!("cut into {bands}"),
         Came::Band(band) => format!("band {band}"),
+        Came::Waits(_) => "waits for a file".into(),
         Came::Faulty(_) => "faulty".into(),
+        Came::File => "a file of scripts".into(),
+        Came::NoFile => "nothing that is read".into(),
         Came::TooMany => "one too many".into(),
     }
 }

@@ -11,7 +11,9 @@ use serde::Deserialize;
 use crate::assemble::is_current;
 use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
-use crate::keys::{Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, decode_event_key};
+use crate::keys::{
+    Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, Uploaded, decode_event_key,
+};
 use crate::manifest::{Fact, Reason, Status};
 use crate::observe::version_result;
 use crate::render::bands::Bands;
@@ -99,6 +101,10 @@ pub async fn record_failure<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     failure: &Failure,
 ) -> Result<Recorded> {
+    // The scripts that name it are pending then, which the sweep finds.
+    if let Uploaded::File(animation, _) = Uploaded::of(&failure.key, 0) {
+        return invocation.fold(&animation, &Fact::Fold, Age::Old).await.map(Recorded::Resolved);
+    }
     match failure.key.parse()? {
         Key::Script { animation, name } => {
             let version = failure.version.clone();
@@ -111,6 +117,9 @@ pub async fn record_failure<S: Store, C: Clock>(
         Key::Band { animation, name, tag, part, band, .. } => {
             let of = (part, Some(band));
             invocation.record_frame(failure, animation, name, of, Some(tag.version)).await
+        }
+        Key::Wake { animation, name, tag } => {
+            invocation.record_frame(failure, animation, name, (None, None), Some(tag.version)).await
         }
         Key::Retry { animation, name, tag, part, .. } => {
             invocation.record_frame(failure, animation, name, (part, None), Some(tag.version)).await
@@ -137,7 +146,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let Some(script) = self.head(&animation.script(&name)).await? else {
             return self.fold(&animation, &Fact::Absent(name), Age::Old).await.map(Recorded::Resolved);
         };
-        let version = script.etag;
+        let version = match part.is_some() || band.is_some() {
+            true if tried.as_ref().is_some_and(|tried| tried.script() == script.etag.as_str()) => {
+                tried.clone().unwrap_or(script.etag)
+            }
+            true => script.etag,
+            false => self.current_version(&animation, &name, script.etag).await?,
+        };
         if (part.is_some() || band.is_some()) && tried.as_ref() != Some(&version) {
             return self
                 .fold(&animation, &Fact::Version(name, version), Age::Old)

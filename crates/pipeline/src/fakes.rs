@@ -9,6 +9,7 @@
 //! | `hang N`    | nothing, ever: the deadline comes       |
 //! | `crash N`   | the death of the process that draws it  |
 //! | `big …`     | the same, each frame of it in bands     |
+//! | `with A,B …` | the same, drawn from these files; a file `also C` refers to C, which may be absent |
 
 use std::num::NonZeroU64;
 use std::time::Duration;
@@ -20,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::Result;
 use crate::keys::{Band, Part, ScriptName};
 use crate::manifest::Reason;
-use crate::render::{BandJoiner, Drawing, Renderer};
+use crate::render::{BandJoiner, Drawing, File, Files, Renderer, Source};
 
 /// The request that a script makes to the fakes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +42,8 @@ impl Play {
     /// Parses the text of a script.
     pub fn of(script: &[u8]) -> Play {
         let text = String::from_utf8_lossy(script);
-        let mut words = text.strip_prefix(BIG).unwrap_or(&text).split(' ');
+        let text = text.strip_prefix(BIG).unwrap_or(&text);
+        let mut words = without_files(text).split(' ');
         match words.next() {
             Some("frame") => Play::Frame,
             Some("split") => words.next().and_then(|count| count.parse().ok()).map_or(Play::Bad, Play::Split),
@@ -50,6 +52,51 @@ impl Play {
             _ => Play::Bad,
         }
     }
+}
+
+/// The first word of a script that names files, after `big ` if it has that.
+const WITH: &str = "with ";
+
+/// The first word of a file that refers to another one.
+const ALSO: &str = "also ";
+
+fn without_files(text: &str) -> &str {
+    text.strip_prefix(WITH).and_then(|rest| rest.split_once(' ')).map_or(text, |(_, rest)| rest)
+}
+
+/// Returns the names of files in a script, each of which must be there for its drawing.
+pub fn named(script: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(script);
+    let text = text.strip_prefix(BIG).unwrap_or(&text);
+    let names = text.strip_prefix(WITH).and_then(|rest| rest.split_once(' '));
+    names.map_or(Vec::new(), |(names, _)| names.split(',').map(str::to_owned).collect())
+}
+
+/// Returns the name of the file that a file refers to.
+pub fn referred(file: &[u8]) -> Option<String> {
+    String::from_utf8_lossy(file).strip_prefix(ALSO).map(str::to_owned)
+}
+
+/// Returns the text that a drawing shows: the script with the files that it is drawn from, or the name of a file that
+/// has not come.
+///
+/// # Errors
+///
+/// The name of the first absent file that the script names.
+pub fn drawn_text(script: &[u8], file: impl Fn(&str) -> Option<Vec<u8>>) -> Result<Vec<u8>, String> {
+    let mut text = script.to_vec();
+    let mut names: Vec<(String, bool)> = named(script).into_iter().map(|name| (name, true)).collect();
+    while let Some((name, is_needed)) = names.pop() {
+        match file(&name) {
+            Some(body) => {
+                text.extend(format!(" | {name} = {}", String::from_utf8_lossy(&body)).bytes());
+                names.extend(referred(&body).map(|name| (name, false)));
+            }
+            None if is_needed => return Err(name),
+            None => text.extend(format!(" | no {name}").bytes()),
+        }
+    }
+    Ok(text)
 }
 
 /// The first word of a script whose frames are too big for one invocation.
@@ -131,19 +178,28 @@ impl Renderer for InstantRenderer {
         1_000
     }
 
-    async fn draw(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        _: Option<Duration>,
-    ) -> Result<Drawing> {
-        Ok(match (Play::of(&script), part) {
-            (Play::Frame, None) | (Play::Split(_), Some(_)) if is_big(&script) && self.bands.get() > 1 => {
+    fn most_file_bytes(&self) -> u64 {
+        1_000
+    }
+
+    async fn missing(&self, _: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        let body = |file: &Option<File>| file.as_ref().map(|file| file.body.to_vec());
+        let referred = files.values().filter_map(|file| referred(&body(file)?));
+        Ok(named(&script).into_iter().chain(referred).filter(|name| !files.contains_key(name)).collect())
+    }
+
+    async fn draw(&self, source: Source, _: Option<Duration>) -> Result<Drawing> {
+        let Source { name, script, part, .. } = &source;
+        let text = match text_of(&source) {
+            Ok(text) => text,
+            Err(absent) => return Ok(Drawing::Waits(Reason::new(format!("{name}.txt waits for {absent}")))),
+        };
+        Ok(match (Play::of(script), *part) {
+            (Play::Frame, None) | (Play::Split(_), Some(_)) if is_big(script) && self.bands.get() > 1 => {
                 Drawing::Cut(self.bands)
             }
             (Play::Frame, None) | (Play::Split(_), Some(_)) => {
-                Drawing::Frame(picture(name, &script, part).into())
+                Drawing::Frame(picture(name, &text, *part).into())
             }
             (Play::Split(count), None) => Drawing::Split(count),
             (Play::Bad | Play::Hang | Play::Crash | Play::Frame, _) => {
@@ -152,25 +208,20 @@ impl Renderer for InstantRenderer {
         })
     }
 
-    async fn draw_band(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        band: Band,
-    ) -> Result<Result<Bytes, Reason>> {
-        Ok(Ok(strip(name, &script, part, band).into()))
+    async fn draw_band(&self, source: Source, band: Band) -> Result<Result<Bytes, Reason>> {
+        let text = text_of(&source).unwrap_or_default();
+        Ok(Ok(strip(&source.name, &text, source.part, band).into()))
     }
 
-    async fn join(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        _: NonZeroU64,
-    ) -> Result<Result<Paste, Reason>> {
-        Ok(Ok(Paste::of(name, &script, part)))
+    async fn join(&self, source: Source, _: NonZeroU64) -> Result<Result<Paste, Reason>> {
+        let text = text_of(&source).unwrap_or_default();
+        Ok(Ok(Paste::of(&source.name, &text, source.part)))
     }
+}
+
+fn text_of(source: &Source) -> Result<Vec<u8>, String> {
+    let body = |file: &Option<File>| file.as_ref().map(|file| file.body.to_vec());
+    drawn_text(&source.script, |name| source.files.get(name).and_then(body))
 }
 
 /// The encoder's state, as another process needs it.

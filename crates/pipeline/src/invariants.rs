@@ -58,6 +58,7 @@ fn counts_are_true(next: &Manifest, _: Option<&Manifest>) -> bool {
     head.total == next.frames.len() as u64
         && head.done == count(|state| matches!(state, FrameState::Done { .. }))
         && head.pending == count(|state| matches!(state, FrameState::Pending))
+        && head.waiting == count(|state| matches!(state, FrameState::Waiting(_)))
         && head.failed == count(|state| matches!(state, FrameState::Failed(_)))
         && head.scripts == scripts.len() as u64
 }
@@ -87,15 +88,15 @@ fn status_follows(next: &Manifest, _: Option<&Manifest>) -> bool {
     let head = &next.head;
     let expected = head.settings.value.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
     let sound = head.failed == 0 && head.settings.value.is_some() && head.rejected.is_empty();
-    let complete = head.total > 0 && head.pending == 0 && head.total >= expected;
+    let complete = head.total > 0 && head.pending == 0 && head.waiting == 0 && head.total >= expected;
     if head.excess.is_some() {
         return head.status == Status::Failed && head.total > 0;
     }
     match head.status {
         Status::Empty => head.total == 0 && head.rejected.is_empty(),
-        Status::Waiting => head.total < expected,
+        Status::Waiting => head.total < expected || head.pending == 0 && head.waiting > 0,
         Status::Rendering => head.pending > 0,
-        Status::Failed => head.pending == 0 && head.total >= expected && !sound,
+        Status::Failed => head.pending == 0 && head.waiting == 0 && head.total >= expected && !sound,
         Status::Refused => complete && sound && head.refusal.is_some(),
         Status::Done => complete && sound && head.refusal.is_none(),
     }

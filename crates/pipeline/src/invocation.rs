@@ -145,11 +145,13 @@ pub enum Mutation {
     TakeUpAnyCheckpoint,
     /// A finisher leaves for any frame that the manifest shows to come, without a look whether it still is.
     LeaveForAnyFrame,
+    /// The files that a script names are not looked at again after their versions were put.
+    FilesNotLookedAtAgain,
 }
 
 impl Mutation {
     /// All mutations, in the order of their definition.
-    pub const ALL: [Mutation; 11] = [
+    pub const ALL: [Mutation; 12] = [
         Mutation::SkipSecondListing,
         Mutation::ClaimBeforeCommit,
         Mutation::DropIfMatch,
@@ -161,6 +163,7 @@ impl Mutation {
         Mutation::JoinTooEarly,
         Mutation::TakeUpAnyCheckpoint,
         Mutation::LeaveForAnyFrame,
+        Mutation::FilesNotLookedAtAgain,
     ];
 }
 

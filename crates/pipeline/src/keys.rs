@@ -23,10 +23,12 @@ use crate::{Error, Result};
 
 mod band;
 mod event;
+mod files;
 mod names;
 
 pub use band::Band;
 pub use event::decode_event_key;
+pub use files::{Entry, FileList, NameHash, VersionHash};
 pub use names::{Uploaded, goes_with, misplaced};
 
 /// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
@@ -40,6 +42,9 @@ pub const MANIFESTS: &str = "manifests/";
 /// The name of a lease's file. No receipt ends like this.
 const LEASE_FILE: &str = "@assembler.json";
 const SWEEP_LEASE_FILE: &str = "@sweep.json";
+
+/// The name of the object that wakes a script whose files have changed.
+const WAKE_FILE: &str = "files.json";
 
 /// The folder of unfinished GIFs, and the ending of their names.
 const CHECKPOINTS: &str = "checkpoints/";
@@ -101,6 +106,13 @@ pub enum Key {
         band: Band,
         /// The retry that woke the band; 0 if the invocation that cut the frame did.
         attempt: u64,
+    },
+    /// `parts/<animation>/<name>@<tag>/files.json`: a file that the script names has changed.
+    Wake {
+        animation: Animation,
+        name: ScriptName,
+        /// The version that the script is expected to have with its files as they are now.
+        tag: Tag,
     },
     /// Below `frames/`: the result of a script, a part, or of the whole.
     Receipt { animation: Animation, receipt: Receipt },
@@ -194,6 +206,10 @@ pub enum Receipt {
         /// The rows of the frame.
         band: Band,
     },
+    /// `<name>@<tag>.files-<i>-of-<n>-<entries>`: the files that this version of the script is drawn from.
+    Files { name: ScriptName, tag: Tag, list: FileList },
+    /// `<name>@<tag>.waits.json`: the frame cannot be drawn before files come that the script names.
+    Waits { name: ScriptName, tag: Tag },
     /// `@<generation>.error.json`: this set of frames gives no GIF.
     Refusal {
         /// The set that was refused.
@@ -268,6 +284,11 @@ impl Animation {
         format!("{SCRIPTS}{self}/{name}.txt")
     }
 
+    /// Returns the key `scripts/<animation>/<name>` of a file that scripts name.
+    pub(crate) fn file(&self, name: &str) -> String {
+        format!("{SCRIPTS}{self}/{name}")
+    }
+
     /// A key below `frames/<animation>/`.
     pub fn receipt(&self, receipt: &Receipt) -> String {
         format!("frames/{self}/{receipt}")
@@ -293,6 +314,11 @@ impl ScriptName {
 }
 
 impl Tag {
+    /// Returns the prefix of the receipts of all versions of a script with this entity tag, whatever its files.
+    pub(crate) fn receipts_of_script(name: &ScriptName, script: &ETag) -> String {
+        format!("{name}@{}", escape(script))
+    }
+
     /// Returns the prefix of the receipts of a script's version, for all renderers: `<name>@<version>-p`.
     pub fn receipts_of(name: &ScriptName, version: &ETag) -> String {
         format!("{name}@{}-p", escape(version))
@@ -333,6 +359,7 @@ impl Key {
             | Key::Settings { animation }
             | Key::Part { animation, .. }
             | Key::Band { animation, .. }
+            | Key::Wake { animation, .. }
             | Key::Receipt { animation, .. }
             | Key::Lease { animation }
             | Key::SweepLease { animation }
@@ -365,6 +392,9 @@ impl FromStr for Key {
             "parts" => {
                 let (animation, scripted, file) = beneath_tag(rest).ok_or_else(unknown)?;
                 let (name, tag) = name_and_tag(scripted).ok_or_else(unknown)?;
+                if file == WAKE_FILE {
+                    return Ok(Key::Wake { animation: Animation::new(animation)?, name, tag });
+                }
                 let number = file.strip_suffix(".json").and_then(canonical).ok_or_else(unknown)?;
                 Key::Part { animation: Animation::new(animation)?, name, tag, number }
             }
@@ -419,17 +449,29 @@ impl FromStr for Key {
 }
 
 impl Receipt {
-    /// Whether it is about this version of a script, whatever drew it.
-    pub fn is_of(&self, script: &ScriptName, version: &ETag) -> bool {
+    /// The script and the version that it is about.
+    pub(crate) fn subject(&self) -> Option<(&ScriptName, &ETag)> {
         match self {
             Receipt::Frame { name, tag, .. }
             | Receipt::Fault { name, tag, .. }
             | Receipt::Begun { name, tag, .. }
             | Receipt::Cut { name, tag, .. }
             | Receipt::Band { name, tag, .. }
-            | Receipt::Split { name, tag, .. } => name == script && tag.version == *version,
-            Receipt::Refusal { .. } => false,
+            | Receipt::Split { name, tag, .. }
+            | Receipt::Files { name, tag, .. }
+            | Receipt::Waits { name, tag } => Some((name, &tag.version)),
+            Receipt::Refusal { .. } => None,
         }
+    }
+
+    /// Whether it is about a version of a script with this entity tag, whatever its files.
+    pub(crate) fn is_of_script(&self, script: &ScriptName, etag: &ETag) -> bool {
+        self.subject().is_some_and(|(name, version)| name == script && version.script() == etag.as_str())
+    }
+
+    /// Whether it is about this version of a script, whatever drew it.
+    pub fn is_of(&self, script: &ScriptName, version: &ETag) -> bool {
+        self.subject() == Some((script, version))
     }
 }
 
@@ -522,6 +564,10 @@ fn receipt_of_kind(name: ScriptName, tag: Tag, part: Part, kind: &str) -> Option
     Some(match kind {
         "png" => Receipt::Frame { name, tag, part },
         "error.json" => Receipt::Fault { name, tag, part },
+        "waits.json" => part.is_none().then_some(Receipt::Waits { name, tag })?,
+        _ if kind.starts_with("files-") => {
+            part.is_none().then_some(Receipt::Files { name, tag, list: FileList::parse(kind)? })?
+        }
         _ => {
             if let Some(attempt) = numbered("begun-") {
                 Receipt::Begun { name, tag, part, attempt: attempt? }
@@ -585,6 +631,7 @@ impl fmt::Display for Key {
             Key::Band { animation, name, tag, part: Some(number), band, attempt } => {
                 write!(f, "parts/{animation}/{name}@{tag}/{number}/{band}.band-{attempt}.json")
             }
+            Key::Wake { animation, name, tag } => write!(f, "parts/{animation}/{name}@{tag}/{WAKE_FILE}"),
             Key::Receipt { animation, receipt } => f.write_str(&animation.receipt(receipt)),
             Key::Lease { animation } => write!(f, "{}{LEASE_FILE}", animation.frames()),
             Key::SweepLease { animation } => write!(f, "{}{SWEEP_LEASE_FILE}", animation.frames()),
@@ -627,6 +674,8 @@ impl fmt::Display for Receipt {
             Receipt::Band { name, tag, part: Some(number), band } => {
                 write!(f, "{name}@{tag}/{number}.{band}.band")
             }
+            Receipt::Files { name, tag, list } => write!(f, "{name}@{tag}.{list}"),
+            Receipt::Waits { name, tag } => write!(f, "{name}@{tag}.waits.json"),
             Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
         }
     }

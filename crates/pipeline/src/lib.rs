@@ -12,6 +12,7 @@ mod error;
 pub mod failure;
 #[cfg(any(test, feature = "simulation"))]
 pub mod fakes;
+mod files;
 pub mod fold;
 pub mod invariants;
 mod invocation;
@@ -34,11 +35,12 @@ pub use assemble::assemble;
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
+pub use files::script_versions;
 pub use fold::fold;
 #[cfg(any(test, feature = "simulation"))]
 pub use invocation::ReplayState;
 pub use invocation::{Invocation, Mutation, Policy};
 pub use reconcile::reconcile;
-pub use render::{BandJoiner, Drawing, Renderer, render_frame};
+pub use render::{BandJoiner, Drawing, File, Files, Renderer, Source, render_frame};
 pub use retry::retry;
 pub use sweep::sweep;

@@ -62,6 +62,9 @@ pub struct Head {
     pub done: u64,
     /// Frames that are still to come.
     pub pending: u64,
+    /// Frames that wait for files that their scripts name.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub waiting: u64,
     /// Frames that cannot be drawn.
     pub failed: u64,
     /// The settings in `animation.json`.
@@ -105,7 +108,7 @@ pub struct Gif {
 pub enum Status {
     /// There is no script; there will be no GIF.
     Empty,
-    /// Fewer frames than `animation.json` says are there.
+    /// Fewer frames than `animation.json` says are there, or some wait for files that their scripts name.
     Waiting,
     /// Frames are being drawn.
     Rendering,
@@ -137,7 +140,8 @@ impl fmt::Display for Status {
 pub struct Frame {
     /// The script that draws it.
     pub script: ScriptName,
-    /// The entity tag of the script that the frame is drawn from.
+    /// The entity tag of the script that the frame is drawn from, and of a script that names files, once it has been
+    /// read, a hash of them behind it.
     pub version: ETag,
     /// The frame's number in its script; `None` when the script is one frame, or has not been read yet.
     pub part: Part,
@@ -155,6 +159,8 @@ pub enum FrameState {
         /// The renderer's pixel version that is used.
         pixels: u32,
     },
+    /// It cannot be drawn before files come that the script names.
+    Waiting(Fault),
     /// It cannot be drawn.
     Failed(Fault),
 }
@@ -218,7 +224,7 @@ pub enum Fact {
     Settings(Option<ETag>),
     /// The script's frame, or this part of it, is drawn with this pixel version or a newer one.
     Drawn(ScriptName, ETag, Part, u32),
-    /// The script's frame, or this part of it, cannot be drawn, as this receipt says.
+    /// The script's frame, or this part of it, cannot be drawn, or not yet, as this receipt says.
     Faulty(ScriptName, ETag, Part, ETag),
     /// The script has several frames.
     Split(ScriptName, ETag),
@@ -237,8 +243,13 @@ impl Head {
 
     /// Returns the number of frames that are expected and not there yet.
     pub fn missing(&self) -> u64 {
+        self.pending + self.waiting + self.not_uploaded()
+    }
+
+    /// Returns the number of frames that are expected and whose scripts are not uploaded, or not read yet.
+    pub fn not_uploaded(&self) -> u64 {
         let expected = self.settings.value.as_ref().and_then(AnimationSettings::frames).unwrap_or(0);
-        self.pending + expected.saturating_sub(self.total)
+        expected.saturating_sub(self.total)
     }
 }
 
@@ -324,7 +335,7 @@ impl Fact {
                     && match &frame.state {
                         FrameState::Pending => false,
                         FrameState::Done { .. } => true,
-                        FrameState::Failed(fault) => fault.receipt == *receipt,
+                        FrameState::Failed(fault) | FrameState::Waiting(fault) => fault.receipt == *receipt,
                     }
             }),
             Fact::Split(name, version) => of(name, version).any(|frame| frame.part.is_some()),
@@ -335,7 +346,8 @@ impl Fact {
 impl Frame {
     fn agrees_with(&self, other: &Frame) -> bool {
         let same_state = match (&self.state, &other.state) {
-            (FrameState::Failed(a), FrameState::Failed(b)) => a.receipt == b.receipt,
+            (FrameState::Failed(a), FrameState::Failed(b))
+            | (FrameState::Waiting(a), FrameState::Waiting(b)) => a.receipt == b.receipt,
             (a, b) => a == b,
         };
         same_state && self.script == other.script && self.version == other.version && self.part == other.part
@@ -424,6 +436,7 @@ struct FrameLine {
 enum Word {
     Pending,
     Done,
+    Waiting,
     Failed,
 }
 
@@ -433,6 +446,7 @@ impl From<Frame> for FrameLine {
         let (state, pixels, receipt, reason) = match state {
             FrameState::Pending => (Word::Pending, None, None, None),
             FrameState::Done { pixels } => (Word::Done, Some(pixels), None, None),
+            FrameState::Waiting(fault) => (Word::Waiting, None, Some(fault.receipt), fault.reason),
             FrameState::Failed(fault) => (Word::Failed, None, Some(fault.receipt), fault.reason),
         };
         FrameLine { script, version, part, state, pixels, receipt, reason }
@@ -441,13 +455,12 @@ impl From<Frame> for FrameLine {
 
 impl From<FrameLine> for Frame {
     fn from(line: FrameLine) -> Self {
+        let fault = Fault { receipt: line.receipt.unwrap_or_else(|| ETag::new("")), reason: line.reason };
         let state = match line.state {
             Word::Pending => FrameState::Pending,
             Word::Done => FrameState::Done { pixels: line.pixels.unwrap_or(0) },
-            Word::Failed => FrameState::Failed(Fault {
-                receipt: line.receipt.unwrap_or_else(|| ETag::new("")),
-                reason: line.reason,
-            }),
+            Word::Waiting => FrameState::Waiting(fault),
+            Word::Failed => FrameState::Failed(fault),
         };
         Frame { script: line.script, version: line.version, part: line.part, state }
     }
@@ -456,6 +469,11 @@ impl From<FrameLine> for Frame {
 /// The number of a part, for frames counted from 1.
 pub fn part(number: u64) -> Part {
     NonZeroU64::new(number)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_none(number: &u64) -> bool {
+    *number == 0
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]

@@ -8,9 +8,9 @@ use futures_util::future::try_join;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
 use crate::invocation::{Invocation, Known};
-use crate::keys::{Animation, Key, Part, Receipt, ScriptName, Tag, Uploaded};
-use crate::manifest::{Fault, FrameState, MAX_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings};
-use crate::reconcile::{MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
+use crate::keys::{Animation, Key, NameHash, Part, Receipt, ScriptName, Tag, Uploaded, VersionHash};
+use crate::manifest::{Fault, FrameState, MAX_SETTINGS_BYTES, Manifest, Reason, Rejected, Settings, Status};
+use crate::reconcile::{FileFound, MARK_EVERY, ReceiptFound, Results, ScriptFound, Scripts, reconcile};
 use crate::store::{ETag, ListPage, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
@@ -57,14 +57,17 @@ impl Receipts {
 }
 
 impl Observation {
-    /// When the newest script was uploaded.
+    /// When the newest script, or file beside it, was uploaded.
     pub(crate) fn newest_script(&self) -> Option<Timestamp> {
-        self.scripts.found.iter().map(|script| script.modified).max()
+        let scripts = self.scripts.found.iter().map(|script| script.modified);
+        scripts.chain(self.scripts.files.values().map(|file| file.modified)).max()
     }
 
     /// Whether nothing is uploaded, neither scripts nor settings.
     pub(crate) fn is_of_nothing(&self) -> bool {
-        self.scripts == Scripts::default() && self.manifest.head.settings == Settings::absent()
+        let Scripts { found, rejected, warnings, files: _ } = &self.scripts;
+        let is_empty = found.is_empty() && rejected.is_empty() && warnings.is_empty();
+        is_empty && self.manifest.head.settings == Settings::absent()
     }
 }
 
@@ -107,12 +110,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         &self,
         animation: &Animation,
         known: Option<&Known>,
-        (scripts, settings): (Scripts, Option<ETag>),
+        (mut scripts, settings): (Scripts, Option<ETag>),
         receipts: Receipts,
     ) -> Result<Option<Observation>> {
         let settings = self.settings(animation, settings, known).await?;
         let Receipts { found, has_parts, has_lease, has_sweep_lease } = receipts;
         let mut results = Results { receipts: found };
+        scripts.resolve(&results.receipts);
         if !has_parts {
             self.add_parts(animation, &scripts, &mut results).await?;
         }
@@ -122,7 +126,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(has_reasons.then_some(Observation { scripts, results, manifest, has_lease, has_sweep_lease }))
     }
 
-    /// The versions of the scripts on the first page of a listing.
+    /// The entity tags of the scripts on the first page of a listing.
     pub(crate) async fn scripts_on_a_page(&self, animation: &Animation) -> Result<Vec<(ScriptName, ETag)>> {
         let page = self.list(ListRequest::level(animation.scripts())).await?;
         let script = |listed: Listed| match Uploaded::of(&listed.key, listed.size) {
@@ -130,6 +134,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             _ => None,
         };
         Ok(page.objects.into_iter().filter_map(script).collect())
+    }
+
+    /// The receipts right below the animation's folder.
+    pub(crate) async fn list_results(&self, animation: &Animation) -> Result<Vec<ReceiptFound>> {
+        self.list_receipts(animation, &[]).await.map(|receipts| receipts.found)
     }
 
     /// The receipts if a page shows them all, also those of parts if `has_parts`.
@@ -162,6 +171,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 }
                 Uploaded::NearMiss(_, problem) => {
                     warnings.push(Rejected { key: listed.key, problem: problem.to_owned() });
+                }
+                Uploaded::File(_, name) => {
+                    let (version, modified) = (VersionHash::of(&listed.etag), listed.modified);
+                    scripts.files.insert(NameHash::of(&name), FileFound { version, modified });
                 }
                 Uploaded::Misplaced(_) | Uploaded::Nothing => {}
             }
@@ -264,7 +277,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             | Receipt::Begun { part, .. }
             | Receipt::Cut { part, .. }
             | Receipt::Band { part, .. } => part.is_some(),
-            Receipt::Split { .. } | Receipt::Refusal { .. } => false,
+            Receipt::Split { .. }
+            | Receipt::Files { .. }
+            | Receipt::Waits { .. }
+            | Receipt::Refusal { .. } => false,
         }));
         Ok(())
     }
@@ -301,7 +317,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         known: Option<&Known>,
         manifest: &mut Manifest,
     ) -> Result<bool> {
-        let faulty = manifest.head.failed > 0 || manifest.head.refusal.is_some();
+        let head = &manifest.head;
+        let faulty = head.failed + head.waiting > 0 || head.refusal.is_some();
         if !faulty {
             return Ok(true);
         }
@@ -310,13 +327,19 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         for fault in faults_mut(manifest) {
             fault.reason = reasons.get(&fault.receipt).map(|reason| (*reason).clone());
         }
-        if !manifest.head.is_terminal() {
+        let is_for_files = manifest.head.status == Status::Waiting && manifest.head.waiting > 0;
+        if !manifest.head.is_terminal() && !is_for_files {
             return Ok(true);
         }
         let keys: BTreeMap<&ETag, String> = results
             .receipts
             .iter()
-            .filter(|found| matches!(found.receipt, Receipt::Fault { .. } | Receipt::Refusal { .. }))
+            .filter(|found| {
+                matches!(
+                    found.receipt,
+                    Receipt::Fault { .. } | Receipt::Waits { .. } | Receipt::Refusal { .. }
+                )
+            })
             .map(|found| (&found.etag, animation.receipt(&found.receipt)))
             .collect();
         let mut missing: Vec<ETag> = faults_mut(manifest)
@@ -366,7 +389,7 @@ fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
 
 fn faults(manifest: &Manifest) -> impl Iterator<Item = (&ETag, &Reason)> {
     let frames = manifest.frames.iter().filter_map(|frame| match &frame.state {
-        FrameState::Failed(fault) => Some(fault),
+        FrameState::Failed(fault) | FrameState::Waiting(fault) => Some(fault),
         _ => None,
     });
     frames.chain(&manifest.head.refusal).filter_map(|fault| Some((&fault.receipt, fault.reason.as_ref()?)))
@@ -374,19 +397,22 @@ fn faults(manifest: &Manifest) -> impl Iterator<Item = (&ETag, &Reason)> {
 
 fn faults_mut(manifest: &mut Manifest) -> impl Iterator<Item = &mut Fault> {
     let frames = manifest.frames.iter_mut().filter_map(|frame| match &mut frame.state {
-        FrameState::Failed(fault) => Some(fault),
+        FrameState::Failed(fault) | FrameState::Waiting(fault) => Some(fault),
         _ => None,
     });
     frames.chain(&mut manifest.head.refusal)
 }
 
-/// Returns whether it is a result of a script's version, or of a part of it.
+/// Returns whether it is a result of a script, or of a part of it, with any files. An invocation that leaves for a frame
+/// to come needs more than that the version has no result: another version's may be the one that was to come.
 pub(crate) fn is_result_of(found: &ReceiptFound, script: &ScriptName, version: &ETag, part: Part) -> bool {
     match &found.receipt {
         Receipt::Frame { name, tag, part: of } | Receipt::Fault { name, tag, part: of } => {
-            (name, &tag.version, *of) == (script, version, part)
+            (name, tag.version.script(), *of) == (script, version.script(), part)
         }
-        Receipt::Split { name, tag, .. } => part.is_none() && (name, &tag.version) == (script, version),
+        Receipt::Split { name, tag, .. } | Receipt::Waits { name, tag } => {
+            part.is_none() && (name, tag.version.script()) == (script, version.script())
+        }
         _ => false,
     }
 }
@@ -401,6 +427,7 @@ pub(crate) fn version_result(receipts: &[ReceiptFound], part: Part) -> Option<Ve
             }
             Receipt::Frame { tag, part: of, .. } if *of == part => VersionResult::Drawn(tag.pixels),
             Receipt::Fault { part: of, .. } if *of == part => VersionResult::Faulty(found.etag.clone()),
+            Receipt::Waits { .. } if part.is_none() => VersionResult::Waits(found.etag.clone()),
             _ => continue,
         };
         standing = standing.max(Some(next));
@@ -411,6 +438,8 @@ pub(crate) fn version_result(receipts: &[ReceiptFound], part: Part) -> Option<Ve
 /// The result of a script's version; a later variant overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum VersionResult {
+    /// The version waits for files, as this receipt says.
+    Waits(ETag),
     /// The version has an error receipt.
     Faulty(ETag),
     /// A frame of this pixel version.
@@ -434,7 +463,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         part: Part,
     ) -> Result<bool> {
         let has_receipt = async {
-            let receipts = self.receipts_of(animation, name, version, part).await?;
+            let receipts = match part {
+                None => {
+                    let script = ETag::new(version.script());
+                    self.receipts_of_all_versions(animation, name, &script).await?
+                }
+                Some(_) => self.receipts_of(animation, name, version, part).await?,
+            };
             Ok(version_result(&receipts, part).is_some())
         };
         if part.is_none() {
@@ -448,6 +483,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let level = Listing::read(level, None, |request| self.list(request));
         let (has_receipt, level) = try_join(has_receipt, level).await?;
         Ok(has_receipt || level.prefixes.iter().any(|folder| *folder != own))
+    }
+
+    /// Returns the receipts of all versions of a script with this entity tag, whatever its files: one request, unless it
+    /// is cut into very many bands.
+    pub(crate) async fn receipts_of_all_versions(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        script: &ETag,
+    ) -> Result<Vec<ReceiptFound>> {
+        let prefix = format!("{}{}", animation.frames(), Tag::receipts_of_script(name, script));
+        let listed = self.list_ranges(ListRequest::level(prefix), Vec::new()).await?;
+        let receipts = listed.into_iter().filter_map(|listed| receipt(animation, listed));
+        Ok(receipts.filter(|found| found.receipt.is_of_script(name, script)).collect())
     }
 
     /// Returns the receipts of a script's version, or of a part of it: one request, unless it is cut

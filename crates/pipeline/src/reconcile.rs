@@ -9,7 +9,7 @@ use std::num::NonZeroU64;
 use sha2::{Digest, Sha256};
 
 use crate::Timestamp;
-use crate::keys::{Animation, Generation, Part, Receipt, ScriptName};
+use crate::keys::{Animation, Generation, NameHash, Part, Receipt, ScriptName, VersionHash};
 use crate::manifest::{Fault, Frame, FrameState, Head, Manifest, Rejected, SCHEMA, Settings, Status};
 use crate::store::ETag;
 
@@ -28,6 +28,8 @@ pub struct Scripts {
     pub rejected: Vec<Rejected>,
     /// Objects that are not read because of their names.
     pub warnings: Vec<Rejected>,
+    /// Files that scripts may name.
+    pub files: BTreeMap<NameHash, FileFound>,
 }
 
 /// A script in a listing.
@@ -35,8 +37,18 @@ pub struct Scripts {
 pub struct ScriptFound {
     /// The name of the script within its animation.
     pub name: ScriptName,
-    /// The entity tag of the script.
+    /// The entity tag of the script; of one that names files, with the hash of a set of files behind it if the set
+    /// agrees with the listing.
     pub version: ETag,
+    /// When it was uploaded.
+    pub modified: Timestamp,
+}
+
+/// A file in a listing of a folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileFound {
+    /// A hash of its entity tag.
+    pub version: VersionHash,
     /// When it was uploaded.
     pub modified: Timestamp,
 }
@@ -71,6 +83,7 @@ struct Resolution<'a> {
 struct Outcome<'a> {
     pixels: Option<u32>,
     fault: Option<(u32, &'a ETag)>,
+    waits: Option<&'a ETag>,
 }
 
 /// Folds the listings of an animation into its manifest, with revision 0 and no writer. The invocation that
@@ -109,6 +122,7 @@ pub fn reconcile(
     let count = |wanted: fn(&FrameState) -> bool| frames.iter().filter(|f| wanted(&f.state)).count() as u64;
     let (total, done) = (frames.len() as u64, count(|state| matches!(state, FrameState::Done { .. })));
     let pending = count(|state| matches!(state, FrameState::Pending));
+    let waiting = count(|state| matches!(state, FrameState::Waiting(_)));
     let failed = count(|state| matches!(state, FrameState::Failed(_)));
     let generation = generation(&frames, settings);
     let refusal = results.receipts.iter().find_map(|found| match &found.receipt {
@@ -124,6 +138,8 @@ pub fn reconcile(
         Status::Waiting
     } else if pending > 0 {
         Status::Rendering
+    } else if waiting > 0 {
+        Status::Waiting
     } else if failed > 0 || settings.value.is_none() || !scripts.rejected.is_empty() {
         Status::Failed
     } else if refusal.is_some() {
@@ -142,6 +158,7 @@ pub fn reconcile(
         total,
         done,
         pending,
+        waiting,
         failed,
         settings: settings.clone(),
         rejected: scripts.rejected.clone(),
@@ -160,7 +177,9 @@ impl Outcome<'_> {
         match (self.pixels, self.fault) {
             (Some(pixels), _) => FrameState::Done { pixels },
             (None, Some((_, etag))) => FrameState::Failed(Fault { receipt: etag.clone(), reason: None }),
-            (None, None) => FrameState::Pending,
+            (None, None) => self.waits.map_or(FrameState::Pending, |etag| {
+                FrameState::Waiting(Fault { receipt: etag.clone(), reason: None })
+            }),
         }
     }
 }
@@ -181,7 +200,15 @@ fn resolve(results: &Results) -> BTreeMap<(&ScriptName, &ETag), Resolution<'_>> 
                 let outcome = resolutions.entry((name, &tag.version)).or_default().outcome(*part);
                 outcome.fault = outcome.fault.max(Some((tag.pixels, etag)));
             }
-            Receipt::Begun { .. } | Receipt::Cut { .. } | Receipt::Band { .. } | Receipt::Refusal { .. } => {}
+            Receipt::Waits { name, tag } => {
+                let outcome = &mut resolutions.entry((name, &tag.version)).or_default().whole;
+                outcome.waits = outcome.waits.max(Some(etag));
+            }
+            Receipt::Begun { .. }
+            | Receipt::Cut { .. }
+            | Receipt::Band { .. }
+            | Receipt::Files { .. }
+            | Receipt::Refusal { .. } => {}
         }
     }
     resolutions
@@ -219,6 +246,7 @@ fn generation(frames: &[Frame], settings: &Settings) -> Generation {
         match &frame.state {
             FrameState::Pending => field(b"pending"),
             FrameState::Done { pixels } => field(&pixels.to_le_bytes()),
+            FrameState::Waiting(_) => field(b"waiting"),
             FrameState::Failed(_) => field(b"failed"),
         }
     }

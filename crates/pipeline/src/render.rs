@@ -20,14 +20,17 @@ use crate::invocation::{Invocation, ManifestPrefix};
 use crate::keys::{Animation, Band, Key, Part, Receipt, ScriptName, Tag, Uploaded};
 use crate::manifest::{Fact, Reason};
 use crate::observe::{VersionResult, version_result};
+use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, ListRequest, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
 pub(crate) mod bands;
+mod source;
 
 use bands::{Bands, Woken};
 
 pub use bands::BandJoiner;
+pub use source::{File, Files, Source};
 
 /// A renderer of scripts. The render function brings a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
@@ -37,6 +40,30 @@ pub trait Renderer: Send + Sync {
     /// Returns the largest size of a script in bytes. Of a larger script only these bytes and one more are read.
     fn most_bytes(&self) -> u64;
 
+    /// Returns the largest size of a file in bytes. Of a larger file only these bytes and one more are read.
+    fn most_file_bytes(&self) -> u64;
+
+    /// Returns the names of files that the drawing of a script reads and that are not among `files`, where an absent file is
+    /// `None`. It is asked again with those until none is missing.
+    ///
+    /// # Errors
+    ///
+    /// Errors after which another attempt may succeed.
+    fn missing(
+        &self,
+        name: &ScriptName,
+        script: Bytes,
+        files: Files,
+    ) -> impl Future<Output = Result<Vec<String>>> + Send;
+
+    /// Returns a file that was read before, by its key. It may have changed since.
+    fn kept(&self, _key: &str) -> Option<File> {
+        None
+    }
+
+    /// Keeps a file, so that the next drawing need not read it.
+    fn keep(&self, _key: &str, _file: &File) {}
+
     /// Draws the script's one frame (`part` is `None`) or one of several, or says that it is too big: that drawing it takes
     /// most of the time that is `left`, or more memory than there is.
     ///
@@ -44,13 +71,7 @@ pub trait Renderer: Send + Sync {
     ///
     /// [`Error::OutOfTime`] when it was stopped before the deadline. A fault of the script is no
     /// error but a [`Drawing::Fault`].
-    fn draw(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        left: Option<Duration>,
-    ) -> impl Future<Output = Result<Drawing>> + Send;
+    fn draw(&self, source: Source, left: Option<Duration>) -> impl Future<Output = Result<Drawing>> + Send;
 
     /// Draws a band of a frame that was found too big, as a file that [`BandJoiner`] reads; the reason if that cannot be done.
     ///
@@ -59,9 +80,7 @@ pub trait Renderer: Send + Sync {
     /// [`Error::OutOfTime`] when it was stopped before the deadline.
     fn draw_band(
         &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
+        source: Source,
         band: Band,
     ) -> impl Future<Output = Result<Result<Bytes, Reason>>> + Send;
 
@@ -72,9 +91,7 @@ pub trait Renderer: Send + Sync {
     /// Errors after which another attempt may succeed.
     fn join(
         &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
+        source: Source,
         count: NonZeroU64,
     ) -> impl Future<Output = Result<Result<Self::BandJoiner, Reason>>> + Send;
 }
@@ -88,6 +105,8 @@ pub enum Drawing {
     Split(NonZeroU64),
     /// The frame is too big for one invocation: it is to be drawn in this many bands, two or more.
     Cut(NonZeroU64),
+    /// There is no frame before files come that the script names; only when no part was asked for.
+    Waits(Reason),
     /// There is no frame and never will be.
     Fault(Reason),
 }
@@ -97,7 +116,7 @@ pub enum Drawing {
 pub struct Rendered {
     /// The animation of the script.
     pub animation: Animation,
-    /// The script; `None` for an event of `animation.json` or of a file that is not read.
+    /// The script; `None` for an event of `animation.json` or of a file that is no script.
     pub script: Option<ScriptName>,
     /// The result of the event.
     pub outcome: Outcome,
@@ -128,8 +147,14 @@ pub enum Outcome {
     Cut(NonZeroU64),
     /// This band of the frame is there; others are to come.
     Band(Band),
+    /// The script gives no frame before files come that it names, as the receipt now says.
+    Waits(Reason),
     /// The script gives no frame, as the receipt now says.
     Faulty(Reason),
+    /// The event was about a file that a script names; the scripts that are to be drawn with it were woken.
+    File,
+    /// The event was about a file that no script names.
+    NoFile,
     /// Nothing was drawn: the animation has more frames than it may have.
     TooMany,
 }
@@ -158,8 +183,12 @@ pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
     renderer: &R,
     key: &str,
 ) -> Result<Rendered> {
-    if let Uploaded::NearMiss(animation, problem) = Uploaded::of(key, 0) {
-        return invocation.follow_near_miss(animation, problem).await;
+    match Uploaded::of(key, 0) {
+        Uploaded::NearMiss(animation, problem) => {
+            return invocation.follow_near_miss(animation, problem).await;
+        }
+        Uploaded::File(animation, name) => return invocation.follow_file(animation, &name).await,
+        _ => {}
     }
     match key.parse()? {
         Key::Settings { animation } => invocation.follow_settings(animation).await,
@@ -184,12 +213,21 @@ pub(crate) struct Subject {
     pub(crate) retry: Option<(NonZeroU64, ETag)>,
 }
 
-/// A script as it is now.
+/// A script as it is now, with its files.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Script {
     pub(crate) version: ETag,
     pub(crate) uploaded: Timestamp,
     pub(crate) body: Bytes,
+    pub(crate) files: Files,
+}
+
+impl Script {
+    /// Returns the inputs for drawing a frame.
+    pub(crate) fn source(&self, subject: &Subject) -> Source {
+        let (script, files) = (self.body.clone(), self.files.clone());
+        Source { name: subject.name.clone(), script, files, part: subject.part }
+    }
 }
 
 /// The work that a script as it is now asks for.
@@ -221,6 +259,9 @@ impl Subject {
                 let woken = Some(Woken { band, pixels: tag.pixels, attempt });
                 Some(Subject { animation, name, part, woken, only: Some(tag.version), retry: None })
             }
+            Key::Wake { animation, name, .. } => {
+                Some(Subject { animation, name, part: None, woken: None, only: None, retry: None })
+            }
             Key::Settings { .. }
             | Key::Receipt { .. }
             | Key::Lease { .. }
@@ -238,10 +279,11 @@ impl Subject {
         let Some(Object { info, body }) = script else {
             return Due::Nothing(Outcome::Gone, Fact::Absent(name()));
         };
-        if self.only.as_ref().is_some_and(|only| *only != info.etag) {
+        if self.only.as_ref().is_some_and(|only| only.script() != info.etag.as_str()) {
             return Due::Nothing(Outcome::Superseded, Fact::Version(name(), info.etag));
         }
-        Due::Version(Script { version: info.etag, uploaded: info.modified, body })
+        let files = Files::default();
+        Due::Version(Script { version: info.etag, uploaded: info.modified, body, files })
     }
 }
 
@@ -249,7 +291,7 @@ impl Outcome {
     /// Returns the age of the fact that the outcome stands for.
     fn age(&self) -> Age {
         match self {
-            Outcome::Drawn | Outcome::Split(_) | Outcome::Faulty(_) => Age::New,
+            Outcome::Drawn | Outcome::Split(_) | Outcome::Waits(_) | Outcome::Faulty(_) => Age::New,
             Outcome::Gone
             | Outcome::Settings
             | Outcome::NearMiss(_)
@@ -257,6 +299,8 @@ impl Outcome {
             | Outcome::Present
             | Outcome::Cut(_)
             | Outcome::Band(_)
+            | Outcome::File
+            | Outcome::NoFile
             | Outcome::TooMany => Age::Old,
         }
     }
@@ -281,6 +325,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Rendered { animation, script: None, outcome: Outcome::NearMiss(problem), folded, stages })
     }
 
+    /// Wakes the scripts that are to be drawn again because a file has come, changed or gone.
+    async fn follow_file(&self, animation: Animation, name: &str) -> Result<Rendered> {
+        let start = self.clock.now();
+        let is_named = self.wake_for_file(&animation, name).await?;
+        let read = self.clock.now();
+        let (outcome, folded) = match is_named {
+            true => (Outcome::File, self.fold(&animation, &Fact::Fold, Age::Old).await?),
+            false => (Outcome::NoFile, Folded::Untouched),
+        };
+        let stages =
+            Stages { read: read.since(start), fold: self.clock.now().since(read), ..Stages::default() };
+        Ok(Rendered { animation, script: None, outcome, folded, stages })
+    }
+
     async fn render<R: Renderer>(&self, renderer: &R, subject: Subject) -> Result<Rendered> {
         let mut stages = Stages::default();
         let start = self.clock.now();
@@ -289,22 +347,26 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let (outcome, fact) = match subject.due(script) {
             Due::Nothing(outcome, fact) => (outcome, Some(fact)),
             Due::Version(script) => {
-                let Subject { animation, name, part, .. } = &subject;
-                let receipts = self.receipts_of(animation, name, &script.version, *part).await?;
-                match version_result(&receipts, *part) {
-                    Some(VersionResult::Split { tag, count }) => {
-                        stages.read = self.clock.now().since(start);
-                        return self.follow_split(subject, tag, count, script.uploaded, stages).await;
-                    }
-                    Some(standing) => {
-                        (Outcome::Present, Some(standing.fact(name.clone(), script.version, *part)))
-                    }
-                    None if self.has_too_many(animation).await? => {
-                        (Outcome::TooMany, Some(Fact::Version(name.clone(), script.version)))
-                    }
-                    None => {
-                        let bands = Bands::of(&receipts, *part, self.policy.pixels);
-                        self.work_on(renderer, &subject, script, bands, &mut stages).await?
+                let (animation, name, part) = (&subject.animation, &subject.name, &subject.part);
+                let (script, receipts) = self.with_files(renderer, &subject, script).await?;
+                if subject.only.as_ref().is_some_and(|only| *only != script.version) {
+                    (Outcome::Superseded, Some(Fact::Version(name.clone(), script.version)))
+                } else {
+                    match version_result(&receipts, *part) {
+                        Some(VersionResult::Split { tag, count }) => {
+                            stages.read = self.clock.now().since(start);
+                            return self.follow_split(subject, tag, count, script.uploaded, stages).await;
+                        }
+                        Some(standing) => {
+                            (Outcome::Present, Some(standing.fact(name.clone(), script.version, *part)))
+                        }
+                        None if self.has_too_many(animation).await? => {
+                            (Outcome::TooMany, Some(Fact::Version(name.clone(), script.version)))
+                        }
+                        None => {
+                            let bands = Bands::of(&receipts, *part, self.policy.pixels);
+                            self.work_on(renderer, &subject, script, bands, &mut stages).await?
+                        }
                     }
                 }
             }
@@ -317,6 +379,44 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         };
         stages.fold = self.clock.now().since(before_fold);
         Ok(Rendered { animation: subject.animation, script: Some(subject.name), outcome, folded, stages })
+    }
+
+    /// Gives a script the version that it has with its files, and returns the receipts of that version. The files are read
+    /// only if there is no result.
+    async fn with_files<R: Renderer>(
+        &self,
+        renderer: &R,
+        subject: &Subject,
+        mut script: Script,
+    ) -> Result<(Script, Vec<ReceiptFound>)> {
+        let Subject { animation, name, part, only, .. } = subject;
+        let of_version = |mut receipts: Vec<ReceiptFound>, version: &ETag| {
+            receipts.retain(|found| found.receipt.is_of(name, version));
+            receipts
+        };
+        let etag = script.version.clone();
+        let (mut receipts, agreed) = match only {
+            Some(only) => {
+                let receipts = self.receipts_of(animation, name, only, *part).await?;
+                (receipts, Some(only.clone()))
+            }
+            None => {
+                let receipts = self.receipts_of_all_versions(animation, name, &etag).await?;
+                let agreed = self.agreed_version(animation, name, &etag, &receipts).await?;
+                (receipts, agreed)
+            }
+        };
+        let version = agreed.clone().unwrap_or_else(|| etag.clone());
+        let of_agreed = of_version(receipts.clone(), &version);
+        if version_result(&of_agreed, *part).is_some() || only.is_some() && !version.has_files() {
+            script.version = version;
+            return Ok((script, of_agreed));
+        }
+        let (read, files) =
+            self.read_files(renderer, animation, name, &etag, &script.body, agreed.as_ref()).await?;
+        (script.version, script.files) = (read, files);
+        receipts = of_version(receipts, &script.version);
+        Ok((script, receipts))
     }
 
     /// Whether the manifest says that the animation has more frames than it may have.
@@ -359,7 +459,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             self.put_begun(subject, &script.version, *attempt).await?;
         }
         let before = self.clock.now();
-        let drawing = self.draw(renderer, &subject.name, script.body, subject.part).await?;
+        let drawing = self.draw(renderer, script.source(subject)).await?;
         let drawn = self.clock.now();
         stages.draw = drawn.since(before);
         let put = self.put_drawing(subject, script.version, script.uploaded, drawing).await?;
@@ -380,14 +480,9 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_receipt(&animation.receipt(&begun), Bytes::new(), "text/plain").await.map(drop)
     }
 
-    async fn draw<R: Renderer>(
-        &self,
-        renderer: &R,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-    ) -> Result<Drawing> {
-        let drawing = renderer.draw(name, script, part, self.time_to_draw());
+    async fn draw<R: Renderer>(&self, renderer: &R, source: Source) -> Result<Drawing> {
+        let name = source.name.clone();
+        let drawing = renderer.draw(source, self.time_to_draw());
         self.in_time(drawing, || format!("{name} is not drawn")).await
     }
 
@@ -448,7 +543,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 self.cut(subject, &tag, count).await?;
                 (Outcome::Cut(count), Fact::Version(name, version))
             }
-            Drawing::Fault(reason) => return self.put_drawing_fault(subject, version, &tag, reason).await,
+            Drawing::Waits(reason) if part.is_none() => {
+                let key = animation.receipt(&Receipt::Waits { name: name.clone(), tag });
+                let put = self.put_receipt(&key, reason_body(&key, &reason)?, "application/json").await?;
+                let fact = put.map_or(Fact::Fold, |receipt| Fact::Faulty(name, version, None, receipt));
+                (Outcome::Waits(reason), fact)
+            }
+            Drawing::Waits(reason) | Drawing::Fault(reason) => {
+                return self.put_drawing_fault(subject, version, &tag, reason).await;
+            }
         })
     }
 
@@ -478,9 +581,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<Option<ETag>> {
         let receipt = Receipt::Fault { name: name.clone(), tag: tag.clone(), part };
         let key = animation.receipt(&receipt);
-        let body = serde_json::to_vec(reason)
-            .map_err(|source| Error::Malformed { key: key.clone(), source: source.into() })?;
-        self.put_receipt(&key, body.into(), "application/json").await
+        self.put_receipt(&key, reason_body(&key, reason)?, "application/json").await
     }
 
     /// Wakes an invocation for each part. Parts that have been put since the script was uploaded have had their event;
@@ -555,6 +656,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
+fn reason_body(key: &str, reason: &Reason) -> Result<Bytes> {
+    let malformed =
+        |source: serde_json::Error| Error::Malformed { key: key.to_owned(), source: source.into() };
+    serde_json::to_vec(reason).map(Bytes::from).map_err(malformed)
+}
+
 /// The object that wakes an invocation for a part.
 fn part_object(
     animation: &Animation,
@@ -574,7 +681,9 @@ impl VersionResult {
         match self {
             VersionResult::Split { .. } => Fact::Split(name, version),
             VersionResult::Drawn(pixels) => Fact::Drawn(name, version, part, pixels),
-            VersionResult::Faulty(receipt) => Fact::Faulty(name, version, part, receipt),
+            VersionResult::Faulty(receipt) | VersionResult::Waits(receipt) => {
+                Fact::Faulty(name, version, part, receipt)
+            }
         }
     }
 }

@@ -67,6 +67,7 @@ impl Page {
             Receipt::Frame { name, tag, part } | Receipt::Fault { name, tag, part } => {
                 Some((name, &tag.version, *part))
             }
+            Receipt::Waits { name, tag } => Some((name, &tag.version, None)),
             _ => None,
         });
         results.filter(|result| !shown.contains(result)).count()
@@ -246,7 +247,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(true);
         }
         let script = self.head(&animation.script(&frame.script)).await?;
-        Ok(script.is_some_and(|script| script.etag == frame.version))
+        Ok(script.is_some_and(|script| script.etag.as_str() == frame.version.script()))
     }
 
     /// Returns whether a script other than that of the fact has no result in the page.

@@ -184,8 +184,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         lease: Option<SweepLease>,
         visit: &mut Visit,
     ) -> Result<()> {
-        let pending: Vec<&Frame> =
-            observation.manifest.frames.iter().filter(|frame| frame.state == FrameState::Pending).collect();
+        let frames = || observation.manifest.frames.iter();
+        let pending: Vec<&Frame> = frames().filter(|frame| frame.state == FrameState::Pending).collect();
         let now = self.clock.now();
         let is_stuck = now.since(self.last_progress(observation)) >= self.policy.stuck_after;
         let swept = match lease {
@@ -193,6 +193,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             Some(SweepLease::New | SweepLease::Anothers) | None => None,
         };
         let is_hopeless = observation.manifest.head.excess.is_some();
+        if is_stuck && !is_hopeless {
+            for (frame, fault) in frames().filter_map(|frame| match &frame.state {
+                FrameState::Waiting(fault) => Some((frame, fault)),
+                _ => None,
+            }) {
+                self.give_up_waiting(animation, frame, fault).await?;
+                visit.given_up += 1;
+            }
+        }
         if pending.is_empty() || is_hopeless || !is_stuck && swept.is_none() {
             return Ok(());
         }
@@ -219,6 +228,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             visit.given_up += u64::from(step == Step::GivenUp);
         }
         Ok(())
+    }
+
+    /// Fails a frame whose files have not come.
+    async fn give_up_waiting(&self, animation: &Animation, frame: &Frame, fault: &Fault) -> Result<()> {
+        let unknown = || Reason::new(format!("{}.txt names a file that has not come", frame.script));
+        let reason = fault.reason.clone().unwrap_or_else(unknown);
+        let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
+        self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await.map(drop)
     }
 
     /// Deletes the receipts that say that attempts at these frames have begun.
@@ -281,7 +298,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             |fault: &Fault| fault.reason.as_ref().is_some_and(|reason| reason.message == Reason::UNREADABLE);
         let faults = manifest.frames.iter().filter_map(|frame| match &frame.state {
             FrameState::Failed(fault) if is_unreadable(fault) => Some((Some(frame), fault)),
-            FrameState::Failed(_) | FrameState::Pending | FrameState::Done { .. } => None,
+            FrameState::Failed(_)
+            | FrameState::Waiting(_)
+            | FrameState::Pending
+            | FrameState::Done { .. } => None,
         });
         let refusal = manifest.head.refusal.iter().filter(|fault| is_unreadable(fault));
         let faults: Vec<_> = faults.chain(refusal.map(|fault| (None, fault))).collect();
@@ -337,19 +357,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let current: BTreeMap<&ScriptName, &ETag> =
             observation.scripts.found.iter().map(|script| (&script.name, &script.version)).collect();
         let used = used_pixels(&observation.manifest);
+        // If no set of files agrees with the listing, each may again.
+        let is_current = |name: &ScriptName, version: &ETag| {
+            current
+                .get(name)
+                .is_some_and(|current| *current == version || current.as_str() == version.script())
+        };
         let superseded = |found: &&ReceiptFound| match &found.receipt {
             Receipt::Refusal { generation } => *generation != observation.manifest.head.generation,
-            Receipt::Cut { name, tag, .. } | Receipt::Band { name, tag, .. } => {
-                current.get(name) != Some(&&tag.version)
-            }
-            Receipt::Split { name, tag, .. }
-            | Receipt::Fault { name, tag, .. }
-            | Receipt::Begun { name, tag, .. } => current.get(name) != Some(&&tag.version),
             Receipt::Frame { name, tag, part } => match used.get(&(name, *part)) {
-                _ if current.get(name) != Some(&&tag.version) => true,
+                _ if !is_current(name, &tag.version) => true,
                 Some(used) => tag.pixels < *used,
                 None => false,
             },
+            other => other.subject().is_some_and(|(name, version)| !is_current(name, version)),
         };
         let old = |modified: Timestamp| self.is_old(modified);
         let mut doomed: Vec<Key> = Vec::new();
@@ -377,8 +398,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 if key.animation() != animation {
                     continue;
                 }
-                let is_superseded =
-                    part_of(&key).is_some_and(|(name, version)| current.get(name) != Some(&version));
+                let is_superseded = part_of(&key).is_some_and(|(name, version)| !is_current(name, version));
                 let has_woken = matches!(&key, Key::Band { name, tag, part, .. }
                     if used_up.contains(&(name, &tag.version, *part)));
                 if is_superseded && !old(listed.modified) {
@@ -398,7 +418,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         let gone: BTreeSet<_> = doomed.iter().filter_map(version_of).collect();
         let gone: BTreeSet<_> =
-            gone.into_iter().filter(|(name, version)| current.get(name) != Some(version)).collect();
+            gone.into_iter().filter(|(name, version)| !is_current(name, version)).collect();
         if !gone.is_empty() && !self.may_delete(animation, lease).await? {
             return Ok(());
         }
@@ -427,8 +447,17 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if gone.is_empty() {
             return Ok(());
         }
-        let (scripts, _) = self.list_scripts(animation, &[]).await?;
-        for script in scripts.found.iter().filter(|found| gone.contains(&(&found.name, &found.version))) {
+        let (mut scripts, _) = self.list_scripts(animation, &[]).await?;
+        if gone.iter().any(|(_, version)| version.has_files()) {
+            scripts.resolve(&self.list_results(animation).await?);
+        }
+        // The set that the files agree with again may be among what was deleted.
+        let is_gone = |name: &ScriptName, now: &ETag| {
+            gone.iter().any(|(of, version)| {
+                *of == name && (*version == now || !now.has_files() && version.script() == now.as_str())
+            })
+        };
+        for script in scripts.found.iter().filter(|found| is_gone(&found.name, &found.version)) {
             let tag = Tag { version: script.version.clone(), pixels: self.policy.pixels };
             self.put_retry(animation, &script.name, tag, None, 1).await?;
             visit.woken += 1;
@@ -456,7 +485,9 @@ fn used_pixels(manifest: &Manifest) -> BTreeMap<(&ScriptName, Part), u32> {
 /// The script and version that a part, or a part's receipt, belongs to.
 fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     match key {
-        Key::Part { name, tag, .. } | Key::Band { name, tag, .. } => Some((name, &tag.version)),
+        Key::Part { name, tag, .. } | Key::Band { name, tag, .. } | Key::Wake { name, tag, .. } => {
+            Some((name, &tag.version))
+        }
         Key::Receipt {
             receipt:
                 Receipt::Frame { name, tag, part: Some(_) }
@@ -480,7 +511,9 @@ fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
                 | Receipt::Begun { name, tag, part: None, .. }
                 | Receipt::Cut { name, tag, part: None, .. }
                 | Receipt::Band { name, tag, part: None, .. }
-                | Receipt::Split { name, tag, .. },
+                | Receipt::Split { name, tag, .. }
+                | Receipt::Files { name, tag, .. }
+                | Receipt::Waits { name, tag },
             ..
         } => Some((name, &tag.version)),
         key => part_of(key),
@@ -490,7 +523,8 @@ fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
 /// Returns whether the key says that there is something below a script's version, or below `parts/`, that a listing
 /// of the results does not show.
 fn tells_of_parts(key: &Key) -> bool {
-    matches!(key, Key::Receipt { receipt: Receipt::Split { .. } | Receipt::Cut { .. }, .. })
+    use Receipt::{Cut, Files, Split};
+    matches!(key, Key::Receipt { receipt: Split { .. } | Cut { .. } | Files { .. }, .. })
 }
 
 /// The frame that a cut or a band belongs to.

@@ -5,6 +5,7 @@ mod assemblies;
 mod bands;
 mod builds;
 mod failures;
+mod files;
 mod folds;
 mod observations;
 mod orders;

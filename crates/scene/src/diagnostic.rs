@@ -91,7 +91,9 @@ pub enum Code {
     SquashedImage,
     /// A word in quotes that is malformed, or is no name of a file.
     MalformedQuote,
-    /// A file that a script names and that is absent or cannot be used.
+    /// A file that a script names and that is absent.
+    AbsentFile,
+    /// A file that a script names and that cannot be used.
     UnusableFile,
     /// A part of a file that is not drawn as its author may expect.
     UnusedPart,

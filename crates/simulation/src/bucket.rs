@@ -162,6 +162,8 @@ pub(super) struct SimEnvironment {
     pub(super) set_back: Mutex<Option<String>>,
     /// The seed by which some frames are too big for one invocation, if any are.
     pub(super) big: Mutex<Option<u64>>,
+    /// The seed by which some scripts name files, if any do.
+    pub(super) files: Mutex<Option<u64>>,
     /// The objects that users have overwritten or deleted, with their keys.
     pub(super) past: Mutex<Vec<(String, Option<String>)>>,
     /// A write took effect after its sender was killed.
@@ -195,6 +197,7 @@ impl SimEnvironment {
             gifs: Mutex::default(),
             set_back: Mutex::default(),
             big: Mutex::default(),
+            files: Mutex::default(),
             past: Mutex::default(),
             late_writes: AtomicU64::new(0),
             seen: Mutex::default(),

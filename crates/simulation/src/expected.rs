@@ -5,9 +5,9 @@ use std::num::NonZeroU64;
 
 use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 
-use rayfold_pipeline::fakes::{Play, film, picture};
+use rayfold_pipeline::fakes::{Play, drawn_text, film, picture};
 use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
-use rayfold_pipeline::manifest::{FrameState, Head, Manifest, Status};
+use rayfold_pipeline::manifest::{Frame, FrameState, Head, Manifest, Status};
 use rayfold_pipeline::store::{Bucket, ETag, Object};
 
 /// The state that an animation must have reached.
@@ -24,6 +24,8 @@ struct Shot {
     part: Part,
     /// `None` when it cannot be drawn.
     picture: Option<String>,
+    /// Whether a file that it names is absent.
+    waits: bool,
 }
 
 impl Expected {
@@ -49,13 +51,20 @@ impl Expected {
         });
         let mut frames = Vec::new();
         for (script, version, body) in scripts {
+            let file = |name: &str| {
+                let key = format!("{}{name}", animation.scripts());
+                bucket.get(&key).ok().map(|object| object.body.to_vec())
+            };
+            let text = drawn_text(&body, file);
             let shot = |part: Part, is_drawn: bool| Shot {
                 script: script.clone(),
                 version: version.clone(),
                 part,
-                picture: is_drawn.then(|| picture(&script, &body, part)),
+                picture: text.as_ref().ok().filter(|_| is_drawn).map(|text| picture(&script, text, part)),
+                waits: false,
             };
             match Play::of(&body) {
+                _ if text.is_err() => frames.push(Shot { waits: true, ..shot(None, false) }),
                 Play::Frame => frames.push(shot(None, true)),
                 Play::Split(count) => {
                     frames.extend((1..=count.get()).map(|number| shot(NonZeroU64::new(number), true)));
@@ -66,11 +75,15 @@ impl Expected {
         Expected { frames, settings }
     }
 
-    fn status(&self) -> Status {
+    /// Returns the status. A sweep fails the frames whose files have not come for long.
+    fn status(&self, manifest: Option<&Manifest>) -> Status {
+        let waits = manifest.is_some_and(|manifest| manifest.head.waiting > 0);
         let expects = self.settings.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
         if self.frames.is_empty() {
             Status::Empty
         } else if (self.frames.len() as u64) < expects {
+            Status::Waiting
+        } else if waits && self.frames.iter().any(|shot| shot.waits) {
             Status::Waiting
         } else if self.settings.is_none() || self.frames.iter().any(|shot| shot.picture.is_none()) {
             Status::Failed
@@ -94,7 +107,7 @@ impl Expected {
             Ok(object) => Some(Manifest::decode(animation, &object.body).map_err(|error| error.to_string())?),
             Err(_) => None,
         };
-        let status = self.status();
+        let status = self.status(manifest.as_ref());
         let gif = bucket.get(&animation.gif()).ok();
         let Some(manifest) = manifest else {
             return match (self.frames.is_empty(), gif) {
@@ -106,19 +119,32 @@ impl Expected {
             .frames
             .iter()
             .map(|frame| {
-                (&frame.script, &frame.version, frame.part, matches!(frame.state, FrameState::Done { .. }))
+                (
+                    &frame.script,
+                    frame.version.script(),
+                    frame.part,
+                    matches!(frame.state, FrameState::Done { .. }),
+                )
             })
             .collect();
         let wanted: Vec<_> = self
             .frames
             .iter()
-            .map(|shot| (&shot.script, &shot.version, shot.part, shot.picture.is_some()))
+            .map(|shot| (&shot.script, shot.version.as_str(), shot.part, shot.picture.is_some()))
             .collect();
         if listed != wanted {
             return Err(format!("the manifest has the frames {listed:?}, not {wanted:?}"));
         }
         if let Some(frame) = manifest.frames.iter().find(|frame| frame.state == FrameState::Pending) {
             return Err(format!("{} is pending for ever", frame.script));
+        }
+        let waits = |frame: &Frame| {
+            self.frames.iter().any(|shot| (&shot.script, shot.waits) == (&frame.script, true))
+        };
+        let mut waiting =
+            manifest.frames.iter().filter(|frame| matches!(frame.state, FrameState::Waiting(_)));
+        if let Some(frame) = waiting.find(|frame| !waits(frame)) {
+            return Err(format!("{} waits for what is there", frame.script));
         }
         if manifest.head.status != status {
             return Err(format!("the manifest is {:?}, not {status:?}", manifest.head.status));

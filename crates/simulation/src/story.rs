@@ -14,7 +14,7 @@ use super::timed::Pace;
 use super::{PIXELS, Run, Shared};
 use rayfold_pipeline::assemble::generation_of;
 use rayfold_pipeline::fakes::{BIG, GARBLED};
-use rayfold_pipeline::keys::{Animation, Key};
+use rayfold_pipeline::keys::{Animation, Key, Uploaded};
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::{Bucket, Object, PutOptions};
 use rayfold_pipeline::sweep::Visit;
@@ -34,6 +34,8 @@ const STRANGERS: u64 = 0x0067_6172_626c_6572;
 
 /// Sets apart which frames are too big from the rest of a story.
 const BIG_FRAMES: u64 = 0x0062_6967;
+/// Sets apart which scripts name files, and the acts on these, from the rest of a story.
+const FILES: u64 = 0x0066_696c_6573;
 /// Sets apart how little time the assembler has.
 const HURRY: u64 = 0x0068_7572_7279;
 
@@ -49,6 +51,9 @@ const SMALL_PART: usize = 32;
 /// Scripts of the stories: their natural order is not their byte order, and one name looks like a receipt's.
 const NAMES: [&str; 4] = ["2", "10", "1", "3@0-p1"];
 
+/// Files of the stories.
+const FILE_NAMES: [&str; 2] = ["f", "g"];
+
 /// Lives through one seed, and writes it down if asked to.
 pub(super) fn run(
     seed: u64,
@@ -56,7 +61,12 @@ pub(super) fn run(
     log: Option<&mut Vec<String>>,
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
+    let files = Randomness::seeded(seed ^ FILES);
     let judge = begin(&random, &Randomness::seeded(seed ^ HURRY), mutation, log.is_some())?;
+    if files.one_in(3) {
+        *lock(&judge.env.files) = Some(files.bits());
+        write_acts_on_files(&files, &judge.env, &judge.animation);
+    }
     let lots = Randomness::seeded(seed ^ BIG_FRAMES);
     if lots.one_in(3) {
         *lock(&judge.env.big) = Some(lots.bits());
@@ -218,6 +228,27 @@ fn write_story(
     }
 }
 
+/// Writes the acts on files and their times. Some come before the scripts that name them, some never.
+fn write_acts_on_files(random: &Randomness, env: &Arc<SimEnvironment>, animation: &Animation) {
+    let span_ms = [50, 500, 4_000, 20_000][pick(random, 4)];
+    for _ in 0..1 + random.below(7) {
+        let delay = Duration::from_millis(random.below(span_ms));
+        let name = FILE_NAMES[pick(random, FILE_NAMES.len())];
+        let text = match random.below(8) {
+            0 => None,
+            1 | 2 => Some(format!("also {}", FILE_NAMES[pick(random, FILE_NAMES.len())])),
+            number => Some(["red", "blue"][number as usize % 2].to_owned()),
+        };
+        let key = format!("{}{name}", animation.scripts());
+        act(env, delay, key.clone(), text.clone());
+        if random.one_in(3) {
+            // A quick change back, or again.
+            let later = delay + Duration::from_millis(random.below(400));
+            act(env, later, key, Some("red".to_owned()));
+        }
+    }
+}
+
 /// A user who changes a script at the worst moment, mostly back to its earlier text.
 fn awkward_user(random: &Randomness, env: &Arc<SimEnvironment>) -> Arc<dyn Fn(Moment) + Send + Sync> {
     let random = Randomness::seeded(random.bits());
@@ -278,7 +309,7 @@ fn content(random: &Randomness) -> String {
 fn act(env: &Arc<SimEnvironment>, delay: Duration, key: String, text: Option<String>) {
     let world = env.clone();
     env.engine.after(delay, move || {
-        let text = text.map(|text| perhaps_big(&world, &key, text));
+        let text = text.map(|text| perhaps_big(&world, &key, perhaps_with(&world, &key, text)));
         let now = WorldClock::exact(&world.engine).now();
         let there = text.is_some();
         let before = lock(&world.bucket).get(&key).ok();
@@ -294,6 +325,19 @@ fn act(env: &Arc<SimEnvironment>, delay: Duration, key: String, text: Option<Str
             notify(Actor::User, &key, there, &lock(&world.bucket));
         }
     });
+}
+
+/// In a world with files half of the texts of scripts name some, always the same ones.
+fn perhaps_with(world: &SimEnvironment, key: &str, text: String) -> String {
+    let Some(lot) = *lock(&world.files) else { return text };
+    let is_plain = !text.starts_with("with ") && !text.starts_with(BIG);
+    let number = text.bytes().fold(lot, |number, byte| number.wrapping_mul(31) ^ u64::from(byte));
+    let lots = Randomness::seeded(number);
+    if key.ends_with(".txt") && is_plain && lots.one_in(2) {
+        let names = ["f", "g", "f,g"][pick(&lots, 3)];
+        return format!("with {names} {text}");
+    }
+    text
 }
 
 /// In a world with big frames half of the texts of scripts have some, always the same ones.
@@ -323,6 +367,9 @@ impl Watch {
     fn check(&mut self, actor: Actor, key: &str, there: bool, bucket: &Bucket) -> Result<(), String> {
         if actor != Actor::User && key.starts_with("scripts/") {
             return Err(format!("{actor:?} wrote {key}"));
+        }
+        if actor == Actor::User && matches!(Uploaded::of(key, 1), Uploaded::File(..)) {
+            return Ok(());
         }
         let Ok(parsed) = key.parse::<Key>() else {
             return Err(format!("{actor:?} wrote {key}, which is no key"));

@@ -11,9 +11,9 @@ use super::bucket::{Fate, SimEnvironment};
 use super::engine::Engine;
 use rayfold_pipeline::Result;
 use rayfold_pipeline::fakes::{GARBLED, InstantRenderer, Listed, Paste, Play, is_big};
-use rayfold_pipeline::keys::{Band, Part, ScriptName};
+use rayfold_pipeline::keys::{Band, ScriptName};
 use rayfold_pipeline::manifest::Reason;
-use rayfold_pipeline::render::{Drawing, Renderer};
+use rayfold_pipeline::render::{Drawing, Files, Renderer, Source};
 use rayfold_pipeline::{Animator, Encoding, Unfit};
 
 /// Draws in simulated time.
@@ -44,15 +44,17 @@ impl Renderer for TimedRenderer {
         InstantRenderer { bands: NonZeroU64::MIN }.most_bytes()
     }
 
-    async fn draw(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        time: Option<Duration>,
-    ) -> Result<Drawing> {
+    fn most_file_bytes(&self) -> u64 {
+        InstantRenderer { bands: NonZeroU64::MIN }.most_file_bytes()
+    }
+
+    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        InstantRenderer { bands: NonZeroU64::MIN }.missing(name, script, files).await
+    }
+
+    async fn draw(&self, source: Source, time: Option<Duration>) -> Result<Drawing> {
         self.take_time().await;
-        match Play::of(&script) {
+        match Play::of(&source.script) {
             Play::Hang => std::future::pending().await,
             Play::Crash => {
                 let (fate, die) = (self.fate.clone(), self.die.clone());
@@ -62,31 +64,17 @@ impl Renderer for TimedRenderer {
                 });
                 std::future::pending().await
             }
-            Play::Frame | Play::Split(_) | Play::Bad => {
-                self.drawer(&script).draw(name, script, part, time).await
-            }
+            Play::Frame | Play::Split(_) | Play::Bad => self.drawer(&source.script).draw(source, time).await,
         }
     }
 
-    async fn draw_band(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        band: Band,
-    ) -> Result<Result<Bytes, Reason>> {
+    async fn draw_band(&self, source: Source, band: Band) -> Result<Result<Bytes, Reason>> {
         self.take_time().await;
-        self.drawer(&script).draw_band(name, script, part, band).await
+        self.drawer(&source.script).draw_band(source, band).await
     }
 
-    async fn join(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        bands: NonZeroU64,
-    ) -> Result<Result<Paste, Reason>> {
-        self.drawer(&script).join(name, script, part, bands).await
+    async fn join(&self, source: Source, bands: NonZeroU64) -> Result<Result<Paste, Reason>> {
+        self.drawer(&source.script).join(source, bands).await
     }
 }
 

@@ -9,16 +9,14 @@ use crate::wording::number;
 /// `48 of 50 frames, 2 failed`.
 pub(crate) fn count(manifest: &Manifest) -> String {
     let head = &manifest.head;
-    let mut text = format!("{} of {}", head.done, number(head.total + missing_scripts(manifest), "frame"));
+    let mut text = format!("{} of {}", head.done, number(head.total + head.not_uploaded(), "frame"));
     if head.failed > 0 {
         text += &format!(", {} failed", head.failed);
     }
+    if head.waiting > 0 {
+        text += &format!(", {} waiting for files", head.waiting);
+    }
     text
-}
-
-/// Frames of scripts that have not been uploaded yet.
-fn missing_scripts(manifest: &Manifest) -> u64 {
-    manifest.head.missing() - manifest.head.pending
 }
 
 /// Shows everything that keeps the animation from being done, and the files that are not read because of their names.

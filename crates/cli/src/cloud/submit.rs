@@ -145,7 +145,6 @@ impl Order {
             Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
         };
         plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
-        must_name_no_files()?;
         let submission = submission(&input, &plan, &animation, console)?;
         Ok(Self { animation, submission, output })
     }
@@ -166,16 +165,6 @@ impl Order {
         }
         fetch::gif(client, &self.animation, &self.output, bucket, console).await
     }
-}
-
-/// Files beside scripts are not read in a bucket yet.
-fn must_name_no_files() -> anyhow::Result<()> {
-    let Some(file) = named_by_scripts().into_iter().next() else { return Ok(()) };
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    anyhow::bail!(
-        "nothing was uploaded: the scripts name files, such as `{name}`, which are not read in a bucket yet; rayfold render \
-         draws them on this machine"
-    )
 }
 
 fn name_of(folder: &Path) -> anyhow::Result<Animation> {
@@ -212,7 +201,13 @@ fn submission(
     };
     let scripts = scripts.into_par_iter().map(|(name, path)| Ok((name, File::new(Content::Path(path))?)));
     let scripts: Vec<(ScriptName, File)> = scripts.collect::<rayfold_client::Result<_>>()?;
-    Ok(Submission::new(animation.clone(), scripts, settings)?)
+    // What a model refers to may be absent.
+    let files = named_by_scripts().into_iter().filter(|path| path.is_file()).map(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok((name, File::new(Content::Path(path))?))
+    });
+    let files: Vec<(String, File)> = files.collect::<rayfold_client::Result<_>>()?;
+    Ok(Submission::new(animation.clone(), scripts, settings)?.with_files(files)?)
 }
 
 /// Shows the uploads and deletions that a submission would make, a line a file.
@@ -279,7 +274,7 @@ async fn send(
                 .note(format_args!("{} that the folder does not have: deleted", number(scripts, "script")));
         }
         Sending::Uploading { done, total } => {
-            let bar = progress.get_or_insert_with(|| Progress::start(console, "scripts uploaded", total));
+            let bar = progress.get_or_insert_with(|| Progress::start(console, "files uploaded", total));
             bar.set(console, done);
         }
         Sending::Finished { uploaded, unchanged } => match progress.take() {
@@ -288,7 +283,7 @@ async fn send(
                 let took = progress.finish().as_secs_f64();
                 console.note(format_args!(
                     "{folder}: {} uploaded in {took:.2} s, {unchanged} unchanged",
-                    number(uploaded, "script")
+                    number(uploaded, "file")
                 ));
             }
         },

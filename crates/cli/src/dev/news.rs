@@ -140,6 +140,13 @@ fn state(manifest: &Manifest) -> String {
     match head.status {
         Status::Empty => format!("{name}: no scripts"),
         Status::Waiting => {
+            let mut waits = manifest.frames.iter().filter_map(|frame| match &frame.state {
+                FrameState::Waiting(fault) => fault.reason.as_ref(),
+                _ => None,
+            });
+            if let Some(reason) = waits.next() {
+                return format!("{name}: waiting ({done} of {total}): {}", reason.message);
+            }
             let wanted = head.settings.value.as_ref().and_then(|settings| settings.frames());
             format!("{name}: waiting ({done} of {})", wanted.unwrap_or(total))
         }

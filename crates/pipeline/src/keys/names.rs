@@ -2,6 +2,7 @@
 //! still have a meaning.
 
 use rayfold_scene::Name;
+use rayfold_scene::assets::file_name;
 
 use super::{Animation, Key, SCRIPTS, ScriptName};
 use crate::{Error, Result};
@@ -20,7 +21,9 @@ pub enum Uploaded {
     NearMiss(Animation, &'static str),
     /// An object that belongs to no animation although it is meant as a part of one.
     Misplaced(&'static str),
-    /// An object without meaning: a leftover of a system in a folder, or a file that is no script.
+    /// An object in an animation's folder that its scripts may name.
+    File(Animation, String),
+    /// An object without meaning: a leftover of a system in a folder.
     Nothing,
 }
 
@@ -37,7 +40,13 @@ impl Uploaded {
         let Some(path) = key.strip_prefix(SCRIPTS) else { return Self::Nothing };
         let animation = || Animation::new(path.rsplit_once('/').map_or("", |(folder, _)| folder));
         match Name::below_scripts(path, bytes) {
-            Name::Ignored | Name::Other => Self::Nothing,
+            Name::Ignored => Self::Nothing,
+            Name::Other => match (animation(), path.rsplit_once('/')) {
+                (Ok(animation), Some((_, name))) if file_name(name).is_ok() => {
+                    Self::File(animation, name.to_owned())
+                }
+                _ => Self::Nothing,
+            },
             Name::Misplaced(problem) => match animation() {
                 // A backslash in the name alone: the folder is an animation's.
                 Ok(animation) if !animation.as_str().contains('\\') => Self::NearMiss(animation, problem),
@@ -62,7 +71,8 @@ impl Uploaded {
             | Self::Settings(animation)
             | Self::Rejected(animation, _)
             | Self::NearMiss(animation, _) => Some(animation),
-            Self::Misplaced(_) | Self::Nothing => None,
+            // A folder without scripts is no animation.
+            Self::File(..) | Self::Misplaced(_) | Self::Nothing => None,
         }
     }
 }

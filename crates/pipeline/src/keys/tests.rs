@@ -36,7 +36,12 @@ fn every_kind_of_key_reads_back() {
         "parts/films/ä+b/00 1@x@d41d8cd9-2-p3/12.json",
         Key::Part { animation: a(), name: name.clone(), tag: t(), number },
     );
+    check(
+        "parts/films/ä+b/00 1@x@d41d8cd9-2-p3/files.json",
+        Key::Wake { animation: a(), name: name.clone(), tag: t() },
+    );
     for (text, receipt) in [
+        ("00 1@x@d41d8cd9-2-p3.waits.json", Receipt::Waits { name: name.clone(), tag: t() }),
         ("00 1@x@d41d8cd9-2-p3.png", Receipt::Frame { name: name.clone(), tag: t(), part: None }),
         ("00 1@x@d41d8cd9-2-p3/12.png", Receipt::Frame { name: name.clone(), tag: t(), part: Some(number) }),
         ("00 1@x@d41d8cd9-2-p3.error.json", Receipt::Fault { name: name.clone(), tag: t(), part: None }),

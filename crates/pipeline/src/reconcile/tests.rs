@@ -46,6 +46,7 @@ fn said(manifest: &Manifest) -> String {
         let state = match &frame.state {
             FrameState::Pending => "pending".to_owned(),
             FrameState::Done { pixels } => format!("p{pixels}"),
+            FrameState::Waiting(fault) => format!("waits by {}", fault.receipt),
             FrameState::Failed(fault) => format!("failed by {}", fault.receipt),
         };
         text += &format!(", {}{part} {} {state}", frame.script, frame.version);
@@ -81,6 +82,25 @@ fn a_version_resolves_to_a_split_a_frame_or_an_error_in_this_order() {
     check("1.txt a\n1@a-p1.error.json\n1@a-p1.png", "", "done, 1 a p1");
     let all = "1.txt a\n1@a-p1.error.json\n1@a-p1.png\n1@a-p1.split-2";
     check(all, "", "rendering, 1/1 a pending, 1/2 a pending");
+}
+
+/// A frame that waits is no failure, and one that came after all beats the receipt that says so.
+#[test]
+fn a_frame_that_waits_for_files_counts_as_neither_failed_nor_pending() {
+    let waits = "1.txt a\n1@a-p1.waits.json\n2.txt b\n";
+    check(waits, "", "rendering, 1 a waits by 1@a-p1.waits.json, 2 b pending");
+    check(&format!("{waits}2@b-p1.png"), "", "waiting, 1 a waits by 1@a-p1.waits.json, 2 b p1");
+    check(
+        &format!("{waits}2@b-p1.error.json"),
+        "",
+        "waiting, 1 a waits by 1@a-p1.waits.json, 2 b failed by 2@b-p1.error.json",
+    );
+    check(&format!("{waits}2@b-p1.png\n1@a-p1.png"), "", "done, 1 a p1, 2 b p1");
+    check(
+        &format!("{waits}2@b-p1.png\n1@a-p1.error.json"),
+        "",
+        "failed, 1 a failed by 1@a-p1.error.json, 2 b p1",
+    );
 }
 
 #[test]

@@ -183,8 +183,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stages: &mut Stages,
     ) -> Result<Result<Bytes, Reason>> {
         let before = self.clock.now();
-        let (name, body) = (&subject.name, script.body.clone());
-        let drawing = renderer.draw_band(name, body, subject.part, band);
+        let name = &subject.name;
+        let drawing = renderer.draw_band(script.source(subject), band);
         let drawn = self.in_time(drawing, || format!("band {band} of {name} is not drawn")).await;
         stages.draw += self.clock.now().since(before);
         drawn
@@ -227,7 +227,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<Result<Bytes, Reason>> {
         let Subject { animation, name, part, .. } = subject;
         let late = || format!("{name} is not put together");
-        let mut joining = match renderer.join(name, script.body.clone(), *part, count).await? {
+        let mut joining = match renderer.join(script.source(subject), count).await? {
             Ok(joining) => joining,
             Err(reason) => return Ok(Err(reason)),
         };

@@ -522,7 +522,7 @@ async fn a_finisher_looks_at_one_frame_where_there_is_more_than_a_page() {
     let looks = [
         "get manifests/film.json".to_owned(),
         "list frames/film/".to_owned(),
-        format!("list frames/film/3@{version}-p"),
+        format!("list frames/film/3@{version}"),
         "head scripts/film/3.txt".to_owned(),
     ];
     assert_eq!(requests[3..], looks);

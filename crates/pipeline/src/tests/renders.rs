@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::fakes::Paste;
-use crate::keys::{Band, Part};
-use crate::render::{Drawing, Renderer, Stages};
+use crate::keys::Band;
+use crate::render::{Drawing, Files, Renderer, Source, Stages};
 use crate::retry::Retried;
 
 const SCRIPT: &str = "scripts/film/1.txt";
@@ -38,37 +38,27 @@ impl Renderer for Painter {
         DRAWER.most_bytes()
     }
 
-    async fn draw(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        left: Option<Duration>,
-    ) -> Result<Drawing> {
+    fn most_file_bytes(&self) -> u64 {
+        DRAWER.most_file_bytes()
+    }
+
+    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        DRAWER.missing(name, script, files).await
+    }
+
+    async fn draw(&self, source: Source, left: Option<Duration>) -> Result<Drawing> {
         self.limits.lock().unwrap().push(left);
         self.take_time().await;
-        DRAWER.draw(name, script, part, left).await
+        DRAWER.draw(source, left).await
     }
 
-    async fn draw_band(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        band: Band,
-    ) -> Result<Result<Bytes, Reason>> {
+    async fn draw_band(&self, source: Source, band: Band) -> Result<Result<Bytes, Reason>> {
         self.take_time().await;
-        DRAWER.draw_band(name, script, part, band).await
+        DRAWER.draw_band(source, band).await
     }
 
-    async fn join(
-        &self,
-        name: &ScriptName,
-        script: Bytes,
-        part: Part,
-        count: NonZeroU64,
-    ) -> Result<Result<Paste, Reason>> {
-        DRAWER.join(name, script, part, count).await
+    async fn join(&self, source: Source, count: NonZeroU64) -> Result<Result<Paste, Reason>> {
+        DRAWER.join(source, count).await
     }
 }
 

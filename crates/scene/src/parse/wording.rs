@@ -690,7 +690,11 @@ pub(super) fn no_file_name(fault: NameFault) -> Fault {
 }
 
 pub(super) fn unusable_file(error: &AssetError) -> Fault {
-    let fault = Fault::new(Code::UnusableFile, error.to_string());
+    let code = match error {
+        AssetError::Absent { .. } => Code::AbsentFile,
+        _ => Code::UnusableFile,
+    };
+    let fault = Fault::new(code, error.to_string());
     match error.help() {
         Some(help) => fault.help(help),
         None => fault,

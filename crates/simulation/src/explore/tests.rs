@@ -94,6 +94,12 @@ fn leaving_for_a_frame_that_is_there_is_noticed() {
     notices(Mutation::LeaveForAnyFrame, "two frames, announced last", 20_000);
 }
 
+/// A file that changes while it is read has an event that finds no set of it.
+#[test]
+fn a_file_that_is_not_looked_at_again_is_noticed() {
+    notices(Mutation::FilesNotLookedAtAgain, "a file after its script", 20_000);
+}
+
 /// The GIF of an assembler that was killed landed on that of its successor, which knew newer scripts.
 #[test]
 fn unconditional_gifs_are_noticed() {

@@ -40,7 +40,15 @@ const B: Option<&str> = Some("frame 1");
 const C: Option<&str> = Some("frame 2");
 /// One frame that is drawn in bands.
 const BIG: Option<&str> = Some("big frame 0");
-/// The script is deleted.
+/// A script that names a file.
+const WITH_F: Option<&str> = Some("with f frame 0");
+/// The file.
+const RED: Option<&str> = Some("red");
+/// The file with another content.
+const BLUE: Option<&str> = Some("blue");
+/// A file that refers to another one.
+const ALSO_G: Option<&str> = Some("also g");
+/// The object is deleted.
 const GONE: Option<&str> = None;
 
 fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<&'static str>)]) -> World {
@@ -96,7 +104,34 @@ pub fn worlds() -> Vec<World> {
     let announced_last = [("1.txt", A), ("2.txt", A), ("animation.json", Some("{\"frames\": 2}"))];
     let returning_early = [("1.txt", A), ("2.txt", A), ("2.txt", B), ("2.txt", A)];
     let deleted_early = [("1.txt", A), ("2.txt", A), ("3.txt", A), ("3.txt", GONE)];
+    let file = [("f", RED), ("1.txt", WITH_F)];
+    let file_late = [("1.txt", WITH_F), ("f", RED)];
+    let file_changed = [("f", RED), ("1.txt", WITH_F), ("f", BLUE)];
+    let file_to_and_fro = [("f", RED), ("1.txt", WITH_F), ("f", BLUE), ("f", RED)];
+    let file_gone = [("f", RED), ("1.txt", WITH_F), ("f", GONE)];
+    let file_back = [("f", RED), ("1.txt", WITH_F), ("f", GONE), ("f", RED)];
+    let referred = [("f", ALSO_G), ("1.txt", WITH_F), ("g", RED)];
+    let two_with_file = [("1.txt", WITH_F), ("2.txt", WITH_F), ("f", RED)];
+    let file_and_script = [("f", RED), ("1.txt", WITH_F), ("f", BLUE), ("1.txt", A)];
     vec![
+        world("a file before its script", 0, CALM, &file),
+        world("a file before its script, a kill", 0, kill, &file),
+        world("a file before its script, an event twice", 0, twice, &file),
+        world("a file after its script", 0, CALM, &file_late),
+        world("a file after its script, a kill", 0, kill, &file_late),
+        world("a file after its script, a lost answer", 0, loss, &file_late),
+        world("a file after its script, an event lost", 0, lost, &file_late),
+        world("a file, changed", 1, CALM, &file_changed),
+        world("a file, changed when all is done, a kill", 2, kill, &file_changed),
+        world("a file, changed when all is done, a late write", 2, late, &file_changed),
+        world("a file, changed and changed back when all is done", 2, CALM, &file_to_and_fro),
+        world("a file, changed and changed back when all is done, a kill", 2, kill, &file_to_and_fro),
+        world("a file, deleted when all is done", 2, CALM, &file_gone),
+        world("a file, deleted and uploaded again when all is done", 2, CALM, &file_back),
+        world("a file that refers to another one", 0, CALM, &referred),
+        world("two scripts that name a file", 2, CALM, &two_with_file),
+        world("two scripts that name a file, at once", 0, CALM, &two_with_file),
+        world("a file and then its script, changed", 2, CALM, &file_and_script),
         world("one frame, a kill", 0, kill, &one),
         world("one frame, a kill and a late write", 0, late, &one),
         world("one frame, a lost answer", 0, loss, &one),
@@ -162,7 +197,9 @@ pub fn worlds() -> Vec<World> {
 
 /// Returns the worlds in which few schedules show much, which suit [`super::provoke`] best.
 pub fn provoking() -> Vec<World> {
-    const NAMES: [&str; 12] = [
+    const NAMES: [&str; 14] = [
+        "a file after its script",
+        "a file, changed and changed back when all is done",
         "one frame, a kill",
         "one frame, an event twice",
         "one frame, deleted when done, a lost answer",

@@ -165,7 +165,7 @@ pub(crate) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
         summary.status = head.status.to_string();
         (summary.done, summary.failed) = (head.done, head.failed);
         // Frames of scripts that have not been uploaded yet are awaited, too.
-        summary.total = head.total + head.missing() - head.pending;
+        summary.total = head.total + head.not_uploaded();
     }
     summary
 }
@@ -179,7 +179,7 @@ pub(crate) fn faults(manifest: &Manifest) -> (Vec<FaultInfo>, usize) {
         .map(|rejected| FaultInfo::of_nothing_drawn(rejected.key.clone(), rejected.problem.clone()))
         .collect();
     let failed = manifest.frames.iter().filter_map(|frame| match &frame.state {
-        FrameState::Failed(fault) => Some((frame, fault.reason.as_ref())),
+        FrameState::Failed(fault) | FrameState::Waiting(fault) => Some((frame, fault.reason.as_ref())),
         FrameState::Pending | FrameState::Done { .. } => None,
     });
     let mut failed: std::collections::VecDeque<_> = failed.collect();
@@ -233,7 +233,7 @@ impl FaultInfo {
 impl FrameUpdate {
     pub(crate) fn of(frame: &Frame) -> Self {
         let (state, pixels) = match frame.state {
-            FrameState::Pending => (FrameStatus::Pending, None),
+            FrameState::Pending | FrameState::Waiting(_) => (FrameStatus::Pending, None),
             FrameState::Done { pixels } => (FrameStatus::Done, Some(pixels)),
             FrameState::Failed(_) => (FrameStatus::Failed, None),
         };

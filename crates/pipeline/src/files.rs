@@ -1,0 +1,349 @@
+//! The files that scripts name, as the protocol sees them.
+//!
+//! A script that names files is drawn from itself and from those files. Its *version* is therefore its entity tag with the
+//! hash of a [`FileSet`] behind it: which files, and which content each of them has, or that it is absent. The receipts
+//! `files-…` of a version spell the set out, so that a listing alone shows which version of a script is current: the one
+//! whose set agrees with the files in the listing. If none agrees, the version is the entity tag alone, and no result
+//! belongs to it: the frame is pending.
+//!
+//! The set is complete: what a model refers to in turn follows from the model's content, and so from its entity tag.
+//!
+//! Invariant: a set is put before any result of its version, and the files are looked at once more after it was put. A
+//! file that changes before that look is seen by it. The event of one that changes later finds the set, and wakes the
+//! script.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroU64;
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use crate::invocation::{Invocation, Mutation};
+use crate::keys::{
+    Animation, Entry, FileList, Key, NameHash, Receipt, ScriptName, Tag, Uploaded, VersionHash,
+};
+use crate::reconcile::{FileFound, ReceiptFound, Scripts};
+use crate::render::{File, Files, Renderer};
+use crate::store::{ETag, Listed, Store};
+use crate::{Clock, Error, Result, Timestamp};
+
+/// The files that a receipt names: with more its key would be too long for some stores.
+const PER_RECEIPT: usize = 4;
+
+/// The most times that files are read because they have changed meanwhile.
+const MAX_READS: u32 = 8;
+
+/// Returns the set that a drawing has read, in the order in which its version hashes it.
+fn set_of(files: &BTreeMap<String, Option<File>>) -> Vec<Entry> {
+    let entry = |(name, file): (&String, &Option<File>)| {
+        (NameHash::of(name), file.as_ref().map(|file| VersionHash::of(&file.version)))
+    };
+    let mut set: Vec<Entry> = files.iter().map(entry).collect();
+    set.sort();
+    set
+}
+
+/// A set as the receipts of a listing show it.
+#[derive(Default)]
+struct SetSeen<'a> {
+    numbers: BTreeSet<NonZeroU64>,
+    of: Option<NonZeroU64>,
+    entries: BTreeSet<&'a Entry>,
+    pixels: u32,
+    modified: Timestamp,
+}
+
+impl SetSeen<'_> {
+    fn is_whole(&self) -> bool {
+        self.of.is_some_and(|of| self.numbers.len() as u64 == of.get())
+    }
+}
+
+/// The sets of files of all scripts' versions that the receipts of a listing show.
+pub(crate) struct FileSets<'a>(BTreeMap<(&'a ScriptName, &'a str), BTreeMap<&'a ETag, SetSeen<'a>>>);
+
+impl<'a> FileSets<'a> {
+    pub(crate) fn of(receipts: &'a [ReceiptFound]) -> Self {
+        let mut sets: BTreeMap<_, BTreeMap<&ETag, SetSeen<'_>>> = BTreeMap::new();
+        for found in receipts {
+            let Receipt::Files { name, tag, list } = &found.receipt else { continue };
+            let of_script = sets.entry((name, tag.version.script())).or_default();
+            let seen = of_script.entry(&tag.version).or_default();
+            seen.numbers.insert(list.number);
+            seen.of = Some(list.of);
+            seen.entries.extend(&list.entries);
+            seen.pixels = seen.pixels.max(tag.pixels);
+            seen.modified = seen.modified.max(found.modified);
+        }
+        FileSets(sets)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether any set has this file.
+    fn names(&self, file: &NameHash) -> bool {
+        self.0.values().flat_map(BTreeMap::values).any(|set| set.entries.iter().any(|(name, _)| name == file))
+    }
+
+    /// Returns the version of a script whose set agrees with the files of a folder. If two renderers have read a
+    /// model differently, it is the newer one's.
+    pub(crate) fn current(
+        &self,
+        name: &ScriptName,
+        script: &ETag,
+        files: &BTreeMap<NameHash, FileFound>,
+    ) -> Option<&'a ETag> {
+        let sets = self.0.get(&(name, script.as_str()))?;
+        let agrees = |set: &SetSeen<'_>| {
+            set.is_whole()
+                && set
+                    .entries
+                    .iter()
+                    .all(|(name, version)| files.get(name).map(|found| &found.version) == version.as_ref())
+        };
+        let current = sets.iter().filter(|(_, set)| agrees(set)).max_by_key(|(_, set)| set.pixels);
+        current.map(|(version, _)| *version)
+    }
+
+    /// Returns the version that a script will most likely have, if one of its sets has this file: that of the files that
+    /// its newest set names, with their contents as they are now.
+    fn expected(
+        &self,
+        name: &ScriptName,
+        script: &ETag,
+        file: &NameHash,
+        files: &BTreeMap<NameHash, FileFound>,
+    ) -> Option<ETag> {
+        let sets = self.0.get(&(name, script.as_str()))?;
+        sets.values().find(|set| set.entries.iter().any(|(name, _)| name == file))?;
+        let newest = sets.values().filter(|set| set.is_whole()).max_by_key(|set| set.modified);
+        let now = |name: &NameHash| files.get(name).map(|found| found.version.clone());
+        let names: BTreeSet<&NameHash> = newest?.entries.iter().map(|(name, _)| name).collect();
+        let set: Vec<Entry> = names.into_iter().map(|name| (name.clone(), now(name))).collect();
+        Some(script.with_files(&set))
+    }
+}
+
+/// Returns the version of each script of an animation, from listings of its scripts and of its receipts.
+pub fn script_versions(
+    animation: &Animation,
+    scripts: &[Listed],
+    receipts: &[Listed],
+) -> BTreeMap<ScriptName, ETag> {
+    let mut files = BTreeMap::new();
+    for listed in scripts {
+        if let Uploaded::File(of, name) = Uploaded::of(&listed.key, listed.size)
+            && of == *animation
+        {
+            let (version, modified) = (VersionHash::of(&listed.etag), listed.modified);
+            files.insert(NameHash::of(&name), FileFound { version, modified });
+        }
+    }
+    let found = |listed: &Listed| match listed.key.parse() {
+        Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {
+            Some(ReceiptFound { receipt, etag: listed.etag.clone(), modified: listed.modified })
+        }
+        _ => None,
+    };
+    let receipts: Vec<ReceiptFound> = receipts.iter().filter_map(found).collect();
+    let sets = FileSets::of(&receipts);
+    let version = |listed: &Listed| match listed.key.parse() {
+        Ok(Key::Script { animation: of, name }) if of == *animation => {
+            let version = sets.current(&name, &listed.etag, &files).unwrap_or(&listed.etag).clone();
+            Some((name, version))
+        }
+        _ => None,
+    };
+    scripts.iter().filter_map(version).collect()
+}
+
+impl Scripts {
+    /// Gives each script that names files the version whose set agrees with the files of the same listing.
+    pub(crate) fn resolve(&mut self, receipts: &[ReceiptFound]) {
+        let sets = FileSets::of(receipts);
+        if sets.is_empty() {
+            return;
+        }
+        for script in &mut self.found {
+            if let Some(version) = sets.current(&script.name, &script.version, &self.files) {
+                script.version = version.clone();
+            }
+        }
+    }
+}
+
+impl<S: Store, C: Clock> Invocation<'_, S, C> {
+    /// Returns the version of a script with this entity tag, by a listing of its receipts and, if it names files, of
+    /// its folder.
+    pub(crate) async fn current_version(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        script: ETag,
+    ) -> Result<ETag> {
+        let receipts = self.receipts_of_all_versions(animation, name, &script).await?;
+        self.agreed_version(animation, name, &script, &receipts)
+            .await
+            .map(|version| version.unwrap_or(script))
+    }
+
+    /// Returns the version whose set of files agrees with the folder, if one does. Without sets nothing is listed.
+    pub(crate) async fn agreed_version(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        script: &ETag,
+        receipts: &[ReceiptFound],
+    ) -> Result<Option<ETag>> {
+        let sets = FileSets::of(receipts);
+        if sets.is_empty() {
+            return Ok(None);
+        }
+        let (scripts, _) = self.list_scripts(animation, &[]).await?;
+        Ok(sets.current(name, script, &scripts.files).cloned())
+    }
+
+    /// Reads the files that a script's drawing needs, and gives it the version that it has with them. If `agreed`
+    /// is a version that a listing has just shown to be current and the files are of it, nothing is written.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Conflict`] if the files change as fast as they are read.
+    pub(crate) async fn read_files<R: Renderer>(
+        &self,
+        renderer: &R,
+        animation: &Animation,
+        name: &ScriptName,
+        script: &ETag,
+        body: &Bytes,
+        agreed: Option<&ETag>,
+    ) -> Result<(ETag, Files)> {
+        let mut may_keep = true;
+        for _ in 0..MAX_READS {
+            let mut files = BTreeMap::new();
+            loop {
+                let missing = renderer.missing(name, body.clone(), Arc::new(files.clone())).await?;
+                if missing.is_empty() {
+                    break;
+                }
+                for file in missing {
+                    let content = self.file(renderer, animation, &file, may_keep).await?;
+                    files.insert(file, content);
+                }
+            }
+            if files.is_empty() {
+                return Ok((script.clone(), Files::default()));
+            }
+            let set = set_of(&files);
+            let version = script.with_files(&set);
+            if agreed == Some(&version) {
+                return Ok((version, Arc::new(files)));
+            }
+            self.put_set(animation, name, &version, &set).await?;
+            if self.are_current(animation, &files).await? {
+                return Ok((version, Arc::new(files)));
+            }
+            may_keep = false;
+        }
+        Err(Error::Conflict { key: animation.script(name) })
+    }
+
+    async fn file<R: Renderer>(
+        &self,
+        renderer: &R,
+        animation: &Animation,
+        name: &str,
+        may_keep: bool,
+    ) -> Result<Option<File>> {
+        let key = animation.file(name);
+        if let Some(kept) = renderer.kept(&key).filter(|_| may_keep) {
+            return Ok(Some(kept));
+        }
+        let object = self.get_start(&key, renderer.most_file_bytes()).await?;
+        let file = object.map(|object| File { version: object.info.etag, body: object.body });
+        if let Some(file) = &file {
+            renderer.keep(&key, file);
+        }
+        Ok(file)
+    }
+
+    async fn put_set(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+        set: &[Entry],
+    ) -> Result<()> {
+        let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let of = set.len().div_ceil(PER_RECEIPT) as u64;
+        for (entries, number) in set.chunks(PER_RECEIPT).zip(1..) {
+            let (Some(number), Some(of)) = (NonZeroU64::new(number), NonZeroU64::new(of)) else { continue };
+            let list = FileList { number, of, entries: entries.to_vec() };
+            let receipt = Receipt::Files { name: name.clone(), tag: tag.clone(), list };
+            self.put_receipt(&animation.receipt(&receipt), Bytes::new(), "text/plain").await?;
+        }
+        Ok(())
+    }
+
+    async fn are_current(
+        &self,
+        animation: &Animation,
+        files: &BTreeMap<String, Option<File>>,
+    ) -> Result<bool> {
+        if self.breaks(Mutation::FilesNotLookedAtAgain) {
+            return Ok(true);
+        }
+        for (name, file) in files {
+            let now = self.head(&animation.file(name)).await?.map(|info| info.etag);
+            if now.as_ref() != file.as_ref().map(|file| &file.version) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Wakes the scripts whose files have changed with this one. Returns whether a script names it at all.
+    pub(crate) async fn wake_for_file(&self, animation: &Animation, file: &str) -> Result<bool> {
+        let file = NameHash::of(file);
+        let receipts = self.list_results(animation).await?;
+        let sets = FileSets::of(&receipts);
+        if !sets.names(&file) {
+            return Ok(false);
+        }
+        let (scripts, _) = self.list_scripts(animation, &[]).await?;
+        for script in &scripts.found {
+            if sets.current(&script.name, &script.version, &scripts.files).is_some() {
+                continue;
+            }
+            let expected = sets.expected(&script.name, &script.version, &file, &scripts.files);
+            if let Some(version) = expected {
+                let changed = scripts.files.get(&file).map(|found| found.modified);
+                self.wake_script(animation, &script.name, version, changed).await?;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Wakes a script, unless it was woken for this version since the file was `changed`.
+    async fn wake_script(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: ETag,
+        changed: Option<Timestamp>,
+    ) -> Result<()> {
+        let tag = Tag { version, pixels: self.policy.pixels };
+        let key = Key::Wake { animation: animation.clone(), name: name.clone(), tag }.to_string();
+        let body: Bytes = serde_json::json!({ "woken_by": self.request_id() }).to_string().into();
+        if self.put_receipt(&key, body.clone(), "application/json").await?.is_some() {
+            return Ok(());
+        }
+        let woken = self.head(&key).await?.map(|info| info.modified);
+        if woken.is_none() || changed.is_none() || woken <= changed {
+            self.put(&key, body).await?;
+        }
+        Ok(())
+    }
+}
