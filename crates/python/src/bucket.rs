@@ -13,7 +13,7 @@ use pyo3::exceptions::{PyFileExistsError, PyOSError, PyRuntimeError, PyUserWarni
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rayfold_client::{
-    Client, Ended, Error, File, Obstacle, Sending, Submission, Submitted, Waiting, address, obstacles,
+    Client, Content, Ended, Error, File, Obstacle, Sending, Submission, Submitted, Waiting, address, obstacles,
 };
 use rayfold_files::probe;
 use rayfold_pipeline::SystemClock;
@@ -47,7 +47,7 @@ struct Reports {
     failed: RefCell<Option<PyErr>>,
 }
 
-/// Makes the scripts those of an animation in a bucket. `place` is `s3://BUCKET/NAME`. Waits for the GIF if it `is_awaited`,
+/// Makes the scripts, and the files that they name, those of an animation in a bucket. `place` is `s3://BUCKET/NAME`. Waits for the GIF if it `is_awaited`,
 /// and returns its bytes, or writes them to `path`. `report` is called with a kind, the number done and the total.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the properties of a submission, which Python names")]
@@ -55,6 +55,7 @@ pub(crate) fn submit<'py>(
     py: Python<'py>,
     place: &str,
     scripts: Vec<(String, String)>,
+    files: Vec<(String, PathBuf)>,
     settings: String,
     path: Option<PathBuf>,
     delete: bool,
@@ -69,10 +70,20 @@ pub(crate) fn submit<'py>(
     let scripts: Vec<_> = scripts.collect::<Result<_, rayfold_pipeline::Error>>().map_err(value_error)?;
     let submission =
         Submission::new(animation.clone(), scripts, File::of_text(settings)).map_err(value_error)?;
+    let submission = submission.with_files(py.detach(|| read(files))?).map_err(|error| match error {
+        Error::Store(error) => value_error(error),
+        other => PyOSError::new_err(other.to_string()),
+    })?;
     let submission = if delete { submission.deleting_all_others() } else { submission };
     let order = Order { bucket, animation, submission, path, is_awaited };
     let gif = py.detach(|| guarded(|| run(&order, Reports { report, failed: RefCell::default() })))??;
     Ok(gif.map(|gif| PyBytes::new(py, &gif)))
+}
+
+/// Reads the files for their digests.
+fn read(files: Vec<(String, PathBuf)>) -> PyResult<Vec<(String, File)>> {
+    let file = |(name, path)| Ok((name, File::new(Content::Path(path))?));
+    files.into_iter().map(file).collect::<Result<_, Error>>().map_err(|error| PyOSError::new_err(error.to_string()))
 }
 
 /// Takes `s3://BUCKET/NAME` apart.

@@ -72,6 +72,21 @@ def test_the_gif_of_a_bucket_is_the_one_that_is_drawn_here(bucket, tmp_path):
     assert moving.submit(f"{bucket}/wave", progress=False) == expected
 
 
+def test_the_files_that_scenes_name_go_with_them(bucket, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "corner.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+    def of_a_model(t):
+        scene = frame(t)
+        scene.mesh("corner.obj", diffuse=(0.2 + 0.1 * t, 0.5, 0.3))
+        return scene
+
+    moving = rf.animation(of_a_model, frames=3, fps=20)
+    assert moving.submit(f"{bucket}/model", progress=False) == moving.gif(progress=False)
+    (tmp_path / "corner.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert moving.submit(f"{bucket}/model", progress=False) == moving.gif(progress=False)
+
+
 def test_the_command_goes_on_with_what_python_has_sent(bucket, rayfold, tmp_path):
     moving = film(7)
     assert moving.submit(f"{bucket}/sent", wait=False, progress=False) is None

@@ -112,15 +112,17 @@ class Animation:
             if not wait:
                 raise ValueError("submit(): there is no file without waiting: expected either path or wait=False")
         scripts, settings = self._folder(has_one_size=True)
-        named = next((name for _, _, (_, names) in scripts for name in names), None)
-        if named is not None:
-            raise ValueError(
-                f"submit(): the scripts name files, such as {named!r}, which are not read in a bucket yet; save() draws them here"
-            )
         texts = [(name, text) for name, text, _ in scripts]
+        files = {}
+        for folder, names in (named for _, _, named in scripts):
+            for name in names:
+                path = os.path.join(folder, name)
+                # What a model refers to may be absent.
+                if os.path.exists(path) and not os.path.samefile(path, files.setdefault(name, path)):
+                    raise ValueError(f"submit(): {files[name]} and {path} would be one file of the animation: rename one")
         with _Progress(progress) as bar:
             report = bar.at if progress else None
-            return _rayfold.submit(address, texts, settings, path, delete, wait, report)
+            return _rayfold.submit(address, texts, list(files.items()), settings, path, delete, wait, report)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         if self._shown is None:
