@@ -123,7 +123,7 @@ fn read_encoded(
     } else {
         Levels::Bytes(count, read)
     };
-    Ok(Picture { stored: [width, height], levels, orientation, warnings: Vec::new() })
+    Ok(Picture { stored: [width, height], levels, orientation, largest: 1.0, warnings: Vec::new() })
 }
 
 /// Checks the size that a header promises.

@@ -35,7 +35,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     })?;
     let has_colors = |header: &&Header| {
         !header.deep
-            && CHANNELS.iter().all(|name| header.channels.list.iter().any(|channel| channel.name.eq(*name)))
+            && CHANNELS.iter().all(|name| header.channels.list.iter().any(|channel| channel.name.eq(name)))
     };
     let header = meta.headers.iter().find(has_colors);
     let header = header.ok_or_else(|| Fault::new("no part of it has the channels R, G and B"))?;
@@ -45,7 +45,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     let is_whole = |name: &&str| {
         header.channels.list.iter().any(|channel| channel.name.eq(name) && channel.sampling == Vec2(1, 1))
     };
-    if !CHANNELS.iter().all(|name| is_whole(&name)) {
+    if !CHANNELS.iter().all(is_whole) {
         return Err(Fault::new("its R, G and B have fewer values than pixels"));
     }
     match header.compression {
@@ -88,7 +88,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     let warnings = make_light(&mut levels)?;
     let orientation = Orientation::NoTransforms;
     let stored = [width as u32, height as u32];
-    Ok(Picture { stored, levels: Levels::Floats(levels), orientation, warnings })
+    let largest = levels.iter().flatten().fold(1.0, |most: f32, level| most.max(*level)).into();
+    Ok(Picture { stored, levels: Levels::Floats(levels), orientation, largest, warnings })
 }
 
 fn unread(compression: &str) -> Fault {

@@ -3,7 +3,7 @@
 use image::metadata::Orientation;
 
 use super::decode::check_size;
-use super::{Levels, Picture};
+use super::{Levels, Picture, unit};
 use crate::error::Fault;
 
 /// The bytes of the longest header.
@@ -47,7 +47,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     }
     let stored = [width as u32, height as u32];
     let orientation = Orientation::NoTransforms;
-    Ok(Picture { stored, levels: Levels::Shared(levels), orientation, warnings: Vec::new() })
+    let most = levels.iter().map(|[r, g, b, exponent]| f64::from(*r.max(g).max(b)) * unit(*exponent));
+    let largest = most.fold(1.0, f64::max);
+    Ok(Picture { stored, levels: Levels::Shared(levels), orientation, largest, warnings: Vec::new() })
 }
 
 /// Reads the line of the size: `-Y rows +X columns`.

@@ -21,6 +21,8 @@ pub struct Picture {
     stored: [u32; 2],
     levels: Levels,
     orientation: Orientation,
+    /// The largest level.
+    largest: f64,
     warnings: Vec<String>,
 }
 
@@ -80,6 +82,11 @@ impl Picture {
         if alpha == 1.0 { level } else { (1.0 - alpha) + alpha * level }
     }
 
+    /// Returns a bound of all levels, at least 1.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
     /// Returns descriptions of levels that are not taken as they stand.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
@@ -108,10 +115,8 @@ impl Picture {
                 mixed(&levels[count * at..count * (at + 1)], 1.0 / 65535.0, light)
             }
             Levels::Shared(levels) => {
-                let [r, g, b, exponent] = levels[at];
-                // The power of two of the exponent less 136.
-                let unit = f64::from_bits((u64::from(exponent) + 1023 - 136) << 52);
-                (DVec3::new(f64::from(r), f64::from(g), f64::from(b)) * unit, 1.0)
+                let [r, g, b, _] = levels[at].map(f64::from);
+                (DVec3::new(r, g, b) * unit(levels[at][3]), 1.0)
             }
             Levels::Floats(levels) => (DVec3::from_array(levels[at].map(f64::from)), 1.0),
         }
@@ -144,6 +149,11 @@ impl Picture {
         };
         y as usize * width as usize + x as usize
     }
+}
+
+/// Returns the light of 1 in a pixel with a common exponent: the power of two of the exponent less 136.
+fn unit(exponent: u8) -> f64 {
+    f64::from_bits((u64::from(exponent) + 1023 - 136) << 52)
 }
 
 /// Returns colour and alpha of a pixel's 1 to 4 numbers, of which the largest times `unit` is 1. `light` has the linear light
