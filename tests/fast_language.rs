@@ -181,7 +181,7 @@ impl Dice {
             _ => None,
         };
         let pattern = weight.map(|weight| Pattern { weight, other });
-        Material::finished(own, Finish { shine, glass: None, pattern, own: false })
+        Material::finished(own, Finish { shine, glass: None, pattern, image: None, own: false })
     }
 }
 

@@ -44,7 +44,7 @@ fn models_that_no_script_names_are_warnings() {
     folder.write("film/notes.md", "no model");
     let output = folder.rayfold("check film").assert().code(0).get_output().stderr.clone();
     let said = String::from_utf8(output).unwrap();
-    assert!(said.contains("other.stl: no script names this model"), "{said}");
+    assert!(said.contains("other.stl: no script names this file"), "{said}");
     assert!(
         !said.contains("corner.obj") && !said.contains("colours.mtl") && !said.contains("notes"),
         "{said}"
@@ -65,6 +65,38 @@ fn split_copies_the_files() {
     folder.write("parts/corner.obj", "v 0 0 0");
     let output = folder.rayfold("split 1.txt parts").assert().code(1).get_output().stderr.clone();
     assert!(String::from_utf8(output).unwrap().contains("corner.obj holds another file already"));
+}
+
+/// A script with a sky and a picture on a ball.
+const PICTURES: &str = "Screen 8 6\nLook 0 0 5 0 0 0 40\nIlight 1 1 1 -1 -2 -1\nSky \"sky.hdr\" 1 (1:0 2:90)\n\
+    Material m diffuse 1 1 1 image \"my map.png\" ball\nSphere 1 0 0 0 m\nFrames 2\nTrace\n";
+
+/// A picture of light: 4 x 1 pixels, flat.
+const LIGHT: &[u8] = b"#?RADIANCE\n\n-Y 1 +X 4\n\x80\0\0\x80\0\x80\0\x80\0\0\x80\x80\x80\x80\x80\x80";
+
+#[test]
+fn pictures_are_read_copied_and_missed_as_models_are() {
+    let folder = Folder::with("film/1.txt", PICTURES);
+    let said = |code: i32| {
+        let output = folder.rayfold("check film").assert().code(code).get_output().stderr.clone();
+        String::from_utf8(output).unwrap()
+    };
+    assert!(said(1).contains("there is no file `sky.hdr` in the script's folder"));
+    folder.write("film/sky.hdr", LIGHT);
+    assert!(said(1).contains("there is no file `my map.png` in the script's folder"));
+    let map = include_bytes!("../../crates/scene/tests/pixel.png");
+    folder.write("film/my map.png", map);
+    folder.write("film/unused.exr", "no picture");
+    let text = said(0);
+    assert!(text.contains("unused.exr: no script names this file"), "{text}");
+    assert!(!text.contains("sky.hdr") && !text.contains("my map.png"), "{text}");
+    folder.rayfold("render film -o film.gif").assert().code(0);
+    folder.rayfold("split film/1.txt parts").assert().code(0);
+    assert_eq!(folder.list("parts"), ["1-1.txt", "1-2.txt", "my map.png", "sky.hdr"]);
+    folder.rayfold("render parts -o parts.gif").assert().code(0);
+    assert_eq!(folder.read("film.gif"), folder.read("parts.gif"));
+    folder.write("film/sky.hdr", &LIGHT[..20]);
+    assert!(said(1).contains("`sky.hdr`: its header has no end"), "{}", said(1));
 }
 
 #[test]

@@ -45,6 +45,20 @@ pub enum AssetError {
         /// The description of the fault.
         what: String,
     },
+    /// The content of a picture is faulty, or not read.
+    #[error("`{name}`: {what}")]
+    Picture {
+        /// The name of the file.
+        name: String,
+        /// The description of the fault.
+        what: String,
+    },
+    /// The picture is light without bound, where levels from 0 to 1 are wanted.
+    #[error("`{name}` is a picture of light (HDR or EXR), which only a `Sky` takes")]
+    Light {
+        /// The name of the file.
+        name: String,
+    },
     /// The model has no triangle that can be seen.
     #[error("`{name}` has no triangle with an area")]
     NoTriangle {
@@ -81,6 +95,10 @@ impl AssetError {
                 }
                 _ => "export without this extension".into(),
             },
+            Self::Picture { .. } => {
+                "pictures are PNG, JPEG and WebP, those of a `Sky` also HDR and EXR".into()
+            }
+            Self::Light { .. } => "save it as PNG, JPEG or WebP".into(),
             Self::Malformed { .. } | Self::NoTriangle { .. } => {
                 "models are OBJ, PLY, STL, glTF (.gltf) and binary glTF (.glb)".into()
             }

@@ -1,10 +1,10 @@
-//! The files that scripts name, from bytes to models.
+//! The files that scripts name, from bytes to models and pictures.
 //!
 //! Knows no other crate of the project and does no I/O. A caller implements [`Files`], which hands over files as bytes by
-//! name, and asks a [`Library`] for models. The content decides what a file is, not its name.
+//! name, and asks a [`Library`] for models and pictures. The content decides what a file is, not its name.
 //!
 //! Invariants: what a file claims about its size is compared with its bytes and with [`limits`] before memory is spent.
-//! Numbers of a [`Model`] are finite, and its indices in range. Foreign bytes never cause a panic.
+//! Numbers of a [`Model`] and a [`Picture`] are finite, and indices in range. Foreign bytes never cause a panic.
 //!
 //! ```
 //! use rayfold_assets::{Library, MemoryFiles, Smoothing};
@@ -26,6 +26,7 @@ pub mod limits;
 mod model;
 mod normals;
 mod obj;
+mod picture;
 mod ply;
 mod referred;
 mod srgb;
@@ -35,8 +36,9 @@ pub use closure::Closure;
 pub use decode::decode;
 pub use error::AssetError;
 pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, same_but_for_case};
-pub use library::Library;
+pub use library::{Library, Purpose};
 pub use model::{Colors, Look, Model, Smoothing};
+pub use picture::Picture;
 pub use referred::Referred;
 
 /// The example of the README is compiled and run with the tests.

@@ -1,4 +1,4 @@
-//! Models by name, each read and decoded once.
+//! Models and pictures by name, each read and decoded once.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,12 +8,30 @@ use crate::error::AssetError;
 use crate::files::{FileInfo, Files, NoFiles};
 use crate::limits;
 use crate::model::{Model, Smoothing};
+use crate::picture::{self, Picture};
 use crate::referred::{Referred, absent, content};
 
-/// The models of a folder. A model is decoded again only if its files have changed.
+/// The models and pictures of a folder. One is decoded again only if its files have changed.
 pub struct Library {
     files: Box<dyn Files>,
     kept: Mutex<Vec<Kept>>,
+    pictures: Mutex<Vec<KeptPicture>>,
+}
+
+/// The use of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// The levels of a surface, from 0 to 1.
+    Surface,
+    /// The light of a sky, which may be brighter.
+    Sky,
+}
+
+/// A decoded picture, and its file as it was.
+struct KeptPicture {
+    name: String,
+    info: FileInfo,
+    picture: Arc<Picture>,
 }
 
 /// A decoded model, and the files that it was made of.
@@ -35,10 +53,10 @@ struct Source {
 impl Library {
     /// Makes the library of some files.
     pub fn new(files: impl Files + 'static) -> Self {
-        Self { files: Box::new(files), kept: Mutex::default() }
+        Self { files: Box::new(files), kept: Mutex::default(), pictures: Mutex::default() }
     }
 
-    /// Makes a library for callers that read no files: every model is an error that says so.
+    /// Makes a library for callers that read no files: every model and picture is an error that says so.
     pub fn none() -> Self {
         Self::new(NoFiles)
     }
@@ -84,6 +102,34 @@ impl Library {
         Ok(model)
     }
 
+    /// Returns the picture in the file of this name.
+    ///
+    /// # Errors
+    /// If the file is absent, or is no picture for this purpose.
+    pub fn picture(&self, name: &str, purpose: Purpose) -> Result<Arc<Picture>, AssetError> {
+        if !self.files.are_readable() {
+            return Err(AssetError::NotHere { name: name.into() });
+        }
+        let mut kept = self.pictures.lock().unwrap_or_else(PoisonError::into_inner);
+        let info = self.look(name)?;
+        kept.retain(|kept| kept.name != name || Some(kept.info) == info);
+        let info = info.ok_or_else(|| absent(&*self.files, name))?;
+        let known = kept.iter().find(|kept| kept.name == name).map(|kept| kept.picture.clone());
+        let picture = match known {
+            Some(picture) => picture,
+            None => {
+                let picture = Arc::new(picture::decode(name, &content(&*self.files, name)?)?);
+                kept.push(KeptPicture { name: name.into(), info, picture: picture.clone() });
+                picture
+            }
+        };
+        forget_unused(&mut kept);
+        if purpose == Purpose::Surface && picture.is_light() {
+            return Err(AssetError::Light { name: name.into() });
+        }
+        Ok(picture)
+    }
+
     /// Returns the names of the files that a model was made of, or lacks, with their paths in it: after itself those that it
     /// refers to. There are none for a model that was not asked for, or is faulty.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
@@ -121,13 +167,39 @@ impl fmt::Debug for Library {
     }
 }
 
-/// Drops the oldest models that no one uses, until the others are within the bound.
-fn forget_unused(kept: &mut Vec<Kept>) {
-    let mut bytes: usize = kept.iter().map(|kept| kept.model.bytes()).sum();
+/// A thing that is kept while it is used, and a while longer.
+trait Keepable {
+    fn bytes(&self) -> usize;
+    fn is_used(&self) -> bool;
+}
+
+impl Keepable for Kept {
+    fn bytes(&self) -> usize {
+        self.model.bytes()
+    }
+
+    fn is_used(&self) -> bool {
+        Arc::strong_count(&self.model) > 1
+    }
+}
+
+impl Keepable for KeptPicture {
+    fn bytes(&self) -> usize {
+        self.picture.bytes()
+    }
+
+    fn is_used(&self) -> bool {
+        Arc::strong_count(&self.picture) > 1
+    }
+}
+
+/// Drops the oldest things that no one uses, until the others are within the bound.
+fn forget_unused(kept: &mut Vec<impl Keepable>) {
+    let mut bytes: usize = kept.iter().map(Keepable::bytes).sum();
     kept.retain(|kept| {
-        let is_dropped = bytes > limits::KEPT_BYTES && Arc::strong_count(&kept.model) == 1;
+        let is_dropped = bytes > limits::KEPT_BYTES && !kept.is_used();
         if is_dropped {
-            bytes -= kept.model.bytes();
+            bytes -= kept.bytes();
         }
         !is_dropped
     });

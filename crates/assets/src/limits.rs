@@ -12,7 +12,10 @@ pub const TRIANGLES: usize = 10_000_000;
 /// The vertices of a model, which may be three for each triangle.
 pub(crate) const VERTICES: usize = 3 * TRIANGLES;
 
-/// The bytes of decoded models that a [`Library`](crate::Library) keeps although no script uses them.
+/// The pixels of a picture.
+pub const PIXELS: u64 = 1 << 26;
+
+/// The bytes of decoded models, and those of pictures, that a [`Library`](crate::Library) keeps although no script uses them.
 pub(crate) const KEPT_BYTES: usize = 512 << 20;
 
 /// The nodes that the scene of a glTF file may draw.

@@ -134,6 +134,9 @@ impl Model {
         if parts.triangles.is_empty() {
             return Ok(None);
         }
+        if parts.uv_of.iter().flatten().all(|i| *i == NONE) {
+            (parts.uvs, parts.uv_of) = (Vec::new(), Vec::new());
+        }
         let Parts { positions, triangles, normals, normal_of, uvs, uv_of, colors, space, .. } = parts;
         let Parts { mut looks, look_of, warnings, .. } = Parts {
             looks: parts.looks,
@@ -234,6 +237,17 @@ impl Model {
     /// Returns whether any triangle has normals of its own.
     pub fn has_normals(&self) -> bool {
         !self.normal_of.is_empty()
+    }
+
+    /// Returns whether corners have texture coordinates.
+    pub fn has_uvs(&self) -> bool {
+        !self.uv_of.is_empty()
+    }
+
+    /// Returns whether (0, 0) of the texture coordinates is the upper left corner of a picture, as in glTF, and not the
+    /// lower left one.
+    pub fn has_uvs_from_top(&self) -> bool {
+        self.space == Colors::Linear
     }
 
     /// Returns the texture coordinates at the corners of a triangle, as they stand in the file.

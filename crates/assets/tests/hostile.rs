@@ -1,9 +1,13 @@
-//! Foreign bytes: cut off, changed, with huge headers and circles. Each is an error or a model, in little memory.
+//! Foreign bytes: cut off, changed, with huge headers and circles. Each is an error, a model or a picture, in little memory.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::io::Cursor;
+use std::sync::LazyLock;
+
+use exr::prelude::{Compression, Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
 use proptest::prelude::*;
-use rayfold_assets::{Library, MemoryFiles, Smoothing};
+use rayfold_assets::{Library, MemoryFiles, Purpose, Smoothing};
 
 fn error(bytes: impl Into<Vec<u8>>) -> String {
     let library = Library::new(MemoryFiles::from([("x", bytes.into())]));
@@ -110,6 +114,122 @@ fn numbers_that_are_none_are_errors() {
     assert!(
         error(String::from_utf8_lossy(OBJ).replace("v 0 1 0", "v 0 1e999 0")).contains("not a finite number")
     );
+}
+
+/// Looks at all pixels of what may be a picture.
+fn attempt_picture(bytes: &[u8]) {
+    let library = Library::new(MemoryFiles::from([("x", bytes.to_vec())]));
+    let Ok(picture) = library.picture("x", Purpose::Sky) else { return };
+    for y in 0..picture.height().min(50) {
+        for x in 0..picture.width().min(50) {
+            let level = picture.level(x, y, true);
+            assert!(level.is_finite() && level.min_element() >= 0.0, "{level}");
+            assert!(picture.is_light() || picture.factor(x, y, false).max_element() <= 1.0);
+        }
+    }
+}
+
+/// A picture in each format.
+static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+    let colors =
+        image::RgbaImage::from_fn(9, 7, |x, y| image::Rgba([x as u8 * 20, y as u8 * 30, 99, 250 - x as u8]));
+    let colors = image::DynamicImage::from(colors);
+    let mut all = Vec::new();
+    for (image, format) in [
+        (colors.clone(), image::ImageFormat::Png),
+        (colors.to_luma16().into(), image::ImageFormat::Png),
+        (colors.to_rgb8().into(), image::ImageFormat::Jpeg),
+        (colors.to_luma8().into(), image::ImageFormat::Jpeg),
+        (colors.clone(), image::ImageFormat::WebP),
+    ] {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        all.push(bytes.into_inner());
+    }
+    for (compression, tiles) in [
+        (Compression::Uncompressed, None),
+        (Compression::RLE, None),
+        (Compression::ZIP16, None),
+        (Compression::PIZ, Some(4)),
+        (Compression::PXR24, None),
+        (Compression::B44, Some(5)),
+    ] {
+        let blocks = tiles
+            .map_or(exr::image::Blocks::ScanLines, |of| exr::image::Blocks::Tiles(exr::math::Vec2(of, of)));
+        let encoding = Encoding { compression, blocks, ..Encoding::UNCOMPRESSED };
+        let channels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
+            (exr::prelude::f16::from_f32(at.0 as f32), at.1 as f32, 0.5f32)
+        });
+        let image = Image::from_layer(Layer::new((9, 7), LayerAttributes::named("a"), encoding, channels));
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut bytes).unwrap();
+        all.push(bytes.into_inner());
+    }
+    let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n".to_vec();
+    for _ in 0..2 {
+        hdr.extend([
+            2,
+            2,
+            0,
+            9,
+            128 + 9,
+            7,
+            9,
+            1,
+            2,
+            3,
+            4,
+            5,
+            6,
+            7,
+            8,
+            9,
+            128 + 4,
+            6,
+            5,
+            1,
+            1,
+            1,
+            1,
+            1,
+            128 + 9,
+            136,
+        ]);
+    }
+    all.push(hdr);
+    all.push(
+        b"#?RGBE\n\n-Y 2 +X 3\n\x01\x02\x03\x80\x01\x01\x01\x02\x05\x06\x07\x80\x01\x01\x01\x02".to_vec(),
+    );
+    all
+});
+
+#[test]
+fn the_samples_are_pictures() {
+    for (k, bytes) in PICTURES.iter().enumerate() {
+        let library = Library::new(MemoryFiles::from([("x", bytes.clone())]));
+        let picture = library.picture("x", Purpose::Sky);
+        picture.unwrap_or_else(|error| panic!("sample {k}: {error}"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(10_000))]
+
+    #[test]
+    fn changed_pictures_do_no_harm(
+        sample in 0..13usize,
+        cut in 0.0..1.0f64,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+    ) {
+        let mut bytes = PICTURES[sample].clone();
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        attempt_picture(&bytes);
+        bytes.truncate((cut * bytes.len() as f64) as usize);
+        attempt_picture(&bytes);
+    }
 }
 
 proptest! {

@@ -32,7 +32,7 @@ Examples:
 The JSON document holds the number of files, frames, errors and warnings; `diagnostics`, each with file, line,
 column, span (byte offsets), severity, code, message and, where there is one, expected and help; `unreadable`, the
 files that could not be read; `conflicts`, why scripts that are fine by themselves are no animation together, and
-files that are not read because of their names, models that no script names, each with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
+files that are not read because of their names, models and skies that no script names, each with its input, severity and message; and `language`, the table of the scene language: its commands, the clauses of
 materials and the modes of curves, each number with its name, kind, unit, range and default.")]
 pub(crate) struct Args {
     /// Folders, script files, animation.json, or - for standard input
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             Some(Ok(plan)) => {
                 frames += plan.len();
                 for file in unused_files(path) {
-                    faults.conflict(&file, Severity::Warning, &"no script names this model");
+                    faults.conflict(&file, Severity::Warning, &"no script names this file");
                 }
                 if let Some(warning) = plan.light_cut_off()? {
                     faults.conflict(path, Severity::Warning, &warning);
@@ -125,19 +125,19 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     Ok(if faults.errors() > 0 { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The endings of models and of the files that they refer to.
-const MODELS: [&str; 6] = ["obj", "mtl", "ply", "stl", "gltf", "glb"];
+/// The endings of models, of the files that they refer to, and of skies. Other pictures may be those that were rendered.
+const NAMED: [&str; 8] = ["obj", "mtl", "ply", "stl", "gltf", "glb", "hdr", "exr"];
 
-/// Returns the models in a folder that no script names, in order.
+/// Returns the models and skies in a folder that no script names, in order.
 fn unused_files(folder: &Path) -> Vec<PathBuf> {
     let named = named_by_scripts();
-    let is_model = |path: &Path| {
+    let is_meant = |path: &Path| {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        MODELS.contains(&ending.as_str()) && path.is_file()
+        NAMED.contains(&ending.as_str()) && path.is_file()
     };
     let entries = folder.read_dir().into_iter().flatten();
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut unused: Vec<PathBuf> = paths.filter(|path| is_model(path) && !named.contains(path)).collect();
+    let mut unused: Vec<PathBuf> = paths.filter(|path| is_meant(path) && !named.contains(path)).collect();
     unused.sort();
     unused
 }

@@ -13,7 +13,8 @@ use pyo3::exceptions::{PyFileExistsError, PyOSError, PyRuntimeError, PyUserWarni
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rayfold_client::{
-    Client, Content, Ended, Error, File, Obstacle, Sending, Submission, Submitted, Waiting, address, obstacles,
+    Client, Content, Ended, Error, File, Obstacle, Sending, Submission, Submitted, Waiting, address,
+    obstacles,
 };
 use rayfold_files::probe;
 use rayfold_pipeline::SystemClock;
@@ -83,7 +84,11 @@ pub(crate) fn submit<'py>(
 /// Reads the files for their digests.
 fn read(files: Vec<(String, PathBuf)>) -> PyResult<Vec<(String, File)>> {
     let file = |(name, path)| Ok((name, File::new(Content::Path(path))?));
-    files.into_iter().map(file).collect::<Result<_, Error>>().map_err(|error| PyOSError::new_err(error.to_string()))
+    files
+        .into_iter()
+        .map(file)
+        .collect::<Result<_, Error>>()
+        .map_err(|error| PyOSError::new_err(error.to_string()))
 }
 
 /// Takes `s3://BUCKET/NAME` apart.

@@ -99,6 +99,11 @@ pub(crate) fn material_doc() -> String {
         let form = keyword.clause.form();
         let _ = writeln!(text, "{} : {}, optional", keyword.name, keyword_type(keyword));
         let _ = writeln!(text, "    {}", keyword.clause.summary());
+        if keyword.clause == Clause::Image {
+            text += "    the name of the file, then \"uv\", \"ball\", or \"flat\", its width and the axes along which it goes right \
+                     and up.\n";
+            continue;
+        }
         for (entry, field) in keyword.entries.iter().zip(form.fields) {
             let of = if keyword.entries.len() > 1 { format!("{entry}: ") } else { String::new() };
             let _ = writeln!(text, "    {of}{}.", field_doc(field));
@@ -211,6 +216,12 @@ fn field_type(form: &Form, field: &Field) -> String {
 /// Returns the type of a clause's value.
 fn keyword_type(keyword: &Keyword) -> String {
     let form: &Form = Clause::form(keyword.clause);
+    if keyword.clause == Clause::Image {
+        let flat = "tuple[str, Literal[\"flat\"], Number";
+        return format!(
+            "tuple[str, Literal[\"uv\", \"ball\"]] | {flat}] | {flat}, Literal[\"xy\", \"xz\", \"zy\"]]"
+        );
+    }
     let mut types: Vec<String> = form.fields.iter().map(|field| field_type(form, field)).collect();
     types.extend(form.ends_with.map(|_| "Material | str".to_owned()));
     match types.as_slice() {

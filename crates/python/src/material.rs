@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use rayfold_scene::{Clause, is_name};
+use rayfold_scene::{Clause, is_name, quoted_word};
 
 use crate::place::{Place, color_text, flag_of, quoted, shown};
 use crate::signature::{CLAUSES, Keyword};
@@ -282,7 +282,7 @@ fn read_clauses(method: &str, mut given: Vec<Given<'_>>) -> PyResult<Clauses> {
     let mut pattern: Option<&Keyword> = None;
     for (index, value) in &given {
         let keyword = &CLAUSES[*index];
-        let is_pattern = keyword.clause.form().ends_with.is_some();
+        let is_pattern = keyword.clause.form().ends_with.is_some() || keyword.clause == Clause::Image;
         if let (Some(first), true) = (pattern, is_pattern) {
             return Err(PyTypeError::new_err(format!(
                 "{method}(): a material has one pattern, not {} and {}",
@@ -322,6 +322,7 @@ fn read_clause(
         None => read_other(value, place, &keyword.name).map(|found| other = Some(found)),
     };
     match keyword.entries.len() {
+        _ if keyword.clause == Clause::Image => read_image(value, text, &mut numbers, place)?,
         0 => {}
         1 => entry(0, value)?,
         count => {
@@ -343,6 +344,44 @@ fn read_clause(
         return Err(refused(&whole(), form, &names(), numbers.values(), fault));
     }
     Ok(other)
+}
+
+/// Adds a picture to `text`: its file, the way in which it lies, and the width and axes of a flat one.
+fn read_image(
+    value: &Bound<'_, PyAny>,
+    text: &mut String,
+    numbers: &mut Numbers,
+    place: Place<'_>,
+) -> PyResult<()> {
+    let wrong = || {
+        let forms = "(file, \"uv\"), (file, \"ball\") or (file, \"flat\", size, \"xy\", \"xz\" or \"zy\")";
+        PyTypeError::new_err(format!("{place} takes a tuple {forms}, not {}", shown(value)))
+    };
+    let tuple = value.cast::<PyTuple>().map_err(|_| wrong())?;
+    let word = |i: usize| {
+        let item = tuple.get_item(i).ok()?;
+        Some(item.cast::<PyString>().ok()?.to_string_lossy().into_owned())
+    };
+    let (Some(file), Some(map)) = (word(0), word(1)) else { return Err(wrong()) };
+    text.push(' ');
+    *text += &quoted_word(&file);
+    text.push(' ');
+    *text += &map;
+    match (map.as_str(), tuple.len()) {
+        ("uv" | "ball", 2) => Ok(()),
+        ("flat", 3 | 4) => {
+            let form = Clause::Image.form();
+            numbers.field(text, &tuple.get_item(2)?, form, &form.fields[0], place)?;
+            if tuple.len() == 4 {
+                let axes =
+                    word(3).filter(|axes| ["xy", "xz", "zy"].contains(&axes.as_str())).ok_or_else(wrong)?;
+                text.push(' ');
+                *text += &axes;
+            }
+            Ok(())
+        }
+        _ => Err(wrong()),
+    }
 }
 
 fn read_other(value: &Bound<'_, PyAny>, place: Place<'_>, keyword: &'static str) -> PyResult<Other> {

@@ -85,7 +85,12 @@ impl Signature {
             let option = |name: &str, role| Parameter { name: name.to_owned(), role, is_required: false };
             parameters.extend([option("smooth", Role::Smooth), option("flat", Role::Flat)]);
         }
-        let mut signature = Self { command, method: identifier(command.name()), parameters };
+        // Two commands are named `Sky`.
+        let method = match command {
+            Command::SkyPicture => "sky_picture".to_owned(),
+            _ => identifier(command.name()),
+        };
+        let mut signature = Self { command, method, parameters };
         signature.make_unique();
         signature
     }
@@ -163,9 +168,13 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::ScreenWidth => "width",
         Meaning::ScreenHeight => "height",
         Meaning::Background if field.names[0] == "R" => "top",
-        Meaning::Background | Meaning::LightColor | Meaning::FogColor | Meaning::Shine | Meaning::Glass => {
-            "color"
-        }
+        Meaning::SkyTop => "top",
+        Meaning::Background
+        | Meaning::Sky
+        | Meaning::LightColor
+        | Meaning::FogColor
+        | Meaning::Shine
+        | Meaning::Glass => "color",
         Meaning::Center => "center",
         Meaning::Target => "at",
         Meaning::Up => "up",

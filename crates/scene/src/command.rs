@@ -10,7 +10,7 @@ use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
     Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, InvalidValue, Lamp, Lens,
     Light, Look, MATERIAL, MESH, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples, Screen, Shutter,
-    Tone, USE, mesh_surface, shapes, with_shapes,
+    SkyColors, SkyTurn, Tone, USE, mesh_surface, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -20,6 +20,10 @@ pub(crate) enum Effect {
     Camera(Reader<Camera>),
     /// Sets the colour of rays that hit nothing.
     Background,
+    /// Sets a sky of colours.
+    Sky,
+    /// Sets a sky that is a picture of a file.
+    SkyPicture,
     /// Sets the fog.
     Fog,
     Lens,
@@ -114,6 +118,8 @@ with_shapes! { commands! {
         Look: Look::FORM, Effect::Camera(read::<Look, _>), "A camera that looks at a target.";
         Lens: Lens::FORM, Effect::Lens, "A lens that is in focus at one distance.";
         Background: Background::FORM, Effect::Background, "The colour of rays that hit nothing.";
+        Sky: SkyColors::FORM, Effect::Sky, "The light around the scene.";
+        SkyPicture: SkyTurn::FORM, Effect::SkyPicture, "A picture as the light around the scene.";
         Fog: Fog::FORM, Effect::Fog, "The colour that rays take on over their length.";
         Samples: Samples::FORM, Effect::Samples, "The number of rays per pixel.";
         Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
@@ -179,7 +185,7 @@ impl Command {
         self.form().name
     }
 
-    /// Returns the command with this name, in any letter case.
+    /// Returns the command with this name, in any letter case: of the two named `Sky`, the one with colours.
     pub fn from_name(name: &str) -> Option<Self> {
         let letter = name.bytes().next()?.to_ascii_lowercase().wrapping_sub(b'a');
         let first = *INDEX.first.get(usize::from(letter))?;
@@ -189,6 +195,15 @@ impl Command {
         };
         // Most scripts use the documentation's letter case, which is compared faster.
         chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
+    }
+
+    /// Returns the command whose line begins with this word behind its name: of the two named `Sky`, one takes the name of a
+    /// file.
+    pub fn with_first_word(self, word: Option<&str>) -> Self {
+        match (self, word) {
+            (Self::Sky, Some(word)) if names_file(word) => Self::SkyPicture,
+            _ => self,
+        }
     }
 
     /// Returns whether a colour as `#rrggbb` may stand after these parameters, without the name before them. A colour
@@ -222,6 +237,8 @@ impl Command {
             Effect::Screen => Screen::read(numbers).err(),
             Effect::Camera(read) => read(numbers).err(),
             Effect::Background => Background::read(numbers).err(),
+            Effect::Sky => SkyColors::read(numbers).err(),
+            Effect::SkyPicture => SkyTurn::read(numbers).err(),
             Effect::Fog => Fog::read(numbers).err(),
             Effect::Lens => Lens::read(numbers).err(),
             Effect::Samples => Samples::read(numbers).err(),
@@ -258,6 +275,14 @@ impl Command {
     }
 }
 
+/// Returns whether a word is in quotes, or is a name of a picture that lacks them.
+fn names_file(word: &str) -> bool {
+    let is_picture = |end: &str| {
+        ["png", "jpg", "jpeg", "webp", "hdr", "exr"].iter().any(|known| known.eq_ignore_ascii_case(end))
+    };
+    word.starts_with('"') || word.rsplit_once('.').is_some_and(|(_, end)| is_picture(end))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -265,7 +290,7 @@ mod tests {
 
     #[test]
     fn names_are_not_shared() {
-        for command in Command::ALL {
+        for command in Command::ALL.iter().filter(|command| **command != Command::SkyPicture) {
             assert_eq!(Command::from_name(&command.name().to_uppercase()), Some(*command));
             assert_eq!(Command::from_name(&command.name().to_lowercase()), Some(*command));
         }

@@ -97,7 +97,7 @@ pub enum Code {
     UnusableFile,
     /// A part of a file that is not drawn as its author may expect.
     UnusedPart,
-    /// A clause without effect on an object.
+    /// A command without effect, or a clause without effect on an object.
     NoEffect,
     /// A file that is no text.
     NotText,

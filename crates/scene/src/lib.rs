@@ -44,9 +44,9 @@ pub use model::shapes::{
     Triangle,
 };
 pub use model::{
-    Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, InvalidValue,
-    Lamp, Lens, Light, Look, Material, Parameter, Pattern, Pinhole, Samples, Scene, Screen, Shine, Shutter,
-    Tone, Weight,
+    Axes, Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, Image,
+    ImageMap, InvalidValue, Lamp, Lens, Light, Look, Material, Parameter, Pattern, PictureFile, Pinhole,
+    Samples, Scene, Screen, Shine, Shutter, Sky, SkyColors, SkyTurn, Tone, Weight,
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;

@@ -12,6 +12,8 @@ fn sample(command: Command) -> &'static str {
         Command::Look => "Look 1 2 3 4 5 -6 40 .3 .5 .1",
         Command::Lens => "Lens .1 5",
         Command::Background => "Background .1 .2 .3 .4 .5 .6",
+        Command::Sky => "Sky .1 .2 .3 .4 .5 .6",
+        Command::SkyPicture => "Sky \"sky.png\" .5 30",
         Command::Fog => "Fog .1 .2 .3 4",
         Command::Samples => "Samples 16 .5",
         Command::Shutter => "Shutter .5",
@@ -49,7 +51,9 @@ fn errors(line: &str) -> Vec<Diagnostic> {
     };
     let script = format!("Screen 4 3\n{before}{line}\n{behind}Trace\n");
     let corner = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    let files = Library::new(MemoryFiles::from([("corner.obj", corner.to_vec())]));
+    let sky = include_bytes!("pixel.png");
+    let files = MemoryFiles::from([("corner.obj", corner.to_vec()), ("sky.png", sky.to_vec())]);
+    let files = Library::new(files);
     let parsed = parse_with_files("a.txt", script.as_bytes(), &Limits::default(), &files);
     let mut errors = parsed.diagnostics;
     errors.retain(|d| d.is_error() && d.code != Code::LimitExceeded);

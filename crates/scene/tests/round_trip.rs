@@ -58,7 +58,7 @@ fn material() -> BoxedStrategy<Material> {
     let glass = (vector(), size()).prop_map(|(color, ior)| Glass::new(color, ior).unwrap());
     let pattern = (weight(), matte()).prop_map(|(weight, other)| Pattern { weight, other });
     let finish = (prop::option::of(shine), prop::option::of(glass), prop::option::of(pattern))
-        .prop_map(|(shine, glass, pattern)| Finish { shine, glass, pattern, own: false });
+        .prop_map(|(shine, glass, pattern)| Finish { shine, glass, pattern, image: None, own: false });
     prop_oneof![
         2 => matte().prop_map(Material::from),
         1 => (matte(), finish).prop_map(|(matte, finish)| Material::finished(matte, finish)),

@@ -131,7 +131,11 @@ fn numbers(form: &Form, draft: &Draft) -> String {
 
 /// Returns the file that a command names, if it names one.
 fn file(command: Command) -> &'static str {
-    if command == Command::Mesh { " \"corner.obj\"" } else { "" }
+    match command {
+        Command::Mesh => " \"corner.obj\"",
+        Command::SkyPicture => " \"sky.png\"",
+        _ => "",
+    }
 }
 
 /// Returns the words behind the surface of a mesh.
@@ -155,12 +159,23 @@ fn script(drafts: &[Draft]) -> String {
                 let first = draft.left_out % Clause::ALL.len();
                 let mut has_pattern = false;
                 for clause in Clause::ALL.iter().cycle().skip(first).take(1 + draft.name) {
-                    let is_pattern = clause.form().ends_with.is_some();
+                    let names_other = clause.form().ends_with.is_some();
+                    let is_pattern = names_other || *clause == Clause::Image;
                     if is_pattern && std::mem::replace(&mut has_pattern, true) {
                         continue;
                     }
+                    if *clause == Clause::Image {
+                        let width = numbers(clause.form(), &Draft { left_out: 0, ..draft.clone() });
+                        line += " image \"sky.png\"";
+                        line += &match draft.left_out % 3 {
+                            0 => " ball".to_string(),
+                            1 => format!(" flat{width}"),
+                            _ => format!(" FLAT{width} xz"),
+                        };
+                        continue;
+                    }
                     line += &format!(" {}{}", clause.name(), numbers(clause.form(), draft));
-                    if is_pattern {
+                    if names_other {
                         line += &format!(" {}", materials[draft.name % 2]);
                     }
                 }
@@ -212,7 +227,8 @@ fn script(drafts: &[Draft]) -> String {
 fn read(text: &str) -> Result<Script, Vec<Diagnostic>> {
     static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
         let corner = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        Library::new(MemoryFiles::from([("corner.obj", corner.to_vec())]))
+        let picture = include_bytes!("pixel.png");
+        Library::new(MemoryFiles::from([("corner.obj", corner.to_vec()), ("sky.png", picture.to_vec())]))
     });
     let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &LIBRARY);
     parsed.script.ok_or(parsed.diagnostics)

@@ -8,7 +8,7 @@ use rayfold_scene::{
 use crate::document::Splice;
 use crate::extent;
 use crate::line::{Line, written};
-use crate::source_map::SourceMap;
+use crate::source_map::{AROUND, SourceMap};
 use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed, tidy};
 use crate::view::Bounds;
@@ -133,7 +133,7 @@ pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Sp
     }
     if source_map.camera.is_none() && source_map.objects.is_empty() && source_map.trace.is_none() {
         before.push(Line::new(CAMERA));
-        if source_map.setting(Command::Background).is_none() {
+        if AROUND.iter().all(|around| source_map.setting(*around).is_none()) {
             before.push(Line::new(BACKGROUND));
         }
     }

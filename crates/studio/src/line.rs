@@ -78,7 +78,10 @@ impl Line {
         let start = body.iter().position(|&byte| !is_separator(byte))?;
         let word = &body[start..];
         let end = word.iter().position(|&byte| is_separator(byte) || matches!(byte, b'#' | b'('));
-        Command::from_name(std::str::from_utf8(&word[..end.unwrap_or(word.len())]).ok()?)
+        let (word, rest) = word.split_at(end.unwrap_or(word.len()));
+        let command = Command::from_name(std::str::from_utf8(word).ok()?)?;
+        let first = rest.split(|&byte| is_separator(byte)).find(|word| !word.is_empty());
+        Some(command.with_first_word(first.and_then(|word| std::str::from_utf8(word).ok())))
     }
 
     /// Returns the positions of the words, or `None` for a line without a command.

@@ -4,7 +4,8 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use rayfold_scene::{Clause, Command, Limits, Parameter, parse};
+use rayfold_scene::assets::Library;
+use rayfold_scene::{Clause, Command, Limits, Parameter, Presence, parse_with_files, quoted_word};
 
 use crate::document::Splice;
 use crate::edits::set;
@@ -55,6 +56,16 @@ const PRESETS: &[Preset] = &[
     },
 ];
 
+/// The reason why a material gets no picture.
+const NO_PICTURE: &str = "There is no picture (.png, .jpg, .webp) beside the script.";
+
+/// Returns whether a name is that of a picture of light, which no surface takes.
+fn is_light(name: &str) -> bool {
+    name.rsplit('.')
+        .next()
+        .is_some_and(|end| ["hdr", "exr"].iter().any(|light| light.eq_ignore_ascii_case(end)))
+}
+
 /// The width and height of a sphere's picture in pixels.
 pub(crate) const SIDE: u32 = 96;
 
@@ -75,14 +86,19 @@ pub(crate) fn presets() -> Vec<&'static str> {
 ///
 /// # Errors
 /// Fails if the sphere cannot be rendered.
-pub(crate) fn sphere(lines: &[Line], at: usize, frame: u32) -> Result<Option<Vec<u8>>, Error> {
+pub(crate) fn sphere(
+    lines: &[Line],
+    at: usize,
+    frame: u32,
+    library: &Library,
+) -> Result<Option<Vec<u8>>, Error> {
     let Some(name) = lines.get(at).filter(|line| is_material(line)).and_then(Line::subject) else {
         return Ok(None);
     };
     let tone = lines.iter().filter(|line| line.command() == Some(Command::Tone)).take(1);
     let before = lines[..=at].iter().filter(|line| is_material(line)).chain(tone);
     let texts: Vec<String> = before.map(Line::text).collect();
-    drawn(&texts.join("\n"), name, frame)
+    drawn(&texts.join("\n"), name, frame, library)
 }
 
 /// Renders a sphere of a starter material.
@@ -92,16 +108,16 @@ pub(crate) fn sphere(lines: &[Line], at: usize, frame: u32) -> Result<Option<Vec
 pub(crate) fn preset_sphere(name: &str) -> Result<Option<Vec<u8>>, Error> {
     let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) else { return Ok(None) };
     let lines: Vec<String> = definitions(preset).iter().map(|(_, line)| line.text()).collect();
-    drawn(&lines.join("\n"), name, 1)
+    drawn(&lines.join("\n"), name, 1, &Library::none())
 }
 
-fn drawn(materials: &str, name: &str, frame: u32) -> Result<Option<Vec<u8>>, Error> {
+fn drawn(materials: &str, name: &str, frame: u32, library: &Library) -> Result<Option<Vec<u8>>, Error> {
     let frame = frame.max(1);
     let text = format!(
         "Screen {SIDE} {SIDE}\n{STUDIO}{materials}\nSphere 1  0 1 0  {name}\nFrames {frame} {frame}\nTrace\n"
     );
     let limits = Limits { max_described: 0, ..Limits::default() };
-    match parse("sphere", text.as_bytes(), &limits).script {
+    match parse_with_files("sphere", text.as_bytes(), &limits, library).script {
         Some(script) => frame_png(&script, 0),
         None => Ok(None),
     }
@@ -159,18 +175,24 @@ pub(crate) fn plain_names(lines: &[Line], at: usize) -> Vec<String> {
 }
 
 /// Adds a clause to a material, or removes it. A pattern replaces another one, and gets a second material if there is
-/// none that it could name.
+/// none that it could name. `pictures` are the pictures beside the script.
 ///
 /// # Errors
 /// Returns the reason why the last clause stays.
-pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Splice>, &'static str> {
+pub(crate) fn toggle(
+    lines: &[Line],
+    at: usize,
+    clause: Clause,
+    pictures: &[String],
+) -> Result<Vec<Splice>, &'static str> {
     let Some(line) = lines.get(at).filter(|line| is_material(line)) else { return Ok(Vec::new()) };
     let all = clauses(line);
     let has = all.iter().any(|(other, _)| *other == clause);
     if has && all.len() == 1 {
         return Err("A material needs one clause at least.");
     }
-    let is_pattern = |clause: Clause| clause.form().ends_with.is_some();
+    let names_other = |clause: Clause| clause.form().ends_with.is_some();
+    let is_pattern = |clause: Clause| names_other(clause) || clause == Clause::Image;
     let goes = |other: Clause| other == clause || !has && is_pattern(clause) && is_pattern(other);
     let Some(words) = line.words() else { return Ok(Vec::new()) };
     let kept = all
@@ -185,13 +207,18 @@ pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Sp
     let mut splices = Vec::new();
     if !has {
         let mut other = plain_names(lines, at).pop();
-        if is_pattern(clause) && other.is_none() {
+        if names_other(clause) && other.is_none() {
             let name = free_name(lines);
             splices.push(Splice { at, removed: 0, inserted: vec![blank(&name, "0.1 0.1 0.1")] });
             other = Some(name);
         }
         texts.push(clause.name().to_owned());
-        texts.extend(clause.form().fields.iter().flat_map(|field| {
+        if clause == Clause::Image {
+            let picture = pictures.iter().find(|name| !is_light(name)).ok_or(NO_PICTURE)?;
+            texts.extend([quoted_word(picture), "ball".to_owned()]);
+        }
+        let fields = clause.form().fields.iter().filter(|field| field.presence == Presence::Required);
+        texts.extend(fields.flat_map(|field| {
             let value = match field.parameter {
                 Parameter::ShineExponent => "60",
                 Parameter::Ior => "1.5",
@@ -203,7 +230,7 @@ pub(crate) fn toggle(lines: &[Line], at: usize, clause: Clause) -> Result<Vec<Sp
             };
             vec![value.to_owned(); field.names.len()]
         }));
-        texts.extend(other.filter(|_| is_pattern(clause)));
+        texts.extend(other.filter(|_| names_other(clause)));
     }
     let from =
         all.iter().find(|(other, _)| goes(*other)).map_or(words.parameters.len(), |(_, span)| span.start);
@@ -300,6 +327,9 @@ fn is_material(line: &Line) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rayfold_scene::assets::MemoryFiles;
+    use rayfold_scene::parse;
+
     use super::*;
     use crate::document::Document;
 
@@ -325,7 +355,7 @@ mod tests {
             let lines = Line::split(text.as_bytes());
             assert!(seen.insert(preset_sphere(name).unwrap().unwrap()), "{name} looks as another");
             let at = lines.iter().position(|line| line.subject() == Some(name)).unwrap();
-            assert_eq!(sphere(&lines, at, 1).unwrap(), preset_sphere(name).unwrap());
+            assert_eq!(sphere(&lines, at, 1, &Library::none()).unwrap(), preset_sphere(name).unwrap());
             assert_eq!(give_preset(&lines, &[at], name), [], "a material has none");
         }
     }
@@ -338,9 +368,13 @@ mod tests {
         let given = after(text, give(&lines, &[1, 3, 4], "red"));
         assert_eq!(given, text.replace("blue", "red"));
         assert!(give(&lines, &[3], "green").is_empty());
-        assert_ne!(sphere(&lines, 2, 1).unwrap().unwrap(), sphere(&lines, 2, 9).unwrap().unwrap());
-        assert_eq!(sphere(&lines, 1, 1).unwrap(), None);
-        assert_eq!(sphere(&lines, 99, 1).unwrap(), None);
+        let none = Library::none();
+        assert_ne!(
+            sphere(&lines, 2, 1, &none).unwrap().unwrap(),
+            sphere(&lines, 2, 9, &none).unwrap().unwrap()
+        );
+        assert_eq!(sphere(&lines, 1, 1, &none).unwrap(), None);
+        assert_eq!(sphere(&lines, 99, 1, &none).unwrap(), None);
     }
 
     #[test]
@@ -350,15 +384,19 @@ mod tests {
         let (splices, at) = new(&lines, &[3]);
         let blank = after(text, splices);
         assert!(blank.contains("\nSphere 1  0 0 0  material-1   # ball\n"), "{blank}");
+        let pictures = ["a.hdr".to_owned(), "a b.png".to_owned()];
+        let files = MemoryFiles::from([("a b.png", include_bytes!("../../scene/tests/pixel.png").to_vec())]);
+        let library = Library::new(files);
+        let parse = |text: &str| parse_with_files("a", text.as_bytes(), &Limits::default(), &library);
         let toggled = |text: &str, at: usize, clause| {
-            toggle(&Line::split(text.as_bytes()), at, clause).map(|splices| after(text, splices))
+            toggle(&Line::split(text.as_bytes()), at, clause, &pictures).map(|splices| after(text, splices))
         };
         for &clause in Clause::ALL {
             let Ok(on) = toggled(&blank, at, clause) else {
                 assert_eq!(clause, Clause::Diffuse, "the only clause stays");
                 continue;
             };
-            let parsed = parse("a", on.as_bytes(), &Default::default());
+            let parsed = parse(&on);
             // A ball has no colours of a file.
             let is_meant = |d: &rayfold_scene::Diagnostic| d.code == rayfold_scene::Code::NoEffect;
             assert!(parsed.diagnostics.iter().all(is_meant), "{on}\n{:?}", parsed.diagnostics);
@@ -367,7 +405,7 @@ mod tests {
             assert!(off.contains("Material material-1   diffuse 0.7 0.7 0.7\n"), "{off}");
             for &other in Clause::ALL.iter().filter(|&&other| other != clause && other != Clause::Diffuse) {
                 let both = toggled(&on, at, other).unwrap();
-                assert!(parse("a", both.as_bytes(), &Default::default()).script.is_some(), "{both}");
+                assert!(parse(&both).script.is_some(), "{both}");
             }
         }
     }

@@ -29,6 +29,9 @@ use crate::tracks::{Tracks, tracks};
 /// The endings of models.
 const MODELS: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];
 
+/// The endings of pictures, those of skies before others.
+const PICTURES: [&str; 6] = ["hdr", "exr", "png", "jpg", "jpeg", "webp"];
+
 /// The longest name of a new script in bytes. File systems allow 255, and a receipt in a bucket adds to it.
 const NAME: usize = 200;
 
@@ -378,16 +381,32 @@ impl Opened {
         self.tracks = OnceCell::new();
     }
 
+    /// Returns the models and pictures in the script's folder.
+    pub(crate) fn library(&self) -> &Arc<Library> {
+        &self.library
+    }
+
     /// Returns the names of the models in the script's folder, in natural order.
     pub(crate) fn models(&self) -> Vec<String> {
+        self.files_with(&MODELS)
+    }
+
+    /// Returns the names of the pictures in the script's folder, skies first, then in natural order.
+    pub(crate) fn pictures(&self) -> Vec<String> {
+        let (mut skies, others) = (self.files_with(&PICTURES[..2]), self.files_with(&PICTURES[2..]));
+        skies.extend(others);
+        skies
+    }
+
+    fn files_with(&self, endings: &[&str]) -> Vec<String> {
         let folder = if self.folder == Path::new("") { Path::new(".") } else { &self.folder };
         let names = folder.read_dir().into_iter().flatten();
         let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-        let is_model = |name: &String| {
+        let is_one = |name: &String| {
             let ending = name.rsplit('.').next().unwrap_or_default();
-            MODELS.iter().any(|known| ending.eq_ignore_ascii_case(known)) && file_name(name).is_ok()
+            endings.iter().any(|known| ending.eq_ignore_ascii_case(known)) && file_name(name).is_ok()
         };
-        let mut names: Vec<_> = names.filter(is_model).collect();
+        let mut names: Vec<_> = names.filter(is_one).collect();
         names.sort_by(|a, b| natural_cmp(a, b));
         names
     }

@@ -212,12 +212,12 @@ async fn material(State(shared): State<Arc<Shared>>, request: Request) -> Respon
     let mut next = || numbers.next().unwrap_or(0);
     let (of, line, frame) = (next(), next(), next());
     let png = tokio::task::block_in_place(|| {
-        let lines: Vec<_> = {
+        let (lines, library): (Vec<_>, _) = {
             let project = shared.project();
-            project.files.get(of).map(|file| file.document.lines().iter().take(line + 1).cloned().collect())
-        }
-        .unwrap_or_default();
-        materials::sphere(&lines, line, u32::try_from(frame).unwrap_or(u32::MAX))
+            let Some(file) = project.files.get(of) else { return Ok(None) };
+            (file.document.lines().iter().take(line + 1).cloned().collect(), file.library().clone())
+        };
+        materials::sphere(&lines, line, u32::try_from(frame).unwrap_or(u32::MAX), &library)
     });
     // The script may have changed since the page wanted it.
     picture(png, StatusCode::NO_CONTENT)

@@ -379,7 +379,10 @@ impl Session {
             }
             ClientMessage::Clause { line, clause } => {
                 let lines = self.file_lines(project);
-                match Clause::from_name(&clause).map(|clause| materials::toggle(lines, line, clause)) {
+                let file = project.files.get(self.place(project).file);
+                let pictures = file.map(|file| file.pictures()).unwrap_or_default();
+                let clause = Clause::from_name(&clause);
+                match clause.map(|clause| materials::toggle(lines, line, clause, &pictures)) {
                     Some(Ok(splices)) => self.edit(project, splices, None, tell),
                     Some(Err(refusal)) => tell.notice = Some(refusal.into()),
                     None => {}

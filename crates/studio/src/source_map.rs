@@ -44,6 +44,9 @@ struct Groups {
     open: Option<(usize, String, usize)>,
 }
 
+/// The settings of what is around the scene, which a `Clear` removes.
+pub(crate) const AROUND: [Command; 3] = [Command::Background, Command::Sky, Command::SkyPicture];
+
 impl SourceMap {
     /// Makes the map of frame `frame` of a script, counted from 0, at a time. Beyond the last `Trace` it is the
     /// state at the end.
@@ -58,7 +61,9 @@ impl SourceMap {
                     source_map.objects.clear();
                     source_map.drawn.clear();
                     source_map.lights.clear();
-                    source_map.settings.remove(&Command::Background);
+                    for command in AROUND {
+                        source_map.settings.remove(&command);
+                    }
                     source_map.cleared = Some(number);
                 }
                 (Command::Trace, _) => {
@@ -141,8 +146,9 @@ impl SourceMap {
     /// Returns the line for a new object or light of this frame: after its existing ones and before its `Trace`.
     pub(crate) fn end(&self, lines: &[Line]) -> usize {
         let groups = self.groups.last().map(|group| group.end());
-        let [screen, background] = [Command::Screen, Command::Background].map(|of| self.settings.get(&of));
-        let set = self.camera.iter().chain(screen).chain(background).chain(&self.cleared);
+        let screen = self.settings.get(&Command::Screen);
+        let around = AROUND.iter().filter_map(|of| self.settings.get(of));
+        let set = self.camera.iter().chain(screen).chain(around).chain(&self.cleared);
         let last = self.objects.iter().chain(&self.lights).chain(set).chain(groups).max();
         match (last, self.trace) {
             (Some(last), _) => last + 1,

@@ -79,11 +79,19 @@ pub(crate) fn commands() -> Vec<CommandTable> {
     Command::ALL
         .iter()
         .map(|&command| CommandTable {
-            name: command.name(),
+            name: title(command),
             role: role(command),
             fields: fields(command).map(|(first, field)| FieldTable::new(first, field)).collect(),
         })
         .collect()
+}
+
+/// Returns the name of a command on the page: of the two named `Sky`, one with the word that it takes.
+pub(crate) fn title(command: Command) -> &'static str {
+    match command {
+        Command::SkyPicture => "Sky \"FILE\"",
+        _ => command.name(),
+    }
 }
 
 /// Returns the role of a command, which follows from its parameters.
@@ -172,6 +180,12 @@ impl FieldTable {
     }
 }
 
+/// Returns the command with this name on the page.
+pub(crate) fn by_title(name: &str) -> Option<Command> {
+    let (name, word) = name.split_once(' ').map_or((name, None), |(name, word)| (name, Some(word)));
+    Some(Command::from_name(name)?.with_first_word(word))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,8 +200,7 @@ mod tests {
         assert_eq!(["Screen", "Background", "Clear", "Trace"].map(named), [Role::Setting; 4]);
         for table in commands() {
             let names: Vec<_> = table.fields.iter().flat_map(|field| field.names).collect();
-            let all: Vec<_> =
-                Command::from_name(table.name).unwrap().form().numbers().map(|(n, _)| n).collect();
+            let all: Vec<_> = by_title(table.name).unwrap().form().numbers().map(|(n, _)| n).collect();
             assert!(names.into_iter().eq(all.iter()), "{}", table.name);
         }
     }

@@ -102,6 +102,16 @@ pub(crate) fn slots(line: &Line) -> Vec<Slot> {
     while let Some(word) = words.parameters.get(at) {
         at += 1;
         let Some(clause) = Clause::from_name(line.word(word)) else { continue };
+        if clause == Clause::Image {
+            // The width of a flat picture stands behind the file and the way.
+            let is_flat =
+                words.parameters.get(at + 1).is_some_and(|word| line.word(word).eq_ignore_ascii_case("flat"));
+            for field in clause.form().fields.iter().filter(|_| is_flat) {
+                slots.extend(of(at + 2, field));
+            }
+            at += 2;
+            continue;
+        }
         for field in clause.form().fields {
             slots.extend(of(at, field));
             at += field.names.len();

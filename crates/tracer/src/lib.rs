@@ -30,6 +30,7 @@ mod meshes;
 mod nans;
 mod parallel;
 pub mod parts;
+mod pictures;
 mod progress;
 pub mod reference;
 mod sampling;

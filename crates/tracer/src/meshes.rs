@@ -12,9 +12,11 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayfold_scene::assets::{Closure, Look, Model};
 use rayfold_scene::{
-    Coefficients, Finish, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone, Triangle,
+    Coefficients, Finish, ImageMap, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone,
+    Triangle,
 };
 
+use crate::pictures::factor_at;
 use crate::reference::onward_normal;
 
 /// A scene without meshes, and the faces that its triangles were.
@@ -47,6 +49,8 @@ struct Run {
     has_colors: bool,
     /// Whether it also glows with the light of its file. Without colours at vertices that is a part of its materials.
     glows: bool,
+    /// Whether it has a picture by texture coordinates.
+    has_image: bool,
     /// Whether it is a closed body of glass.
     is_filled: bool,
 }
@@ -151,6 +155,8 @@ pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Fac
             is_linear,
             has_colors,
             glows: has_colors && !mesh.has_material() && model.looks().iter().any(|l| l.glow != DVec3::ZERO),
+            has_image: finish
+                .is_some_and(|finish| finish.image.as_ref().is_some_and(|image| image.map() == ImageMap::Uv)),
             is_filled: finish.is_some_and(|finish| finish.glass.is_some())
                 && *model.closure() == Closure::Closed,
         });
@@ -193,7 +199,7 @@ fn material(mesh: &Mesh, look: usize, is_linear: bool) -> Material {
     }
     let pattern =
         finish.pattern.map(|pattern| rayfold_scene::Pattern { other: tinted(pattern.other), ..pattern });
-    Material::finished(coefficients, Finish { own: false, pattern, ..*finish })
+    Material::finished(coefficients, Finish { own: false, pattern, ..finish.clone() })
 }
 
 impl Faces {
@@ -256,10 +262,20 @@ impl Faces {
         if run.has_colors {
             color = run.model.color(k, weights, run.is_linear);
         }
+        let finish = material.finish();
+        if run.has_image
+            && let (Some(image), Some(uvs)) = (finish.and_then(|f| f.image.as_ref()), run.model.uvs(k))
+        {
+            let [u, v] = [0, 1].map(|axis: usize| {
+                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
+            });
+            let v = if run.model.has_uvs_from_top() { v } else { 1.0 - v };
+            color *= factor_at(image.file().picture(), [u, v], true, run.is_linear);
+        }
         if run.glows {
             glow = run.model.glow(run.model.look(k), run.is_linear);
         }
-        let glass = material.finish().and_then(|finish| finish.glass);
+        let glass = finish.and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));
         let onward = onward_normal(direction, normal, face, glass);
         Some(Shading { normal, onward, lift, color, glow, within })
@@ -268,7 +284,7 @@ impl Faces {
 
 impl Run {
     fn is_shaded(&self) -> bool {
-        self.model.has_normals() || self.has_colors || self.is_filled
+        self.model.has_normals() || self.has_colors || self.has_image || self.is_filled
     }
 }
 

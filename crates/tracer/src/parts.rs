@@ -50,6 +50,8 @@ parts! {
     patterns, "patterns", |scene| is_made(scene, |f| f.pattern.is_some());
     lamps, "lamps", |scene| scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)));
     skies, "skies", |scene| scene.surroundings().color().is_none();
+    // Pictures as the sky, and on surfaces.
+    pictures, "pictures", |scene| scene.sky_picture().is_some() || is_made(scene, |f| f.image.is_some());
     srgb, "srgb", |scene| scene.tone == Tone::Srgb;
     samples, "samples", is_sampled;
     lenses, "lenses", |scene| is_sampled(scene) && scene.lens.radius() > 0.0;

@@ -126,7 +126,7 @@ fn render(scene: &Scene) -> RgbImage {
 fn color(scene: &Scene, objects: &[Shape], origin: Vec3, direction: Vec3, bounces: u32) -> Vec3 {
     let start = if bounces == 0 { 0.0 } else { EPSILON };
     let Some((object, t)) = nearest(objects, origin, direction, start) else {
-        return scene.background.along(direction.as_dvec3()).as_vec3();
+        return scene.surroundings().along(direction.as_dvec3()).as_vec3();
     };
     let point = origin + t * direction;
     let normal = objects[object].normal(point, direction);

@@ -115,7 +115,7 @@ fn with_cells(object: Object, scale: f64) -> Result<Object> {
         Weight::Gradient(start, end) => Weight::Gradient(scale * start, scale * end),
     };
     let pattern = Some(Pattern { weight: weight.checked()?, ..pattern });
-    let material = Material::finished(material.coefficients(), Finish { pattern, ..*finish });
+    let material = Material::finished(material.coefficients(), Finish { pattern, ..finish.clone() });
     Ok(object.with_material(material)?)
 }
 

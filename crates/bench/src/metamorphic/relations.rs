@@ -124,7 +124,7 @@ fn lengths(scene: &Scene) -> Vec<f64> {
 /// A rotation that leaves the height alone if the sky depends on that.
 fn right_turn(scene: &Scene, rng: &mut Rng) -> DMat3 {
     let mut turns = right_turns();
-    if scene.background.color().is_none() {
+    if scene.one_color().is_none() {
         turns.retain(|turn| turn.y_axis == DVec3::Y);
     }
     turns[rng.usize(0..turns.len())]

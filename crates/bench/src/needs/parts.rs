@@ -45,6 +45,7 @@ pub(super) const VERSION_2: &[&str] = &[
     "glass",
     "lamps",
     "skies",
+    "pictures",
     "srgb",
     "samples",
     "lenses",
@@ -58,13 +59,24 @@ pub(super) const VERSION_2: &[&str] = &[
 /// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). Some of the six are
 /// here in parts: `planes` and `highlights` together cost discs 0.82 % and lamplight 0.57 %, where a part may cost 0.5 %.
 const OF_VERSION_2: [&[&str]; 10] = [
-    &["planes", "groups", "meshes"],
+    &["planes", "groups", "meshes", "pictures"],
     &["planes", "discs", "capsules", "lenses"],
     &["highlights"],
     &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb"],
     &["highlights", "patterns", "fogs", "covers"],
-    &["glass", "skies", "extents", "covers"],
-    &["capsules", "turned-boxes", "patterns", "lamps", "samples", "lenses", "shutters", "extents", "fogs"],
+    &["glass", "skies", "pictures", "extents", "covers"],
+    &[
+        "capsules",
+        "turned-boxes",
+        "patterns",
+        "pictures",
+        "lamps",
+        "samples",
+        "lenses",
+        "shutters",
+        "extents",
+        "fogs",
+    ],
     &[
         "cones",
         "tori",
@@ -136,7 +148,7 @@ fn has_more_than_version_1(scene: &Scene) -> bool {
         }
         _ => false,
     };
-    scene.background.color().is_none()
+    scene.one_color().is_none()
         || scene.fog.get().is_some()
         || scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)))
         || scene.objects.iter().any(|object| !is_old(object) || object.material().finish().is_some())

@@ -26,7 +26,8 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
     let mut subjects = of_version_1()?;
     for (name, lines) in OF_VERSION_2 {
         let script = format!("{BEFORE}{lines}Trace\n");
-        let library = Library::new(MemoryFiles::from([("model.obj", MODEL.to_vec())]));
+        let files = MemoryFiles::from([("model.obj", MODEL.to_vec()), ("sky.png", SKY.to_vec())]);
+        let library = Library::new(files);
         let parsed = parse_with_files(name, script.as_bytes(), &Limits::default(), &library);
         let scene = parsed.script.and_then(|script| script.frame(0));
         let scene = scene.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
@@ -34,6 +35,9 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
     }
     Ok(subjects)
 }
+
+/// A panorama.
+const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
 
 /// The camera and the sun of the scenes of version 2.
 const BEFORE: &str = "\
@@ -50,7 +54,7 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 20] = [
+const OF_VERSION_2: [(&str, &str); 21] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -132,6 +136,13 @@ Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
     (
         "balls below a sky",
         "Background .8 .8 .8  .2 .4 .9
+Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2
+Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
+        "balls below a picture",
+        "Sky \"sky.png\" 1 30
 Sphere 1  -1 0 0  .1 .1 .1  .6 .2 .2
 Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
 ",

@@ -18,15 +18,17 @@
 
 mod glass;
 mod hit;
+mod image;
 mod light;
 mod line;
 mod noise;
 mod pattern;
 mod real;
 mod shapes;
+mod sky;
 
+use ::image::RgbImage;
 use glam::DVec3;
-use image::RgbImage;
 use rayfold_scene::{Object, Scene, Tone};
 use rayon::prelude::*;
 
@@ -122,12 +124,7 @@ fn seen_along(scene: &Scene, line: &Line, path: &Path) -> Seen {
         if let Some(clear) = path.clear {
             return Seen { color: DVec3::ZERO.into(), clear };
         }
-        if let Some((fog, _)) = scene.fog.get() {
-            return Vector::from(fog).into();
-        }
-        let (low, high) = scene.background.colors();
-        let height = 0.5 + 0.5 * line.direction.unit().0[1].to_f64();
-        return Vector::from(low + (high.unwrap_or(low) - low) * height).into();
+        return Vector::from(sky::along(scene, line.direction.unit().to_dvec3())).into();
     };
     let Some((fog, distance)) = scene.fog.get() else { return seen_at_hit(scene, line, path, &hit) };
     // The exponential has an error of some roundoffs.
@@ -146,6 +143,9 @@ fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
     let material = object.material();
     let (place, face) = shapes::place(object, line, &hit.t);
     let [mut ambient, mut diffuse, mirror] = pattern::coefficients(material, &place, face);
+    if let Some(factor) = image::factor(object, &place.to_dvec3(), line, hit, scene.tone == Tone::Srgb) {
+        (ambient, diffuse) = (ambient.times(&factor.into()), diffuse.times(&factor.into()));
+    }
     let shaded = shapes::shaded(object, line, hit, scene.tone == Tone::Srgb);
     if let Some(shaded) = &shaded {
         let color = Vector::from(shaded.color);

@@ -78,7 +78,7 @@ fn describe(scene: &Scene) -> Result<Value> {
     Ok(json!({
         "shapes": shapes?,
         "suns": suns?,
-        "background": scene.background.color().context("a sky is not translated")?.to_array(),
+        "background": scene.one_color().context("a sky is not translated")?.to_array(),
         "bounces": MAX_BOUNCES,
         "size": [width, scene.screen.height()],
         "eye": pinhole.eye().to_array(),

@@ -88,7 +88,7 @@ fn translated(scene: &Scene) -> Result<String> {
          background {{ rgb {} }}\n\
          camera {{ perspective location {} direction {} right {} up {} }}\n",
         MAX_BOUNCES + 1,
-        vector(scene.background.color().context("a sky is not translated")?),
+        vector(scene.one_color().context("a sky is not translated")?),
         vector(pinhole.eye()),
         vector(direction),
         vector(right),

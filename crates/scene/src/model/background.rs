@@ -17,7 +17,8 @@ pub struct Background {
 }
 
 impl Background {
-    /// No background: rays that reach nothing straight or through glass leave the picture transparent. All other rays see black.
+    /// No background: rays that reach nothing straight or through glass leave the picture transparent. All other rays see the sky,
+    /// or black without one.
     pub const NONE: Self = Self { low: DVec3::ZERO, high: None, is_none: true };
 
     /// Makes a background of one colour. Clamps each channel to 0..=1, and makes zeros positive.
@@ -31,6 +32,11 @@ impl Background {
     /// Makes a background of a fog's colour, whose channels may be any finite numbers.
     pub(super) fn of_fog(color: DVec3) -> Self {
         Self { low: color, high: None, is_none: false }
+    }
+
+    /// Makes a background of a sky's light, whose channels are at least 0.
+    pub(super) fn of_light(low: DVec3, high: Option<DVec3>) -> Self {
+        Self { low, high, is_none: false }
     }
 
     /// Makes a gradient from one colour, seen straight down, to another, seen straight up.

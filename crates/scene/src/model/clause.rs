@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::invalid::{Faults, InvalidValue, Parameter, finite};
+use super::image::Image;
+use super::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
-use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Subject, Values};
+use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Quotes, Subject, Values};
 
 /// The command that defines a material.
 pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
@@ -44,6 +45,9 @@ macro_rules! clauses {
 
 const SIZE: &[Field] = &[Field::new(Parameter::CellSize, &["s"], Kind::Length, Values::Positive)];
 
+const WIDTH: &[Field] = &[Field::new(Parameter::CellSize, &["s"], Kind::Length, Values::Positive)
+    .optional("stands behind `flat` alone")];
+
 const WHOLE_MIRROR: &[Field] = &[Field { presence: Presence::Required, ..MIRROR }];
 const SHINE: &[Field] = &[
     Field::new(Parameter::Shine, &["r", "g", "b"], Kind::Coefficients, Values::Any),
@@ -68,6 +72,7 @@ clauses! {
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
     Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material in a random pattern.";
     Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
+    Image: Form::new("image", WIDTH).with_subject(Subject::Quotes(Quotes::File)).with_usage("image \"FILE\" uv or flat s [xy or xz or zy] or ball"), "A picture as a factor of ambient and diffuse.";
     Own: Form::new("own", &[]), "The colours of a model's file as factors.";
 }
 
@@ -95,12 +100,12 @@ impl Clause {
 
     /// Returns whether the clause is a pattern. A material has at most one.
     pub(crate) fn is_pattern(self) -> bool {
-        self.form().ends_with.is_some()
+        self.form().ends_with.is_some() || self == Self::Image
     }
 }
 
 /// A material that is assembled from its clauses.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Clauses {
     ambient: DVec3,
     diffuse: DVec3,
@@ -130,9 +135,20 @@ impl Clauses {
             Clause::Gradient => {
                 self.finish.pattern = pattern(Weight::Gradient(numbers.number(), numbers.number()))?;
             }
+            // The picture is added on its own.
+            Clause::Image => {
+                if let Some(width) = numbers.optional_number() {
+                    positive(Parameter::CellSize, width)?;
+                }
+            }
             Clause::Own => self.finish.own = true,
         }
         Ok(())
+    }
+
+    /// Adds the picture of a clause `image`.
+    pub(crate) fn add_image(&mut self, image: Image) {
+        self.finish.image = Some(image);
     }
 
     /// Returns the assembled material.

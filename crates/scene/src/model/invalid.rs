@@ -125,6 +125,14 @@ pub enum Parameter {
     ScreenHeight,
     /// The colour of a ray that hits nothing.
     Background,
+    /// The light of a sky; of one with two colours that seen straight down.
+    Sky,
+    /// The light of a sky that is seen straight up.
+    SkyTop,
+    /// The factor of a sky's picture.
+    SkyStrength,
+    /// The angle by which a sky's picture is turned.
+    SkyTurn,
     /// The origin of a pinhole camera's rays.
     Eye,
     /// The view direction of the camera.
@@ -235,6 +243,10 @@ impl fmt::Display for Parameter {
             Self::ScreenWidth => "the width nx",
             Self::ScreenHeight => "the height ny",
             Self::Background => "the background",
+            Self::Sky => "the sky",
+            Self::SkyTop => "the sky above",
+            Self::SkyStrength => "the sky's strength",
+            Self::SkyTurn => "the sky's turn",
             Self::Eye => "the eye",
             Self::Gaze => "the gaze",
             Self::Up => "the view-up",

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::image::Image;
 use super::invalid::{InvalidValue, Parameter, finite, positive};
 
 /// The coefficients of a surface per channel; any finite numbers.
@@ -22,7 +23,7 @@ pub struct Material {
 }
 
 /// The optional properties of a surface besides its coefficients.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Finish {
     /// The specular highlights of the surface.
     pub shine: Option<Shine>,
@@ -30,6 +31,8 @@ pub struct Finish {
     pub glass: Option<Glass>,
     /// The pattern of other coefficients.
     pub pattern: Option<Pattern>,
+    /// The picture that multiplies the ambient and diffuse coefficients.
+    pub image: Option<Image>,
     /// Whether the colour of a model's file multiplies the ambient and diffuse coefficients.
     pub own: bool,
 }

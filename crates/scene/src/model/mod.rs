@@ -9,13 +9,16 @@ mod background;
 mod camera;
 mod clause;
 mod fog;
+mod image;
 mod invalid;
 mod lights;
 mod look;
 mod material;
+mod picture_file;
 mod sampling;
 mod screen;
 pub mod shapes;
+mod sky;
 mod surface;
 mod vector;
 
@@ -25,17 +28,21 @@ pub use background::Background;
 pub use camera::{Camera, Pinhole};
 pub use clause::Clause;
 pub use fog::Fog;
+pub use image::{Axes, Image, ImageMap};
 pub use invalid::{InvalidValue, Parameter};
 pub use lights::{DirectionalLight, Lamp, Light};
 pub use look::Look;
 pub use material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
+pub use picture_file::PictureFile;
 pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
 pub use shapes::{Instance, Mesh, Object, Placement};
+pub use sky::{Sky, SkyColors, SkyTurn};
 pub use vector::unit;
 
 pub(crate) use camera::{ORTHOCAMERA, unsquashed};
 pub(crate) use clause::{Clauses, MATERIAL};
+pub(crate) use image::{AXES, MAPS};
 pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
 pub(crate) use shapes::{FLAT, MESH, SMOOTH, USE, mesh_surface, with_shapes};
@@ -52,8 +59,10 @@ pub struct Scene {
     pub screen: Screen,
     /// The camera that generates the rays.
     pub camera: Camera,
-    /// The colour of rays that hit nothing.
+    /// The colour of rays that hit nothing. With a sky, only whether there is none for rays from the camera.
     pub background: Background,
+    /// The light of rays that hit nothing, in place of the background's colours.
+    pub sky: Option<Sky>,
     /// The objects in the order of the script: of hits at the same distance, the first object wins.
     pub objects: SharedSlice<Object>,
     /// The lights in the order of the script, which is the order of summation.
@@ -79,6 +88,7 @@ impl Scene {
             screen,
             camera,
             background: Background::default(),
+            sky: None,
             objects: SharedSlice::default(),
             lights: SharedSlice::default(),
             samples: Samples::default(),
@@ -90,9 +100,27 @@ impl Scene {
         }
     }
 
-    /// Returns the colour of rays that hit nothing: the background, or the fog's colour, which hides it.
+    /// Returns the colours of rays that hit nothing: those of the sky, of the background, or of the fog, which hides both. A sky
+    /// that is a picture is none of them ([`Self::sky_picture`]).
     pub fn surroundings(&self) -> Background {
-        self.fog.get().map_or(self.background, |(color, _)| Background::of_fog(color))
+        match (self.fog.get(), &self.sky) {
+            (Some((color, _)), _) => Background::of_fog(color),
+            (None, Some(Sky::Colors(colors))) => colors.background(),
+            (None, _) => self.background,
+        }
+    }
+
+    /// Returns the picture that rays see that hit nothing, unless fog hides it.
+    pub fn sky_picture(&self) -> Option<(&PictureFile, SkyTurn)> {
+        match (&self.sky, self.fog.get()) {
+            (Some(Sky::Picture(file, turn)), None) => Some((file, *turn)),
+            _ => None,
+        }
+    }
+
+    /// Returns the colour of all rays that hit nothing, or `None` if it depends on their direction.
+    pub fn one_color(&self) -> Option<DVec3> {
+        self.surroundings().color().filter(|_| self.sky_picture().is_none())
     }
 
     /// Sets the background; each channel is clamped to 0..=1.

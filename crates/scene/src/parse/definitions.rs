@@ -80,6 +80,7 @@ pub(super) struct Pending {
     pub(super) camera: Option<(Option<usize>, usize)>,
     pub(super) lens: Option<(Option<usize>, usize)>,
     pub(super) background: Option<(Option<usize>, usize)>,
+    pub(super) sky: Option<(Option<usize>, usize)>,
     pub(super) fog: Option<(Option<usize>, usize)>,
     moving: Vec<(usize, usize)>,
     materials: Vec<(usize, usize)>,
@@ -180,6 +181,8 @@ impl<'a> Parser<'a> {
             Effect::Screen
             | Effect::Camera(_)
             | Effect::Background
+            | Effect::Sky
+            | Effect::SkyPicture
             | Effect::Fog
             | Effect::Lens
             | Effect::Samples
@@ -269,6 +272,19 @@ impl<'a> Parser<'a> {
                 let first = first.clause;
                 self.report.error(s.line, place.clone(), || wording::clause_twice(clause, first));
             }
+            if clause == Clause::Image {
+                let Some((image, row, spans)) = self.clause_image(s, &place, &parameters.words, &mut next)
+                else {
+                    continue;
+                };
+                if row.is_constant() {
+                    self.check_clause(s, clause, &row, &spans);
+                } else {
+                    moving.push(self.keep_moving(s.line, spans, Origin::Clause(clause), &row));
+                }
+                lines.push(ClauseLine { clause, row, other: None, image: Some(image) });
+                continue;
+            }
             let (row, spans) = self.clause_numbers(s, clause, &place, &mut parameters, &mut next);
             let other = match clause.form().ends_with {
                 Some(_) => self.clause_material(s, clause, &place, &parameters.words, &mut next),
@@ -286,7 +302,7 @@ impl<'a> Parser<'a> {
                 } else {
                     moving.push(self.keep_moving(s.line, spans, Origin::Clause(clause), &row));
                 }
-                lines.push(ClauseLine { clause, row, other });
+                lines.push(ClauseLine { clause, row, other, image: None });
             }
         }
         if self.report.error_count() == errors_before {
@@ -520,8 +536,9 @@ impl<'a> Parser<'a> {
 
     /// The scene is cleared: records which Traces rendered each of its lines.
     pub(super) fn settle_scene(&mut self) {
-        let background = self.pending.background.take();
-        self.settle(background);
+        for old in [self.pending.background.take(), self.pending.sky.take()] {
+            self.settle(old);
+        }
         let mut suffix = Suffix::of(&self.exposures);
         for (number, since) in self.pending.moving.drain(..).rev() {
             join(&mut self.moving[number].visible_span, suffix.from(since));

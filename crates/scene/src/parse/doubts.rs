@@ -8,7 +8,7 @@ use super::line::{Statement, decimal_comma};
 use super::{Parser, wording};
 use crate::command::{Command, Effect};
 use crate::form::{Form, Kind};
-use crate::model::{Camera, Clause, Light, Material, Parameter};
+use crate::model::{Camera, Clause, ImageMap, Light, Material, Parameter};
 use crate::report::Line;
 use crate::row::{Number, Row};
 use crate::script::{ClauseLine, Value};
@@ -42,6 +42,9 @@ pub(super) struct Doubts<'a> {
     /// Whether an object of the scene has a colour that needs light.
     needs_light: bool,
     is_dark_told: bool,
+    /// The line of the sky, until it is known whether it is seen; and whether there is fog.
+    pub(super) sky: Option<Place<'a>>,
+    pub(super) is_foggy: bool,
 }
 
 /// The properties of a material on which warnings depend.
@@ -51,6 +54,8 @@ pub(super) struct Looks {
     pub(super) refracts: bool,
     /// Whether it has the colours of a file.
     pub(super) is_own: bool,
+    /// Whether it has a picture by texture coordinates.
+    pub(super) needs_uv: bool,
 }
 
 impl Looks {
@@ -65,6 +70,9 @@ impl Looks {
             is_diffuse: is_diffuse || other.is_some_and(|other| other.is_diffuse),
             refracts,
             is_own: has(Clause::Own).is_some(),
+            needs_uv: has(Clause::Image)
+                .and_then(|line| line.image.as_ref())
+                .is_some_and(|image| image.map() == ImageMap::Uv),
         }
     }
 }
@@ -112,7 +120,7 @@ impl<'a> Parser<'a> {
     ) {
         for (i, field) in form.fields.iter().enumerate() {
             let least = match (field.kind, field.parameter) {
-                (Kind::Color, Parameter::LightColor) => FAR_TOO_BRIGHT,
+                (Kind::Color, Parameter::LightColor | Parameter::Sky | Parameter::SkyTop) => FAR_TOO_BRIGHT,
                 (Kind::Color | Kind::Coefficients, _) => FAR_ABOVE_ONE,
                 _ => continue,
             };
@@ -196,7 +204,7 @@ impl<'a> Parser<'a> {
     }
 
     pub(super) fn doubt_no_more_of_scene(&mut self) {
-        (self.doubts.light, self.doubts.needs_light) = (None, false);
+        (self.doubts.light, self.doubts.needs_light, self.doubts.sky) = (None, false, None);
     }
 
     /// Warns of settings and lights without an effect in the picture that is rendered now, each only once.
@@ -214,6 +222,11 @@ impl<'a> Parser<'a> {
                 self.report.warning(line, span, || wording::needs_samples(what));
             }
         }
+        if self.doubts.is_foggy
+            && let Some((line, span)) = self.doubts.sky.take()
+        {
+            self.report.warning(line, span, wording::sky_in_fog);
+        }
         if self.lights == 0
             && self.doubts.needs_light
             && !std::mem::replace(&mut self.doubts.is_dark_told, true)
@@ -230,6 +243,7 @@ pub(super) fn looks_of(material: &Material) -> Looks {
             || material.finish().is_some_and(|finish| finish.shine.is_some() || finish.pattern.is_some()),
         refracts: material.finish().and_then(|finish| finish.glass).is_some_and(|glass| glass.ior() != 1.0),
         is_own: material.finish().is_some_and(|finish| finish.own),
+        needs_uv: false,
     }
 }
 
@@ -237,5 +251,6 @@ pub(super) fn looks_of(material: &Material) -> Looks {
 pub(super) fn looks_in(form: &Form, row: &Row) -> Looks {
     let mut diffuse =
         form.numbers().enumerate().filter(|(_, (_, field))| field.parameter == Parameter::Diffuse);
-    Looks { is_diffuse: diffuse.any(|(i, _)| row.largest(i) != Some(0.0)), refracts: false, is_own: false }
+    let is_diffuse = diffuse.any(|(i, _)| row.largest(i) != Some(0.0));
+    Looks { is_diffuse, refracts: false, is_own: false, needs_uv: false }
 }

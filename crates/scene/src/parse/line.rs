@@ -133,6 +133,8 @@ impl<'a> Parser<'a> {
             self.unknown_command(line, text, words);
             return None;
         };
+        let first = words.parameters().first().map(|word| &text[word.clone()]);
+        let command = command.with_first_word(first);
         let subject = match command.form().subject {
             None => None,
             Some(subject) => match self.subject(line, text, command, subject, words) {

@@ -93,6 +93,7 @@ impl<'a> Parser<'a> {
         let Some(model) = self.model(s, &subject, &name, smoothing) else { return };
         let mesh = Mesh::new(&name, smoothing, model, None);
         self.doubt_object(s, looks.unwrap_or_else(|| looks_of(mesh.material())));
+        self.check_uv(s, looks.is_some_and(|looks| looks.needs_uv), Some(&mesh));
         if looks.is_some_and(|looks| looks.refracts) {
             self.doubt_glass_mesh(s, &mesh, &subject);
         }
@@ -203,7 +204,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Returns the name of a file in quotes. If there is a fault, returns `None` and reports it.
-    fn file(&mut self, s: &Statement<'a, '_>, span: Range<usize>) -> Option<String> {
+    pub(super) fn file(&mut self, s: &Statement<'a, '_>, span: Range<usize>) -> Option<String> {
         let name = match unquoted(&s.text[span.clone()]) {
             Ok(name) => name,
             Err(fault) => {

@@ -12,11 +12,13 @@ mod curve;
 mod definitions;
 mod doubts;
 mod foreign;
+mod images;
 mod line;
 mod meshes;
 mod names;
 mod number;
 mod picture;
+mod surroundings;
 mod text;
 mod visibility;
 mod wording;
@@ -29,9 +31,7 @@ use crate::command::{Command, Effect, Reader};
 use crate::diagnostic::Diagnostic;
 use crate::form::{Names as Kinds, Numbers, Scripted};
 use crate::limits::Limits;
-use crate::model::{
-    Background, Camera, Faults, Fog, InvalidValue, Lens, Light, Lint, Material, Object, Placement, Screen,
-};
+use crate::model::{Camera, Faults, InvalidValue, Lens, Light, Lint, Material, Object, Placement, Screen};
 use crate::report::{Line, Report};
 use crate::script::{Drawn, Recorder, Script, Template, Value};
 pub use curve::parse_curve;
@@ -235,6 +235,8 @@ impl<'a> Parser<'a> {
             Effect::End => self.close_group(),
             Effect::Camera(_)
             | Effect::Background
+            | Effect::Sky
+            | Effect::SkyPicture
             | Effect::Fog
             | Effect::Lens
             | Effect::Samples
@@ -262,6 +264,8 @@ impl<'a> Parser<'a> {
             Effect::Screen => self.screen(s),
             Effect::Camera(read) => self.camera(s, read),
             Effect::Background => self.background(s),
+            Effect::Sky => self.sky(s),
+            Effect::SkyPicture => self.sky_picture(s),
             Effect::Fog => self.fog(s),
             Effect::Lens => self.lens(s),
             Effect::Samples => {
@@ -368,22 +372,6 @@ impl<'a> Parser<'a> {
         self.record(|recorder| recorder.set_lens(lens));
     }
 
-    fn background(&mut self, s: &Statement<'a, '_>) {
-        self.unseen.removable.get_or_insert_with(|| s.place());
-        let Some((background, moving)) = self.read_value(s, Background::read) else { return };
-        let old = self.pending.background.replace((moving, self.exposures.len()));
-        self.settle(old);
-        self.record(|recorder| recorder.set_background(background));
-    }
-
-    fn fog(&mut self, s: &Statement<'a, '_>) {
-        self.unseen.lasting.get_or_insert_with(|| s.place());
-        let Some((fog, moving)) = self.read_value(s, Fog::read) else { return };
-        let old = self.pending.fog.replace((moving, self.exposures.len()));
-        self.settle(old);
-        self.record(|recorder| recorder.set_fog(fog));
-    }
-
     /// Applies a setting that a `Clear` keeps.
     fn set<T: Scripted>(&mut self, s: &Statement<'a, '_>, set: impl FnOnce(&mut Recorder, T)) {
         self.unseen.lasting.get_or_insert_with(|| s.place());
@@ -416,6 +404,7 @@ impl<'a> Parser<'a> {
             self.lint_object(s, &object);
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_of(object.material())));
             self.doubt_own(s, named_looks);
+            self.check_uv(s, named_looks.is_some_and(|looks| looks.needs_uv), None);
             if s.command.form().hides(s.values) {
                 return;
             }
@@ -430,6 +419,7 @@ impl<'a> Parser<'a> {
             let row = s.row.clone().unwrap_or_else(|| s.still_row());
             self.doubt_object(s, named_looks.unwrap_or_else(|| looks_in(s.command.form(), &row)));
             self.doubt_own(s, named_looks);
+            self.check_uv(s, named_looks.is_some_and(|looks| looks.needs_uv), None);
             let template = Template { command: s.command, row: row.clone() };
             if moves {
                 let spans = s.words.parameters().to_vec();

@@ -51,7 +51,8 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
     } else if ["//", "/*", ";", "%", "--"].iter().any(|mark| name.starts_with(mark)) {
         "a comment starts with `#`".to_string()
     } else {
-        let names: Vec<_> = Command::ALL.iter().map(|c| format!("`{}`", c.name())).collect();
+        let mut names: Vec<_> = Command::ALL.iter().map(|c| format!("`{}`", c.name())).collect();
+        names.dedup();
         format!("the commands are {}", names.join(", "))
     };
     Fault::new(Code::UnknownCommand, format!("unknown command {}", quoted(name)))
@@ -725,6 +726,45 @@ pub(super) fn open_glass(file: &str, closure: &Closure) -> Fault {
 pub(super) fn own_without_file(command: Command) -> Fault {
     Fault::new(Code::NoEffect, format!("`own` has no effect on a `{command}`"))
         .help("the colours of a file are those of a `Mesh`")
+}
+
+pub(super) fn no_image_file(word: Option<&str>) -> Fault {
+    let message = match word {
+        None => "`image` names no file".to_string(),
+        Some(word) => format!("{} is not in quotes", quoted(word)),
+    };
+    Fault::new(Code::MalformedQuote, message)
+        .expected("expected the name of a picture in quotes, as in `\"earth.png\"`")
+        .help(format!("write `{}`", Clause::Image.form()))
+}
+
+pub(super) fn no_map(word: Option<&str>) -> Fault {
+    let fault = match word {
+        None => Fault::new(Code::TooFewParameters, "`image` does not say how the picture lies"),
+        Some(word) => {
+            Fault::new(Code::InvalidValue, format!("{} is no way in which a picture lies", quoted(word)))
+        }
+    };
+    fault.expected("expected `uv`, `flat` or `ball`").help(format!("write `{}`", Clause::Image.form()))
+}
+
+pub(super) fn no_image_width() -> Fault {
+    Fault::new(Code::TooFewParameters, "`flat` lacks the width of the picture")
+        .expected("expected a length, as in `flat 2`")
+}
+
+pub(super) fn no_uv(command: Command, file: Option<&str>) -> Fault {
+    let what = match file {
+        Some(file) => format!("the model `{file}` has no texture coordinates"),
+        None => format!("a `{command}` has no texture coordinates"),
+    };
+    Fault::new(Code::UnfitMaterial, format!("{what}, which a picture with `uv` needs"))
+        .help("`flat` and `ball` place a picture on any object")
+}
+
+pub(super) fn sky_in_fog() -> Fault {
+    Fault::new(Code::NoEffect, "the sky has no effect: fog hides it")
+        .help("`Fog none` ends the fog, and `Background` the sky")
 }
 
 pub(super) fn no_smooth_angle() -> Fault {

@@ -18,8 +18,8 @@ use std::ops::Range;
 
 use crate::command::Command;
 use crate::model::{
-    Background, Camera, Clause, Depth, Fog, FrameNumbers, InvalidValue, Lens, Light, Material, Mesh, Object,
-    Samples, Scene, Screen, Shutter, Tone,
+    Background, Camera, Clause, Depth, Fog, FrameNumbers, Image, InvalidValue, Lens, Light, Material, Mesh,
+    Object, PictureFile, Samples, Scene, Screen, Shutter, SkyColors, SkyTurn, Tone,
 };
 use crate::row::Row;
 use crate::shared_slice::SharedSlice;
@@ -67,6 +67,7 @@ pub(crate) struct View {
     pub(crate) screen: Screen,
     pub(crate) camera: Value<Camera>,
     pub(crate) background: Value<Background>,
+    pub(crate) sky: Option<SkyLine>,
     pub(crate) lens: Value<Lens>,
     pub(crate) fog: Value<Fog>,
     pub(crate) samples: Samples,
@@ -80,6 +81,13 @@ pub(crate) struct View {
 pub(crate) enum Value<T> {
     Constant(T),
     Animated(Template),
+}
+
+/// The sky of a view.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum SkyLine {
+    Colors(Value<SkyColors>),
+    Picture(PictureFile, Value<SkyTurn>),
 }
 
 /// A line that is evaluated at each requested moment.
@@ -154,6 +162,8 @@ pub(crate) struct ClauseLine {
     pub(crate) row: Row,
     /// The material that a pattern names.
     pub(crate) other: Option<usize>,
+    /// The picture of a clause `image`; its width is in the row.
+    pub(crate) image: Option<Image>,
 }
 
 /// A named group with its objects.

@@ -5,11 +5,11 @@
 
 use std::sync::Arc;
 
-use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, Template, Value};
+use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, SkyLine, Template, Value};
 use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
 use crate::model::{
-    Clauses, Coefficients, Faults, Instance, Light, Material, Mesh, Object, Placement, Scene, Tone,
+    Clauses, Coefficients, Faults, Instance, Light, Material, Mesh, Object, Placement, Scene, Sky, Tone,
     mesh_surface,
 };
 use crate::row::Row;
@@ -45,6 +45,16 @@ impl Script {
         })?;
         let mut scene = Scene::new(view.screen, camera);
         scene.background = view.background.at(frame, view.tone, |_| Some(Scripted::read))?;
+        scene.sky = match &view.sky {
+            Some(SkyLine::Colors(colors)) => {
+                Some(Sky::Colors(colors.at(frame, view.tone, |_| Some(Scripted::read))?))
+            }
+            Some(SkyLine::Picture(file, turn)) => {
+                let turn = turn.at(frame, view.tone, |_| Some(Scripted::read))?;
+                Some(Sky::Picture(file.clone(), turn))
+            }
+            None => None,
+        };
         scene.lens = view.lens.at(frame, view.tone, |_| Some(Scripted::read))?;
         scene.fog = view.fog.at(frame, view.tone, |_| Some(Scripted::read))?;
         (scene.samples, scene.shutter) = (view.samples, view.shutter);
@@ -238,6 +248,9 @@ impl NamedMaterial {
             };
             let values = line.row.at(frame, tone);
             clauses.add(line.clause, &mut Numbers::new(&values, line.row.len(), None), coefficients)?;
+            if let Some(image) = &line.image {
+                clauses.add_image(image.with_width(values[..line.row.len()].first().copied())?);
+            }
         }
         Ok(clauses.material()?)
     }

@@ -2,9 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ClauseLine, Drawn, GroupRecorder, NamedMaterial, Recorder, Script, Value};
+use super::{ClauseLine, Drawn, GroupRecorder, NamedMaterial, Recorder, Script, SkyLine, Value};
 use crate::model::{
-    Clause, Coefficients, FrameNumbers, Instance, Material, Object, Pattern, Placement, Scene, Weight,
+    Clause, Coefficients, FrameNumbers, ImageMap, Instance, Material, Object, Pattern, Placement, Scene, Sky,
+    Weight,
 };
 use crate::row::{Number, Row};
 
@@ -29,6 +30,13 @@ impl From<&Scene> for Script {
         let mut recorder = namer.recorder;
         recorder.set_camera(Value::Constant(scene.camera));
         recorder.set_background(Value::Constant(scene.background));
+        match scene.sky.clone() {
+            Some(Sky::Colors(colors)) => recorder.set_sky(SkyLine::Colors(Value::Constant(colors))),
+            Some(Sky::Picture(file, turn)) => {
+                recorder.set_sky(SkyLine::Picture(file, Value::Constant(turn)));
+            }
+            None => {}
+        }
         recorder.set_lens(Value::Constant(scene.lens));
         recorder.set_fog(Value::Constant(scene.fog));
         (recorder.samples, recorder.shutter) = (scene.samples, scene.shutter);
@@ -84,7 +92,7 @@ impl Namer {
         {
             return Some(*number);
         }
-        let finish = *material.finish()?;
+        let finish = material.finish()?.clone();
         let mut clauses = coefficients(material.coefficients());
         if let Some(shine) = finish.shine {
             clauses.push(line(Clause::Shine, &[&shine.color().to_array(), &[shine.exponent()]], None));
@@ -101,6 +109,13 @@ impl Namer {
                 Weight::Gradient(start, end) => (Clause::Gradient, vec![start, end]),
             };
             clauses.push(line(clause, &[&numbers], Some(other)));
+        }
+        if let Some(image) = finish.image {
+            let width = match image.map() {
+                ImageMap::Flat(width, _) => vec![width],
+                ImageMap::Uv | ImageMap::Ball => vec![],
+            };
+            clauses.push(ClauseLine { image: Some(image), ..line(Clause::Image, &[&width], None) });
         }
         if finish.own {
             clauses.push(line(Clause::Own, &[], None));
@@ -125,7 +140,7 @@ fn coefficients(own: Coefficients) -> Vec<ClauseLine> {
 }
 
 fn line(clause: Clause, numbers: &[&[f64]], other: Option<usize>) -> ClauseLine {
-    ClauseLine { clause, row: row(numbers), other }
+    ClauseLine { clause, row: row(numbers), other, image: None }
 }
 
 fn row(numbers: &[&[f64]]) -> Row {

@@ -1,6 +1,8 @@
 //! The recorder: applies commands to the state, and stores the shots.
 
-use super::{Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, Template, Value, View};
+use super::{
+    Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, SkyLine, Template, Value, View,
+};
 use crate::model::{
     Background, Camera, Depth, Fog, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
 };
@@ -15,6 +17,7 @@ pub(crate) struct Recorder {
     lights: List<Light, Template>,
     camera: Value<Camera>,
     background: Value<Background>,
+    sky: Option<SkyLine>,
     lens: Value<Lens>,
     fog: Value<Fog>,
     /// The current settings. The screen is passed to each `Trace`.
@@ -103,7 +106,18 @@ impl Recorder {
     }
 
     pub(crate) fn set_background(&mut self, background: Value<Background>) {
+        // None takes away a colour, and no sky.
+        if background != Value::Constant(Background::NONE) {
+            self.sky = None;
+        }
         set(&mut self.background, background);
+    }
+
+    pub(crate) fn set_sky(&mut self, sky: SkyLine) {
+        if self.background != Value::Constant(Background::NONE) {
+            self.background = Value::default();
+        }
+        set(&mut self.sky, Some(sky));
     }
 
     pub(crate) fn set_lens(&mut self, lens: Value<Lens>) {
@@ -124,6 +138,7 @@ impl Recorder {
         self.surfaces.truncate(self.objects.still.len());
         self.lights.clear();
         self.background = Value::default();
+        self.sky = None;
     }
 
     /// Records a `Trace`. `drawn` is the largest number of objects that a frame draws.
@@ -133,6 +148,7 @@ impl Recorder {
                 screen,
                 camera: self.camera.clone(),
                 background: self.background.clone(),
+                sky: self.sky.clone(),
                 lens: self.lens.clone(),
                 fog: self.fog.clone(),
                 samples: self.samples,
@@ -163,10 +179,11 @@ impl Recorder {
 
     /// Returns whether `view` equals the current state, which is the common case.
     fn is_seen_by(&self, view: &View, screen: Screen) -> bool {
-        let View { screen: size, camera, background, lens, fog, samples, shutter, tone, depth } = view;
+        let View { screen: size, camera, background, sky, lens, fog, samples, shutter, tone, depth } = view;
         *size == screen
             && *camera == self.camera
             && *background == self.background
+            && *sky == self.sky
             && *lens == self.lens
             && *fog == self.fog
             && (*samples, *shutter, *tone, *depth) == (self.samples, self.shutter, self.tone, self.depth)

@@ -12,9 +12,9 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use super::{Drawn, Extent, NamedMaterial, Objects, Script, Shot, Template, Value, View};
+use super::{Drawn, Extent, NamedMaterial, Objects, Script, Shot, SkyLine, Template, Value, View};
 use crate::command::Command;
-use crate::form::write_line;
+use crate::form::{Line, Scripted, quoted_word, write_line};
 use crate::model::{Background, Camera, Fog, FrameNumbers, Lens, Scene, Screen};
 
 /// Writes a script: materials and groups, then for each shot the changes since the previous one, and a `Trace`.
@@ -31,10 +31,11 @@ impl Display for Script {
         for shot in &self.shots {
             let view = &self.views[shot.view];
             let (mut objects, mut lights) = (shot.objects.clone(), shot.lights.clone());
-            let mut background = &Value::Constant(Background::default());
+            let before = Value::Constant(Background::default());
+            let (mut background, mut sky) = (&before, &None);
             if let Some(seen) = seen {
                 if seen.objects.starts_with(&objects) && seen.lights.starts_with(&lights) {
-                    background = &last.background;
+                    (background, sky) = (&last.background, &last.sky);
                     objects = objects.behind(&seen.objects);
                     lights = lights.behind(&seen.lights);
                 } else {
@@ -48,12 +49,7 @@ impl Display for Script {
             if seen.map_or(FrameNumbers::default(), |seen| seen.numbers) != shot.numbers {
                 write_line(f, &shot.numbers, None)?;
             }
-            if *background != view.background {
-                match &view.background {
-                    Value::Constant(background) => write_line(f, background, None)?,
-                    Value::Animated(template) => template.write(f, None)?,
-                }
-            }
+            view.write_surroundings(f, background, sky)?;
             self.write_lights(f, &lights)?;
             self.write_objects(f, &self.objects, &objects)?;
             (0..shot.times).try_for_each(|_| write_name(f, Command::Trace))?;
@@ -76,7 +72,10 @@ impl Script {
         write!(f, "{} {}", Command::Material, material.name)?;
         for line in &material.clauses {
             write!(f, " {}", line.clause.name())?;
-            line.row.write(f)?;
+            match &line.image {
+                Some(image) => image.write(f, |f| line.row.write(f))?,
+                None => line.row.write(f)?,
+            }
             if let Some(other) = line.other {
                 write!(f, " {}", self.materials[other].name)?;
             }
@@ -134,6 +133,7 @@ impl View {
             screen,
             camera: Value::default(),
             background: Value::default(),
+            sky: None,
             lens: Value::default(),
             fog: Value::default(),
             samples: Default::default(),
@@ -141,6 +141,39 @@ impl View {
             tone: Default::default(),
             depth: Default::default(),
         }
+    }
+
+    /// Writes the changes of the surroundings: a colour or a sky, and whether rays from the camera see them.
+    fn write_surroundings(
+        &self,
+        f: &mut Formatter<'_>,
+        background: &Value<Background>,
+        sky: &Option<SkyLine>,
+    ) -> fmt::Result {
+        let none = Value::Constant(Background::NONE);
+        let (is_hidden, was_hidden) = (self.background == none, *background == none);
+        let write_background = |f: &mut Formatter<'_>, background: &Value<Background>| match background {
+            Value::Constant(background) => write_line(f, background, None),
+            Value::Animated(template) => template.write(f, None),
+        };
+        let Some(line) = &self.sky else {
+            if sky.is_some() && is_hidden {
+                write_background(f, &Value::default())?;
+            }
+            return if sky.is_some() || *background != self.background {
+                write_background(f, &self.background)
+            } else {
+                Ok(())
+            };
+        };
+        let is_shown_again = was_hidden && !is_hidden;
+        if is_shown_again {
+            write_background(f, &Value::default())?;
+        }
+        if is_shown_again || self.sky != *sky {
+            line.write(f)?;
+        }
+        if is_hidden && !was_hidden { write_background(f, &none) } else { Ok(()) }
     }
 
     /// Writes the changes of settings that a `Clear` keeps, except the screen.
@@ -176,6 +209,23 @@ impl View {
             write_line(f, &self.depth, None)?;
         }
         Ok(())
+    }
+}
+
+impl SkyLine {
+    fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Colors(Value::Constant(colors)) => write_line(f, colors, None),
+            Self::Colors(Value::Animated(template)) => template.write(f, None),
+            Self::Picture(file, turn) => {
+                write!(f, "{} {}", Command::SkyPicture, quoted_word(file.file()))?;
+                match turn {
+                    Value::Constant(turn) => turn.write(&mut Line::new(f, None))?,
+                    Value::Animated(template) => template.row.write(f)?,
+                }
+                writeln!(f)
+            }
+        }
     }
 }
 

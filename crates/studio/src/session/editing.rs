@@ -12,10 +12,11 @@ use crate::materials;
 use crate::names;
 use crate::project::Project;
 use crate::protocol::ServerMessage;
-use crate::tables::{Role, role};
+use crate::tables::{Role, by_title, role};
 use crate::view::Projection;
 
 /// The notice for a mesh where there is no model.
+const NO_PICTURE: &str = "There is no picture (.hdr, .exr, .png, .jpg, .webp) beside the script.";
 const NO_MODEL: &str = "There is no model (.obj, .ply, .stl, .glb, .gltf) beside the script.";
 
 /// The number of frames of a new animation.
@@ -58,8 +59,8 @@ impl Session {
         at: Option<DVec2>,
         tell: &mut ServerMessage,
     ) {
-        let (name, subject) = name.split_once(' ').unwrap_or((name, ""));
-        let Some(command) = Command::from_name(name) else { return };
+        let Some(command) = by_title(name) else { return };
+        let (_, subject) = name.split_once(' ').unwrap_or((name, ""));
         match role(command) {
             Role::Object if command == Command::Mesh => {
                 self.add_mesh(project, tell);
@@ -150,6 +151,17 @@ impl Session {
         let source_map = &shown.source_map;
         let splices = match command {
             _ if source_map.setting(command).is_some() => return,
+            Command::SkyPicture => {
+                let file = self.place(project).file;
+                let Some(picture) =
+                    project.files.get(file).and_then(|file| file.pictures().into_iter().next())
+                else {
+                    tell.notice = Some(NO_PICTURE.into());
+                    return;
+                };
+                let line = Line::new(&format!("{} {}", command.name(), quoted_word(&picture)));
+                vec![Splice { at: source_map.start(), removed: 0, inserted: vec![line] }]
+            }
             Command::Frames => edits::set_frames(self.file_lines(project), source_map, FRAMES),
             _ => vec![Splice {
                 at: source_map.start(),

@@ -18,7 +18,7 @@ use crate::project::Project;
 use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, TimelineEdit};
 use crate::silhouette::View;
 use crate::source_map::SourceMap;
-use crate::tables::FieldTable;
+use crate::tables::{FieldTable, title};
 use crate::tracks::{self, Copied, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
@@ -208,7 +208,7 @@ impl Session {
         let surface = form.surface().filter(|&at| is_named(at) && !curves.contains(&at));
         Some(Inspected {
             line: at,
-            command: values.command.name(),
+            command: title(values.command),
             values: values.written().to_vec(),
             keyed,
             can_key: form.curves,

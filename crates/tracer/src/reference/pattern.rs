@@ -10,6 +10,7 @@ use rayfold_scene::{Coefficients, Object};
 use super::noise::noise;
 use super::shapes::{Surface, face};
 use super::whole::{ceil, is_odd};
+use crate::pictures::factor;
 
 /// The distance below which a number of the script is on a wall between cells, relative to the larger of 1 and the
 /// number.
@@ -18,11 +19,23 @@ const WALL: f64 = 1.0 / (1u64 << 40) as f64;
 /// Returns the coefficients of an object's surface.
 ///
 /// `place` is the hit point and `normal` its normal, in the coordinates of the object's numbers. `object` is not an
-/// instance.
-pub(crate) fn coefficients(object: &Object, place: DVec3, normal: DVec3, surface: &Surface) -> Coefficients {
+/// instance. `is_linear` is whether colours are linear light.
+pub(crate) fn coefficients(
+    object: &Object,
+    place: DVec3,
+    normal: DVec3,
+    surface: &Surface,
+    is_linear: bool,
+) -> Coefficients {
     let material = object.material();
     let own = material.coefficients();
-    let Some(pattern) = material.finish().and_then(|finish| finish.pattern) else { return own };
+    let Some(finish) = material.finish() else { return own };
+    if let Some(image) = &finish.image {
+        let factor = factor(image, object, place, is_linear);
+        return Coefficients::new(own.ambient() * factor, own.diffuse() * factor, own.mirror())
+            .unwrap_or(own);
+    }
+    let Some(pattern) = finish.pattern else { return own };
     let face = if surface.flat { face(object, place, normal) } else { None };
     own.mixed(&pattern.other, weight(pattern.weight, place, face))
 }

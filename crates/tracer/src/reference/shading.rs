@@ -82,7 +82,7 @@ impl Shader<'_> {
         let Some(hit) = world.nearest(ray) else {
             return match path.clear {
                 Some(clear) => Seen { clear, ..Seen::BLACK },
-                None => Seen { color: world.scene.surroundings().along(ray.direction), ..Seen::BLACK },
+                None => Seen { color: world.around(ray.direction), ..Seen::BLACK },
             };
         };
         let Some((fog, distance)) = world.scene.fog.get() else { return self.seen_at(ray, &hit, path) };
@@ -95,7 +95,8 @@ impl Shader<'_> {
     fn seen_at(&self, ray: Ray, hit: &Hit, path: Path) -> Seen {
         let world = self.world;
         let (object, place, local_normal) = world.in_script(hit.object, &hit.surface);
-        let coefficients = coefficients(object, place, local_normal, &hit.surface);
+        let coefficients =
+            coefficients(object, place, local_normal, &hit.surface, world.scene.tone == Tone::Srgb);
         let face = hit.surface.normal;
         let start = hit.surface.point + hit.surface.offset * face;
         let shading = world.shading(hit, ray.direction);

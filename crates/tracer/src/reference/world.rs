@@ -10,6 +10,7 @@ use super::Hit;
 use super::shapes::{self, Surface};
 use crate::camera::{Ray, Rays, Single};
 use crate::meshes::{Expanded, FaceHit, Faces, Shading};
+use crate::pictures::Panorama;
 
 /// The world that rays are traced through.
 pub(super) struct World<'a> {
@@ -23,6 +24,8 @@ pub(super) struct World<'a> {
     /// The origin of these coordinates in those of the script.
     center: DVec3,
     pub(super) has_glass: bool,
+    /// The picture all around.
+    panorama: Option<Panorama>,
     /// The faces that triangles are.
     faces: Option<&'a Faces>,
 }
@@ -50,6 +53,7 @@ impl<'a> World<'a> {
             lights: Cow::Borrowed(&scene.lights),
             center: DVec3::ZERO,
             has_glass: scene.objects.iter().any(|object| glass(object).is_some()),
+            panorama: Panorama::of(scene),
             faces: None,
         };
         world.seen_from_eye().unwrap_or(world)
@@ -74,6 +78,7 @@ impl<'a> World<'a> {
             lights: lights.collect::<Option<Vec<_>>>()?.into(),
             rays: self.rays.with_eye_at_origin(),
             center: eye,
+            panorama: self.panorama.clone(),
             ..*self
         })
     }
@@ -85,6 +90,14 @@ impl<'a> World<'a> {
             Light::Lamp(lamp) => lamp.position(),
         };
         self.lights.iter().map(middle).collect()
+    }
+
+    /// Returns the light that comes from where a ray goes that hits nothing.
+    pub(super) fn around(&self, direction: DVec3) -> DVec3 {
+        match &self.panorama {
+            Some(panorama) => panorama.along(direction),
+            None => self.scene.surroundings().along(direction),
+        }
     }
 
     /// Returns what a face of a mesh adds to the surface of a hit.

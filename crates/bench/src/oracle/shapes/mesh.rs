@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use rayfold_scene::assets::Closure;
-use rayfold_scene::{Material, Mesh, Object, Triangle};
+use rayfold_scene::{Material, Mesh, Object, Placement, Triangle};
 
 use super::Shape;
 use crate::oracle::hit::Hit;
@@ -60,16 +60,37 @@ impl Shape for Mesh {
     }
 }
 
+/// Returns the texture coordinates of a hit on a mesh, also in a group, and whether they count from the top of a picture.
+pub(in crate::oracle) fn texture(object: &Object, line: &Line, hit: &Hit) -> Option<([f64; 2], bool)> {
+    let (mesh, local, _) = mesh_of(object, line)?;
+    let (model, k) = (mesh.model(), hit_at(mesh, &local, &hit.t));
+    let [a, b, c] = &model.corners(k).map(Vector::from);
+    let point = local.at(&hit.t);
+    let area = b.minus(a).cross(&c.minus(a));
+    let whole = area.dot(&area);
+    let weight =
+        |p: &Vector, q: &Vector| area.dot(&p.minus(&point).cross(&q.minus(&point))).over(&whole).to_f64();
+    let weights = [weight(b, c), weight(c, a), weight(a, b)];
+    let uvs = model.uvs(k)?;
+    let sum = |axis: usize| uvs.iter().zip(weights).map(|(uv, weight)| weight * f64::from(uv[axis])).sum();
+    Some(([sum(0), sum(1)], model.has_uvs_from_top()))
+}
+
+/// Returns the mesh that an object is, the line in the coordinates of its file, and its place if it is in a group.
+fn mesh_of<'a>(object: &'a Object, line: &Line) -> Option<(&'a Mesh, Line, Option<&'a Placement>)> {
+    match object {
+        Object::Mesh(mesh) => Some((mesh, line.clone(), None)),
+        Object::Instance(instance) => match instance.object() {
+            Object::Mesh(mesh) => Some((mesh, instance.local(line), Some(instance.placement()))),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 /// Returns what a mesh, also in a group, adds to the surface of a hit. `linear` is whether colours are linear light.
 pub(in crate::oracle) fn shaded(object: &Object, line: &Line, hit: &Hit, linear: bool) -> Option<Shaded> {
-    let (mesh, local, placement) = match object {
-        Object::Mesh(mesh) => (mesh, line.clone(), None),
-        Object::Instance(instance) => match instance.object() {
-            Object::Mesh(mesh) => (mesh, instance.local(line), Some(instance.placement())),
-            _ => return None,
-        },
-        _ => return None,
-    };
+    let (mesh, local, placement) = mesh_of(object, line)?;
     let (model, k) = (mesh.model(), hit_at(mesh, &local, &hit.t));
     let corners = model.corners(k).map(Vector::from);
     let point = local.at(&hit.t);

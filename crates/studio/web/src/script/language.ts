@@ -28,10 +28,12 @@ export interface Slot {
   readonly clauses: boolean;
 }
 
+/** The entries by their names; of two with the same name the first. */
 const byName = (entries: readonly LanguageEntry[]): ReadonlyMap<string, LanguageEntry> =>
-  new Map(entries.map((entry) => [entry.name.toLowerCase(), entry]));
+  new Map([...entries].reverse().map((entry) => [entry.name.toLowerCase(), entry]));
 
 const commands = computed(() => byName(language.value?.commands ?? []));
+const quoting = computed(() => byName((language.value?.commands ?? []).filter(({ subject }) => subject?.role === "quotes")));
 const clauses = computed(() => byName(language.value?.clauses ?? []));
 
 /** The names that the script defines, by kind: `material` or `group`. */
@@ -115,6 +117,14 @@ export function read(text: string): { readonly words: readonly Word[]; readonly 
       next = needsName ? { ...NOTHING, entry, names: known } : slot(entry, 0);
       continue;
     }
+    const first = words[0];
+    const quotes = words.length === 1 && first && word.startsWith('"') ? quoting.value.get(first.text.toLowerCase()) : undefined;
+    if (quotes && !needsName) {
+      words[0] = { ...first!, entry: quotes };
+      next = slot(quotes, 0);
+      add("name", { ...NOTHING, entry: quotes });
+      continue;
+    }
     if (needsName) {
       needsName = false;
       add("name", next);
@@ -148,7 +158,7 @@ export function choices(text: string, column: number): readonly { readonly label
   if (open > before.lastIndexOf(")")) return table.curve_modes.map(({ name, about }) => ({ label: name, about }));
   const start = before.search(/[^\s,(]*$/);
   const { words, next } = read(before.slice(0, start));
-  if (words.length === 0) return table.commands.map(({ name, about }) => ({ label: name, about }));
+  if (words.length === 0) return [...commands.value.values()].reverse().map(({ name, about }) => ({ label: name, about }));
   const named = next.names.map((label) => ({ label, about: next.entry?.ends_with ?? next.entry?.subject?.of ?? "" }));
   const clause = next.clauses ? table.clauses.map(({ name, about }) => ({ label: name, about })) : [];
   return [...named, ...clause];

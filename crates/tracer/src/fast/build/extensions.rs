@@ -73,10 +73,12 @@ impl<E: Real> Extensions<E> {
         self.finishes.as_ref().filter(|finishes| parts::BUILT.highlights && finishes.has_highlights)
     }
 
-    /// Returns the finishes, if any surface has a pattern.
+    /// Returns the finishes, if any surface has a pattern or a picture.
     #[inline(always)]
     pub(crate) fn patterned(&self) -> Option<&Finishes> {
-        self.finishes.as_ref().filter(|finishes| parts::BUILT.patterns && finishes.has_patterns)
+        self.finishes
+            .as_ref()
+            .filter(|finishes| (parts::BUILT.patterns || parts::BUILT.pictures) && finishes.has_patterns)
     }
 
     pub(crate) fn has_glass(&self) -> bool {

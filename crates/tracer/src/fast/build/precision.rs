@@ -86,8 +86,9 @@ pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
     if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) || is_too_deep(&geometry.view) {
         return None;
     }
-    // The errors of the extensions have bounds for `f64` alone.
+    // The errors of the extensions have bounds for `f64` alone, and pictures may have many pixels.
     let single = !is_needed(geometry)
+        && scene.sky_picture().is_none()
         && match options.precision {
             Precision::F64 => false,
             Precision::F32 => SINGLE.holds(geometry, scene, &colors),
@@ -174,10 +175,22 @@ impl Colors {
             least = least.min(fog.min_element());
         }
         let scattered = arriving * diffuse;
-        let seen = |weight: f64, _| weight * mirror + ambient.max(1.0) + scattered;
-        let largest = (0..=bounces).fold(1.0, seen).max(mirror.powi(bounces as i32));
+        let around = brightest_around(scene);
+        let seen = |weight: f64, _| weight * mirror + ambient.max(around) + scattered;
+        let largest = (0..=bounces).fold(around, seen).max(mirror.powi(bounces as i32));
         Self { largest, scattered, signed: least < 0.0 }
     }
+}
+
+/// Returns a bound of the light of rays that hit nothing, at least 1.
+fn brightest_around(scene: &Scene) -> f64 {
+    let (low, high) = scene.surroundings().colors();
+    let of_picture =
+        scene.sky_picture().map_or(0.0, |(file, turn)| turn.strength() * file.picture().largest());
+    [low, high.unwrap_or(low)]
+        .map(|color| color.max_element())
+        .into_iter()
+        .fold(of_picture.max(1.0), f64::max)
 }
 
 /// Returns the largest slopes across and along the window.

@@ -34,6 +34,7 @@ use crate::fast::shapes::{Obstacles, Seen, Shape, Shapes, Solid, Sorted};
 use crate::fast::shared::SharedSurfaces;
 use crate::parallel::map;
 use crate::parts;
+use crate::pictures::Panorama;
 
 /// The largest number of lanes in a packet.
 const WIDEST: usize = 16;
@@ -99,6 +100,8 @@ pub(crate) struct Prepared<E> {
     is_clear: bool,
     /// A background that depends on the ray's direction.
     sky: Option<Sky<E>>,
+    /// A picture all around.
+    panorama: Option<Panorama>,
     /// The features of the scene.
     pub(crate) needs: Needs,
     /// The features that few scenes use.
@@ -148,9 +151,10 @@ impl<E: Real> Prepared<E> {
         }
         let surroundings = scene.surroundings();
         let sky = Sky::new(surroundings);
+        let panorama = Panorama::of(scene);
         let beyond = Extensions::new(scene, geometry);
         let shared = geometry.shared.clone().filter(|_| BUILT.beyond);
-        needs.beyond = beyond.is_some() || sky.is_some() || shared.is_some();
+        needs.beyond = beyond.is_some() || sky.is_some() || panorama.is_some() || shared.is_some();
         needs.glass = beyond.as_ref().is_some_and(Extensions::has_glass);
         for (order, at) in beyond.iter().filter_map(Extensions::bodies).flat_map(|bodies| bodies.places()) {
             let entry = &mut entries[order];
@@ -203,6 +207,7 @@ impl<E: Real> Prepared<E> {
             background: narrow(surroundings.colors().0),
             is_clear: scene.background.is_none(),
             sky,
+            panorama,
             tree,
             sights,
             entries,
@@ -231,7 +236,7 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn shows_nothing(&self, bodies: u64) -> bool {
         let has_planes = || self.beyond.as_ref().and_then(Extensions::bodies).is_some_and(Bodies::has_planes);
-        self.is_plain() || bodies == 0 && self.sky().is_none() && !has_planes()
+        self.is_plain() || bodies == 0 && self.has_one_backdrop() && !has_planes()
     }
 
     /// Returns whether the scene consists of objects in masks, lists and trees that share no surface, on a background
@@ -257,6 +262,18 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn sky(&self) -> Option<&Sky<E>> {
         if parts::BUILT.skies { self.sky.as_ref() } else { None }
+    }
+
+    /// Returns the picture around it, if there is one.
+    #[inline(always)]
+    pub(crate) fn panorama(&self) -> Option<&Panorama> {
+        if parts::BUILT.pictures { self.panorama.as_ref() } else { None }
+    }
+
+    /// Returns whether all camera rays that hit nothing bring the same.
+    #[inline(always)]
+    fn has_one_backdrop(&self) -> bool {
+        self.is_clear() || self.sky().is_none() && self.panorama().is_none()
     }
 
     /// Returns its fog, if it has any.

@@ -23,7 +23,7 @@ use crate::fast::build::prepare::Prepared;
 use crate::fast::film::band::{Band, Tile, fill, rays_of, write_encoded, write_lit, write_pixels};
 use crate::fast::film::cover::{cover_hits, let_through};
 use crate::fast::film::trace::{aim_along_axis, trace_bodies, trace_primary, trace_queue};
-use crate::fast::materials::sky::show_sky;
+use crate::fast::materials::sky::{show_panorama, show_sky};
 use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns};
 use crate::fast::rays::kind::ByKind;
 use crate::fast::rays::pixels::Rays;
@@ -105,7 +105,17 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             let count = rays_of::<S, E>((tile.width, tile.height));
             let next = Some(&mut *next);
             let bodies = tile.bodies;
-            let met = HitBatch { kinds: seen, bodies, background, queue, count, next, waiting, soft: None };
+            let met = HitBatch {
+                kinds: seen,
+                bodies,
+                background,
+                queue,
+                count,
+                next,
+                waiting,
+                soft: None,
+                is_first: true,
+            };
             shade::<S, E, N, true>(simd, scene, met, hits, occluders);
         }
         Rays::Parallel(rays) => {
@@ -116,7 +126,17 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             let count = queue.count;
             let next = Some(&mut *next);
             let bodies = tile.bodies;
-            let met = HitBatch { kinds: seen, bodies, background, queue, count, next, waiting, soft: None };
+            let met = HitBatch {
+                kinds: seen,
+                bodies,
+                background,
+                queue,
+                count,
+                next,
+                waiting,
+                soft: None,
+                is_first: true,
+            };
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
         }
     }
@@ -164,7 +184,17 @@ impl<E: Real> Scratch<'_, E> {
                 trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, all, scene.background, queue, hits)
             });
             let (kinds, background, count) = (all.kinds, scene.background, queue.count);
-            let met = HitBatch { kinds, bodies: ANY, background, queue, count, next: after, waiting, soft };
+            let met = HitBatch {
+                kinds,
+                bodies: ANY,
+                background,
+                queue,
+                count,
+                next: after,
+                waiting,
+                soft,
+                is_first: false,
+            };
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
@@ -199,8 +229,17 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
         });
-        let met =
-            HitBatch { kinds, bodies, background, queue, count, next: None, waiting: &mut *waiting, soft };
+        let met = HitBatch {
+            kinds,
+            bodies,
+            background,
+            queue,
+            count,
+            next: None,
+            waiting: &mut *waiting,
+            soft,
+            is_first: false,
+        };
         shade_more::<S, E, N, false>(simd, scene, met, hits, occluders);
         if scene.is_clear() {
             let_through(waiting, queue, hits, Lanes::<S, E>::LEN);
@@ -239,6 +278,8 @@ pub(crate) struct HitBatch<'a, 'b, E> {
     pub(crate) waiting: &'a mut RayQueues<'b, E>,
     /// The lights of which each ray samples its own point.
     pub(crate) soft: Option<SoftLight<'a, E>>,
+    /// Whether the rays are those of the camera.
+    pub(crate) is_first: bool,
 }
 
 /// Shades hits: surfaces, their light, and the rays that mirrors spawn.
@@ -267,7 +308,7 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     hits: &mut Hits<E>,
     occluders: &mut Occluders,
 ) {
-    let (queue, count) = (met.queue, met.count);
+    let (queue, count, is_first) = (met.queue, met.count, met.is_first);
     match (&scene.beyond, met.soft.filter(|_| parts::BUILT.extents)) {
         (beyond, Some(soft)) => {
             let way = (beyond.as_ref(), soft);
@@ -278,6 +319,12 @@ fn shade_more<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
             settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
             shade_plain::<S, E, N, EYE>(simd, scene, met, hits, occluders);
         }
+    }
+    if is_first && scene.is_clear() {
+        return;
+    }
+    if let Some(panorama) = scene.panorama() {
+        show_panorama::<E, EYE>(panorama, (count, Lanes::<S, E>::LEN), queue, hits);
     }
     if let Some(sky) = scene.sky() {
         show_sky::<S, E, EYE>(simd, sky, count, queue, hits);

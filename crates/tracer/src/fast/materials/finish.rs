@@ -1,4 +1,5 @@
-//! What few surfaces have beyond coefficients: highlights, and patterns of other coefficients.
+//! What few surfaces have beyond coefficients: highlights, patterns of other coefficients, and
+//! pictures.
 //!
 //! Both are worked out lane by lane, with the functions of the plain tracer: they are powers and lattices of few pixels,
 //! which must be the same bytes everywhere. Patterns are read off the numbers of the script, so that a hit is taken back
@@ -7,7 +8,8 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
-use rayfold_scene::{Coefficients, Object, Scene};
+use rayfold_scene::model::Finish;
+use rayfold_scene::{Coefficients, ImageMap, Object, Scene, Tone};
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
 use crate::fast::placement::geometry::Geometry;
@@ -38,13 +40,13 @@ impl Finishes {
     pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         let finishes = || scene.objects.iter().filter_map(|object| object.material().finish());
         finishes().next()?;
-        let has_patterns = finishes().any(|finish| finish.pattern.is_some());
+        let has_patterns = finishes().any(is_painted);
         let has_highlights = finishes().any(|finish| finish.shine.is_some());
         let (center, scale) = (geometry.center, geometry.scale);
         Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights })
     }
 
-    /// Mixes the coefficients of patterns into the colours and diffuse coefficients of the hits, and notes the mirror
+    /// Mixes the coefficients of patterns and the factors of pictures into the colours and diffuse coefficients of the hits, and notes the mirror
     /// coefficients of all; `EYE` says that the rays count for 1.
     #[inline(never)]
     pub(crate) fn paint<E: Real, const EYE: bool>(
@@ -71,7 +73,7 @@ impl Finishes {
                 };
                 let weight = if EYE { DVec3::ONE } else { read(&queue.weight) };
                 let material = self.scene.objects[order].material();
-                let is_painted = material.finish().is_some_and(|finish| finish.pattern.is_some());
+                let is_painted = material.finish().is_some_and(is_painted);
                 let seen = if is_painted {
                     let origin = if EYE { DVec3::ZERO } else { read(&queue.origin) };
                     let ray = (origin, read(&queue.direction));
@@ -108,7 +110,7 @@ impl Finishes {
         };
         let flat = reference::is_flat_at(object, normal);
         let surface = reference::Surface { point: world, normal, offset: 0.0, flat, within: false };
-        coefficients(object, place, normal, &surface)
+        coefficients(object, place, normal, &surface, self.scene.tone == Tone::Srgb)
     }
 
     /// Which lanes meet a surface with highlights; `orders` are those of what they meet.
@@ -129,6 +131,11 @@ impl Finishes {
     pub(crate) fn gloss(&self) -> Gloss<'_> {
         Gloss { finishes: self, sum: [DVec3::ZERO; 16], is_seen: false }
     }
+}
+
+/// Returns whether the coefficients of a surface depend on the place of a hit.
+fn is_painted(finish: &Finish) -> bool {
+    finish.pattern.is_some() || finish.image.as_ref().is_some_and(|image| image.map() != ImageMap::Uv)
 }
 
 fn write<E: Real>(columns: &mut [impl AsMut<[E]>; 3], lane: usize, color: DVec3) {

@@ -1,11 +1,13 @@
-//! A background of two colours: a separate step for the rays that hit nothing.
+//! A background of two colours, or a picture all around: a separate step for the rays that hit nothing.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
 use rayfold_scene::Background;
 
 use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
-use crate::fast::rays::bounce::{Hits, RayBatch};
+use crate::fast::rays::bounce::{Column, Hits, RayBatch};
+use crate::pictures::Panorama;
 
 /// The colour `low + rise · (½ + ½·y)` for a ray direction of height y.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +22,35 @@ impl<E: Real> Sky<E> {
         let (low, high) = background.colors();
         let rise = high? - low;
         Some(Self { low: low.to_array().map(E::narrow), rise: rise.to_array().map(E::narrow) })
+    }
+}
+
+/// Gives the first `count` rays of a queue that hit nothing the light of a picture, ray by ray. A packet has so many `lanes`. With
+/// `EYE` they all have a weight of 1.
+#[inline(never)]
+pub(crate) fn show_panorama<E: Real, const EYE: bool>(
+    panorama: &Panorama,
+    (count, lanes): (usize, usize),
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+) {
+    let read = |columns: &[Column<E>; 3], ray: usize| {
+        DVec3::from_array([0, 1, 2].map(|axis: usize| columns[axis].0[ray].widen()))
+    };
+    let mut packet = 0;
+    for at in (0..count).step_by(lanes) {
+        let has_hits = hits.packets.get(packet).is_some_and(|&(first, _)| first == at);
+        packet += usize::from(has_hits);
+        for ray in at..(at + lanes).min(count) {
+            if has_hits && hits.is_hit(ray) {
+                continue;
+            }
+            let light = panorama.along(read(&queue.direction, ray));
+            let light = if EYE { light } else { light * read(&queue.weight, ray) };
+            for (column, channel) in hits.color.iter_mut().zip(light.to_array()) {
+                column.0[ray] = E::narrow(channel);
+            }
+        }
     }
 }
 

@@ -165,14 +165,13 @@ fn pairs(scene: &Scene, near: &[&Scene]) -> Vec<Compared> {
         drifts.fold(0.0, f64::max)
     };
     let widths = widths(&scene.objects, &gauge);
-    let of = |object: &Object| object.material().finish().copied().unwrap_or_default();
     let is_indirect = !scene.lights.is_empty()
         || scene.objects.iter().any(|o| {
-            let Finish { glass, pattern, .. } = of(o);
             let is_mirror = |mirror| mirror != glam::DVec3::ZERO;
+            let finish = o.material().finish();
             is_mirror(o.material().mirror())
-                || glass.is_some()
-                || pattern.is_some_and(|pattern| is_mirror(pattern.other.mirror()))
+                || finish.is_some_and(|finish| finish.glass.is_some())
+                || finish.and_then(|f| f.pattern).is_some_and(|pattern| is_mirror(pattern.other.mirror()))
         });
     let mut pairs = vec![];
     pairs.extend(pair(scene, (&gauge, &widths, &drift), (NARROW, WIDER), false));
@@ -231,7 +230,7 @@ fn gleams(object: &Object, gauge: &Gauge) -> Option<(Object, Object)> {
     let part = width / WIDE_GLEAM;
     let wider = Shine::new(shine.color(), (shine.exponent() * part * part).max(1.0)).ok()?;
     let painted = |shine| {
-        let finish = Finish { shine, ..*finish };
+        let finish = Finish { shine, ..finish.clone() };
         repainted(object, Material::finished(material.coefficients(), finish))
     };
     Some((painted(None)?, painted(Some(wider))?))

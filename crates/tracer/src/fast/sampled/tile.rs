@@ -359,14 +359,14 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
             trace_queue::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft };
+        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true };
         shade::<S, E, N, true>(simd, scene, met, hits, occluders);
     } else {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft };
+        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true };
         shade::<S, E, N, false>(simd, scene, met, hits, occluders);
     }
     if pass.wanted.is_first_look {

@@ -1,0 +1,94 @@
+//! Pictures on surfaces: the clause `image`.
+
+use std::fmt;
+
+use super::invalid::{InvalidValue, Parameter, positive};
+use super::picture_file::PictureFile;
+use crate::form::{Line, quoted_word};
+
+/// A picture on a surface, which multiplies the ambient and diffuse coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    file: PictureFile,
+    map: ImageMap,
+}
+
+/// The way in which a picture lies on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImageMap {
+    /// By the texture coordinates of a mesh.
+    Uv,
+    /// On a plane of the coordinates of the object's numbers, so wide, greater than 0, with its lower left corner at 0. It
+    /// repeats.
+    Flat(f64, Axes),
+    /// Around the middle of the coordinates of the object's numbers, or that of a sphere.
+    Ball,
+}
+
+/// The axes of a plane: that along which a picture goes right, and that along which it goes up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Axes {
+    /// Right along x, up along y.
+    #[default]
+    Xy,
+    /// Right along x, up against z: on a floor.
+    Xz,
+    /// Right along z, up along y.
+    Zy,
+}
+
+/// The words for ways and axes.
+pub(crate) const MAPS: [&str; 3] = ["uv", "flat", "ball"];
+pub(crate) const AXES: [(&str, Axes); 3] = [("xy", Axes::Xy), ("xz", Axes::Xz), ("zy", Axes::Zy)];
+
+impl Image {
+    /// Makes a picture on a surface.
+    ///
+    /// # Errors
+    /// Fails if its width is not positive or not finite.
+    pub fn new(file: PictureFile, map: ImageMap) -> Result<Self, InvalidValue> {
+        if let ImageMap::Flat(width, _) = map {
+            positive(Parameter::CellSize, width)?;
+        }
+        Ok(Self { file, map })
+    }
+
+    /// Returns the picture and its file.
+    pub fn file(&self) -> &PictureFile {
+        &self.file
+    }
+
+    /// Returns the way in which it lies on the surface.
+    pub fn map(&self) -> ImageMap {
+        self.map
+    }
+
+    /// Returns the same picture with another width, if it is flat.
+    pub(crate) fn with_width(&self, width: Option<f64>) -> Result<Self, InvalidValue> {
+        let map = match (self.map, width) {
+            (ImageMap::Flat(_, axes), Some(width)) => ImageMap::Flat(width, axes),
+            (map, _) => map,
+        };
+        Self::new(self.file.clone(), map)
+    }
+
+    /// Writes the words of the clause. `write_width` writes the width, with a space before it.
+    pub(crate) fn write<'b>(
+        &self,
+        f: &mut fmt::Formatter<'b>,
+        write_width: impl FnOnce(&mut fmt::Formatter<'b>) -> fmt::Result,
+    ) -> fmt::Result {
+        write!(f, " {}", quoted_word(self.file.file()))?;
+        let mut line = Line::new(f, None);
+        match self.map {
+            ImageMap::Uv => line.word(MAPS[0]),
+            ImageMap::Ball => line.word(MAPS[2]),
+            ImageMap::Flat(_, axes) => {
+                line.word(MAPS[1])?;
+                write_width(f)?;
+                let named = AXES.iter().find(|(_, of)| *of == axes && axes != Axes::default());
+                named.map_or(Ok(()), |(name, _)| write!(f, " {name}"))
+            }
+        }
+    }
+}

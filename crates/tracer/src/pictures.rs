@@ -1,0 +1,140 @@
+//! Pictures as the tracers see them: their places, and the mean of the four pixels around a place.
+//!
+//! A place on a picture is (u, v), from (0, 0) in its upper left corner to (1, 1) in its lower right one. The level of a
+//! pixel is that of its middle; between middles it is interpolated.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayfold_scene::assets::Picture;
+use rayfold_scene::{Axes, Image, ImageMap, Object, Scene, Tone};
+
+/// A picture all around the scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Panorama {
+    picture: Arc<Picture>,
+    /// Whether encoded levels are decoded to linear light.
+    is_linear: bool,
+    strength: f64,
+    /// The sine and cosine of the angle by which the picture is turned.
+    turn: (f64, f64),
+}
+
+impl Panorama {
+    /// Returns the picture around a scene, if there is one.
+    pub(crate) fn of(scene: &Scene) -> Option<Self> {
+        let (file, turn) = scene.sky_picture()?;
+        let is_linear = scene.tone == Tone::Srgb;
+        let angle = (turn.degrees() % 360.0).to_radians();
+        let turn_of = (libm::sin(angle), libm::cos(angle));
+        Some(Self { picture: file.picture().clone(), is_linear, strength: turn.strength(), turn: turn_of })
+    }
+
+    /// Returns the light that comes from where a ray with this unit direction goes.
+    pub(crate) fn along(&self, direction: DVec3) -> DVec3 {
+        let (sine, cosine) = self.turn;
+        let DVec3 { x, y, z } = direction;
+        let (x, z) = (x * cosine - z * sine, x * sine + z * cosine);
+        let u = 0.5 + libm::atan2(x, -z) / TAU;
+        let v = libm::atan2(libm::hypot(x, z), y) / PI;
+        self.strength
+            * mean(&self.picture, [u, v], false, |column, row| {
+                self.picture.level(column, row, self.is_linear)
+            })
+    }
+}
+
+/// Returns the factor of a picture on an object's surface at a place in the coordinates of its numbers; 1 for a picture by
+/// texture coordinates, whose factor is that of [`factor_at`].
+pub(crate) fn factor(image: &Image, object: &Object, place: DVec3, is_linear: bool) -> DVec3 {
+    let picture = image.file().picture();
+    match image.map() {
+        ImageMap::Uv => DVec3::ONE,
+        ImageMap::Flat(width, axes) => {
+            let (right, up) = match axes {
+                Axes::Xy => (place.x, place.y),
+                Axes::Xz => (place.x, -place.z),
+                Axes::Zy => (place.z, place.y),
+            };
+            let shape = f64::from(picture.width()) / f64::from(picture.height());
+            factor_at(picture, [right / width, 1.0 - up / width * shape], true, is_linear)
+        }
+        ImageMap::Ball => {
+            let DVec3 { x, y, z } = match object {
+                Object::Sphere(sphere) => place - sphere.center(),
+                _ => place,
+            };
+            let u = 0.5 + libm::atan2(x, z) / TAU;
+            let v = libm::atan2(libm::hypot(x, z), y) / PI;
+            factor_at(picture, [u, v], false, is_linear)
+        }
+    }
+}
+
+/// Returns the factor of a picture at a place on it.
+pub(crate) fn factor_at(picture: &Picture, place: [f64; 2], repeats_down: bool, is_linear: bool) -> DVec3 {
+    mean(picture, place, repeats_down, |column, row| picture.factor(column, row, is_linear))
+}
+
+/// Returns the interpolated value at a place on a picture. The picture repeats across, and down as well if `repeats_down`;
+/// otherwise its first and last row go on.
+#[inline]
+pub(crate) fn mean(
+    picture: &Picture,
+    [u, v]: [f64; 2],
+    repeats_down: bool,
+    value: impl Fn(u32, u32) -> DVec3,
+) -> DVec3 {
+    let (columns, x) = neighbours(u, picture.width(), true);
+    let (rows, y) = neighbours(v, picture.height(), repeats_down);
+    let of_row = |row: u32| mixed(value(columns[0], row), value(columns[1], row), x);
+    mixed(of_row(rows[0]), of_row(rows[1]), y)
+}
+
+/// Returns the two pixels, of so many, whose middles are around a place, and the share of the second.
+fn neighbours(place: f64, count: u32, repeats: bool) -> ([u32; 2], f64) {
+    // A place that is no number, of an object at the end of all numbers, is the corner.
+    let place = if place.is_finite() { place } else { 0.0 };
+    let place = if repeats { place - place.floor() } else { place.clamp(0.0, 1.0) };
+    let at = place * f64::from(count) - 0.5;
+    let before = at.floor();
+    let pixels = [before, before + 1.0].map(|pixel| {
+        let last = f64::from(count - 1);
+        let pixel = match repeats {
+            true if pixel < 0.0 => last,
+            true if pixel > last => pixel - f64::from(count),
+            _ => pixel.clamp(0.0, last),
+        };
+        pixel as u32
+    });
+    (pixels, at - before)
+}
+
+/// Returns a mean of two values, without a rounding error where they are equal.
+fn mixed(a: DVec3, b: DVec3, share: f64) -> DVec3 {
+    a + share * (b - a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_those_whose_middles_are_around_a_place() {
+        assert_eq!(neighbours(0.5, 1, true), ([0, 0], 0.0));
+        assert_eq!(neighbours(0.375, 4, true), ([1, 2], 0.0));
+        assert_eq!(neighbours(0.5, 4, false), ([1, 2], 0.5));
+        assert_eq!(neighbours(0.0, 4, true), ([3, 0], 0.5));
+        assert_eq!(neighbours(1.0, 4, true), ([3, 0], 0.5));
+        assert_eq!(neighbours(-1e-20, 4, true), ([3, 0], 0.5));
+        assert_eq!(neighbours(0.0, 4, false), ([0, 0], 0.5));
+        assert_eq!(neighbours(1.0, 4, false), ([3, 3], 0.5));
+        assert_eq!(neighbours(-3.0, 4, false), ([0, 0], 0.5));
+        assert_eq!(neighbours(f64::NAN, 4, true).0, [3, 0]);
+        for place in [1e300, -1e300, 1e17, 0.1, -0.1] {
+            let ([a, b], share) = neighbours(place, 7, true);
+            assert!(a < 7 && b < 7 && (0.0..1.0).contains(&share), "{place}");
+        }
+    }
+}
