@@ -225,7 +225,7 @@ fn the_packets_show_the_pictures_of_the_plain_tracer() {
 #[test]
 fn the_packets_show_the_pictures_of_meshes() {
     let stage =
-        "Look 1 2 5 0 0 0 40\nIlight .9 .8 .7 -1 -2 -3\nPlane 0 -1.2 0 0 1 0 .1 .1 .1 .3 .3 .3 .4 .4 .4";
+        "Look 1 2 5 .013 0 0 40\nIlight .9 .8 .7 -1 -2 -3\nPlane 0 -1.2 0 0 1 0 .1 .1 .1 .3 .3 .3 .4 .4 .4";
     let mut scenes = Vec::new();
     for (way, mesh) in [
         ("uv", "square.obj"),

@@ -8,9 +8,9 @@ use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
 use image::{ColorType, ImageDecoder, ImageError};
 
+use super::size::check_size;
 use super::{Levels, Picture, exr, hdr, jpeg};
 use crate::error::{AssetError, Fault};
-use crate::limits;
 
 /// The first bytes of formats, and their names.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -124,17 +124,6 @@ fn read_encoded(
         Levels::Bytes(count, read)
     };
     Ok(Picture { stored: [width, height], levels, orientation, largest: 1.0, warnings: Vec::new() })
-}
-
-/// Checks the size that a header promises.
-pub(super) fn check_size(width: u32, height: u32) -> Result<(), Fault> {
-    if width == 0 || height == 0 {
-        return Err(Fault::new(format!("it has {width} x {height} pixels")));
-    }
-    if u64::from(width) * u64::from(height) > limits::PIXELS {
-        return Err(Fault::new(format!("it has {width} x {height} pixels, more than {}", limits::PIXELS)));
-    }
-    Ok(())
 }
 
 fn fault(error: ImageError) -> Fault {

@@ -8,7 +8,7 @@ use exr::meta::header::Header;
 use exr::prelude::{Compression, ReadChannels, ReadLayers, ReadSpecificChannel, Vec2, read as reader};
 use image::metadata::Orientation;
 
-use super::decode::check_size;
+use super::size::check_size;
 use super::{Levels, Picture};
 use crate::error::Fault;
 

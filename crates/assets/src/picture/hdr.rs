@@ -2,7 +2,7 @@
 
 use image::metadata::Orientation;
 
-use super::decode::check_size;
+use super::size::check_size;
 use super::{Levels, Picture, unit};
 use crate::error::Fault;
 

@@ -1,6 +1,6 @@
 //! The markers of a JPEG: a file that is cut off, or of a kind that is not read, is refused before it is decoded.
 
-use super::decode::check_size;
+use super::size::check_size;
 use crate::error::Fault;
 
 /// Checks the frames of a JPEG, and that it has an end.

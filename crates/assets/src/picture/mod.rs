@@ -4,6 +4,7 @@ mod decode;
 mod exr;
 mod hdr;
 mod jpeg;
+mod size;
 
 use std::sync::LazyLock;
 

@@ -78,7 +78,7 @@ mod tests {
             ("a.obj", OBJ.to_vec()),
             ("a.ply", PLY.to_vec()),
         ]));
-        let stage = "Look 1 1.5 5 0 .1 0 34\nIlight .8 .8 .7 -1 -2 -1\nMaterial chrome mirror .8 .8 .8\n";
+        let stage = "Look 1 1.5 5 .013 .1 0 34\nIlight .8 .8 .7 -1 -2 -1\nMaterial chrome mirror .8 .8 .8\n";
         let on = |way: &str, object: &str| {
             format!("Material m ambient .3 .4 .5 diffuse .5 .6 .5 image \"a.png\" {way}\n{object} m\n")
         };

@@ -1,10 +1,7 @@
 //! Pictures on surfaces: the clause `image`.
 
-use std::fmt;
-
 use super::invalid::{InvalidValue, Parameter, positive};
 use super::picture_file::PictureFile;
-use crate::form::{Line, quoted_word};
 
 /// A picture on a surface, which multiplies the ambient and diffuse coefficients.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,25 +67,5 @@ impl Image {
             (map, _) => map,
         };
         Self::new(self.file.clone(), map)
-    }
-
-    /// Writes the words of the clause. `write_width` writes the width, with a space before it.
-    pub(crate) fn write<'b>(
-        &self,
-        f: &mut fmt::Formatter<'b>,
-        write_width: impl FnOnce(&mut fmt::Formatter<'b>) -> fmt::Result,
-    ) -> fmt::Result {
-        write!(f, " {}", quoted_word(self.file.file()))?;
-        let mut line = Line::new(f, None);
-        match self.map {
-            ImageMap::Uv => line.word(MAPS[0]),
-            ImageMap::Ball => line.word(MAPS[2]),
-            ImageMap::Flat(_, axes) => {
-                line.word(MAPS[1])?;
-                write_width(f)?;
-                let named = AXES.iter().find(|(_, of)| *of == axes && axes != Axes::default());
-                named.map_or(Ok(()), |(name, _)| write!(f, " {name}"))
-            }
-        }
     }
 }

@@ -15,7 +15,10 @@ use std::fmt::{self, Display, Formatter};
 use super::{Drawn, Extent, NamedMaterial, Objects, Script, Shot, SkyLine, Template, Value, View};
 use crate::command::Command;
 use crate::form::{Line, Scripted, quoted_word, write_line};
-use crate::model::{Background, Camera, Fog, FrameNumbers, Lens, Scene, Screen};
+use crate::model::{
+    AXES, Axes, Background, Camera, Fog, FrameNumbers, Image, ImageMap, Lens, MAPS, Scene, Screen,
+};
+use crate::row::Row;
 
 /// Writes a script: materials and groups, then for each shot the changes since the previous one, and a `Trace`.
 impl Display for Script {
@@ -73,7 +76,7 @@ impl Script {
         for line in &material.clauses {
             write!(f, " {}", line.clause.name())?;
             match &line.image {
-                Some(image) => image.write(f, |f| line.row.write(f))?,
+                Some(image) => write_image(f, image, &line.row)?,
                 None => line.row.write(f)?,
             }
             if let Some(other) = line.other {
@@ -249,6 +252,21 @@ impl Template {
             write!(f, " {name}")?;
         }
         writeln!(f)
+    }
+}
+
+/// Writes the words of a clause `image`. Its width is in the row.
+fn write_image(f: &mut Formatter<'_>, image: &Image, width: &Row) -> fmt::Result {
+    write!(f, " {} ", quoted_word(image.file().file()))?;
+    match image.map() {
+        ImageMap::Uv => f.write_str(MAPS[0]),
+        ImageMap::Ball => f.write_str(MAPS[2]),
+        ImageMap::Flat(_, axes) => {
+            f.write_str(MAPS[1])?;
+            width.write(f)?;
+            let named = AXES.iter().find(|(_, of)| *of == axes && axes != Axes::default());
+            named.map_or(Ok(()), |(name, _)| write!(f, " {name}"))
+        }
     }
 }
 
