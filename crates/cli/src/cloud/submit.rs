@@ -29,6 +29,9 @@ use crate::wording::number;
 /// frame's has its script's version, too.
 const LONGEST_NAME: usize = 200;
 
+/// The same for scripts that name files, whose versions are longer.
+const LONGEST_NAME_WITH_FILES: usize = 110;
+
 /// Render a folder of scripts, or one script, in the cloud and download the animation
 ///
 /// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed), waits,
@@ -182,15 +185,22 @@ fn submission(
     animation: &Animation,
     console: &Console,
 ) -> anyhow::Result<Submission> {
+    // What a model refers to may be absent.
+    let files = named_by_scripts().into_iter().filter(|path| path.is_file()).map(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok((name, File::new(Content::Path(path))?))
+    });
+    let files: Vec<(String, File)> = files.collect::<rayfold_client::Result<_>>()?;
+    let longest = if files.is_empty() { LONGEST_NAME } else { LONGEST_NAME_WITH_FILES };
     let mut scripts = Vec::new();
     for path in input.scripts.iter().filter_map(|script| script.path()) {
         let name = path.file_name().and_then(|name| name.to_str());
         let name = name.with_context(|| format!("the name of {} is not UTF-8", path.display()))?;
         let name = ScriptName::new(script_name(name).unwrap_or(name))?;
-        if name.as_str().len() > LONGEST_NAME {
+        if name.as_str().len() > longest {
             console.note(format_args!(
                 "{name}.txt: on S3 it is drawn; on MinIO and SeaweedFS, whose path segments have at most 255 bytes, a name of \
-                 more than {LONGEST_NAME} bytes is too long for its frame"
+                 more than {longest} bytes is too long for its frame"
             ));
         }
         scripts.push((name, path.to_path_buf()));
@@ -201,12 +211,6 @@ fn submission(
     };
     let scripts = scripts.into_par_iter().map(|(name, path)| Ok((name, File::new(Content::Path(path))?)));
     let scripts: Vec<(ScriptName, File)> = scripts.collect::<rayfold_client::Result<_>>()?;
-    // What a model refers to may be absent.
-    let files = named_by_scripts().into_iter().filter(|path| path.is_file()).map(|path| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok((name, File::new(Content::Path(path))?))
-    });
-    let files: Vec<(String, File)> = files.collect::<rayfold_client::Result<_>>()?;
     Ok(Submission::new(animation.clone(), scripts, settings)?.with_files(files)?)
 }
 
