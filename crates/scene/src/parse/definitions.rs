@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::doubts::Looks;
+use super::doubts::{Looks, rough_without_mirror};
 use super::line::Statement;
 use super::meshes::Models;
 use super::text::{Parameters, is_name};
@@ -229,7 +229,7 @@ impl<'a> Parser<'a> {
             && named.clauses.iter().any(ClauseLine::is_rough)
             && !named.clauses.iter().any(is_in_use)
         {
-            self.report.warning(s.line, place, wording::rough_without_mirror);
+            self.report.warning(s.line, place, rough_without_mirror);
         }
         let info = MaterialInfo {
             still: named.still.clone(),

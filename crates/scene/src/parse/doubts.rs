@@ -7,9 +7,10 @@ use std::ops::Range;
 use super::line::{Statement, decimal_comma};
 use super::{Parser, wording};
 use crate::command::{Command, Effect};
+use crate::diagnostic::Code;
 use crate::form::{Form, Kind};
 use crate::model::{Camera, Clause, ImageMap, Light, Material, Parameter};
-use crate::report::Line;
+use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
 use crate::script::{ClauseLine, Value};
 
@@ -285,7 +286,7 @@ impl<'a> Parser<'a> {
             && let Some((line, span)) = self.doubts.ambient.take()
             && !std::mem::replace(&mut self.doubts.is_ambient_told, true)
         {
-            self.report.warning(line, span, wording::ambient_beside_indirect);
+            self.report.warning(line, span, ambient_beside_indirect);
         }
         if self.lights == 0
             && !goes_round
@@ -330,4 +331,17 @@ pub(super) fn looks_in(form: &Form, row: &Row) -> Looks {
         is_rough: false,
         needs_uv: false,
     }
+}
+
+pub(super) fn rough_without_mirror() -> Fault {
+    Fault::new(Code::NoEffect, "`rough` has no effect: the material has neither `mirror` nor `glass`")
+        .expected("expected `mirror` or `glass` beside it")
+}
+
+fn ambient_beside_indirect() -> Fault {
+    Fault::new(
+        Code::AmbientLight,
+        "ambient light comes from nowhere, beside the light that `Indirect` sends round",
+    )
+    .expected("expected `ambient` 0 0 0")
 }

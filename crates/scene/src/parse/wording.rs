@@ -503,19 +503,6 @@ pub(super) fn no_light() -> Fault {
         .help("write for example `Ilight 1 1 1  -1 -2 -1`")
 }
 
-pub(super) fn rough_without_mirror() -> Fault {
-    Fault::new(Code::NoEffect, "`rough` has no effect: the material has neither `mirror` nor `glass`")
-        .expected("expected `mirror` or `glass` beside it")
-}
-
-pub(super) fn ambient_beside_indirect() -> Fault {
-    Fault::new(
-        Code::AmbientLight,
-        "ambient light comes from nowhere, beside the light that `Indirect` sends round",
-    )
-    .expected("expected `ambient` 0 0 0")
-}
-
 pub(super) fn glass_panes() -> Fault {
     Fault::new(
         Code::GlassPanes,
