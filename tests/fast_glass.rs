@@ -41,7 +41,10 @@ impl Dice {
         };
         let mirror = if self.0.u8(0..4) == 0 { 0.3 * self.color() } else { DVec3::ZERO };
         let own = Coefficients::new(0.05 * self.color(), 0.2 * self.color(), mirror).unwrap();
-        Material::finished(own, Finish { shine, glass, pattern, image: None, own: false })
+        Material::finished(
+            own,
+            Finish { shine, glass, pattern, image: None, own: false, glow: DVec3::ZERO, rough: None },
+        )
     }
 
     /// Returns a scene of this many objects, half of them of glass, and a floor.

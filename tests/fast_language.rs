@@ -181,7 +181,13 @@ impl Dice {
             _ => None,
         };
         let pattern = weight.map(|weight| Pattern { weight, other });
-        Material::finished(own, Finish { shine, glass: None, pattern, image: None, own: false })
+        // By dice of its own, so that the others stay as they are.
+        let mut dice = Self(self.0.clone());
+        let glow = if dice.0.bool() { dice.color() } else { DVec3::ZERO };
+        Material::finished(
+            own,
+            Finish { shine, glass: None, pattern, image: None, own: false, glow, rough: None },
+        )
     }
 }
 

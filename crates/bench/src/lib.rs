@@ -29,6 +29,7 @@ pub mod needs;
 pub mod oracle;
 pub mod outlines;
 pub mod parsing;
+pub mod paths;
 #[cfg(feature = "bucket")]
 pub mod pipeline;
 mod plot;

@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use rayfold_bench::{
     accuracy, coincident, fingerprints, gif, growth, measure, metamorphic, models, needs, outlines, parsing,
-    sampling, speed, studio,
+    paths, sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
 use rayfold_bench::{cold_start, explore, footprint, laptop, pipeline, scale, simulate};
@@ -30,6 +30,8 @@ enum Measurement {
     /// Size of the functions, and the time until a new process requests its first invocation
     #[cfg(feature = "bucket")]
     ColdStart(cold_start::Args),
+    /// Light that goes round: means of blocks of pixels, compared with independent paths of the oracle
+    Paths(paths::Args),
     /// Time and memory to read and write the largest scripts
     Parsing(parsing::Args),
     /// The pipeline's protocol in a simulated world: many seeds, broken rules, requests at scale
@@ -81,6 +83,7 @@ fn main() -> anyhow::Result<()> {
         Measurement::Laptop(args) => laptop::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::ColdStart(args) => cold_start::run(&args),
+        Measurement::Paths(args) => paths::run(&args),
         Measurement::Parsing(args) => parsing::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::Simulate(args) => simulate::run(&args),

@@ -174,7 +174,8 @@ fn chosen(field: &Field) -> Option<&'static str> {
         | Meaning::LightColor
         | Meaning::FogColor
         | Meaning::Shine
-        | Meaning::Glass => "color",
+        | Meaning::Glass
+        | Meaning::Glow => "color",
         Meaning::Center => "center",
         Meaning::Target => "at",
         Meaning::Up => "up",
@@ -186,11 +187,12 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::Samples => "n",
         Meaning::SamplingError => "error",
         Meaning::Shutter => "open",
-        Meaning::Depth => "bounces",
+        Meaning::Depth | Meaning::Indirect => "bounces",
         Meaning::RadiusA => "radius_a",
         Meaning::RadiusB => "radius_b",
         Meaning::Thickness => "thickness",
         Meaning::ShineExponent => "exponent",
+        Meaning::Roughness => "roughness",
         Meaning::CellSize => "size",
         Meaning::GradientStart => "start",
         Meaning::GradientEnd => "end",

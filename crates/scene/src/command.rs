@@ -8,9 +8,9 @@ use std::ops::Range;
 
 use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
-    Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, InvalidValue, Lamp, Lens,
-    Light, Look, MATERIAL, MESH, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples, Screen, Shutter,
-    SkyColors, SkyTurn, Tone, USE, mesh_surface, shapes, with_shapes,
+    Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Indirect, InvalidValue,
+    Lamp, Lens, Light, Look, MATERIAL, MESH, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples,
+    Screen, Shutter, SkyColors, SkyTurn, Tone, USE, mesh_surface, shapes, with_shapes,
 };
 
 /// The effect of a command.
@@ -35,6 +35,8 @@ pub(crate) enum Effect {
     Tone,
     /// Sets the largest number of bounces.
     Depth,
+    /// Sets the largest number of diffuse reflections.
+    Indirect,
     /// Sets the frame numbers of a `Trace`.
     Frames,
     /// Defines a named material.
@@ -125,6 +127,7 @@ with_shapes! { commands! {
         Shutter: Shutter::FORM, Effect::Shutter, "The share of a frame's time that the shutter is open.";
         Tone: Tone::FORM, Effect::Tone, "The conversion of colours to levels.";
         Depth: Depth::FORM, Effect::Depth, "The largest number of reflections and refractions of a ray.";
+        Indirect: Indirect::FORM, Effect::Indirect, "The largest number of diffuse reflections of a ray.";
     }
     after {
         Mesh: MESH, Effect::Mesh, "The triangles of a model in a file.";
@@ -245,6 +248,7 @@ impl Command {
             Effect::Shutter => Shutter::read(numbers).err(),
             Effect::Tone => Tone::read(numbers).err(),
             Effect::Depth => Depth::read(numbers).err(),
+            Effect::Indirect => Indirect::read(numbers).err(),
             Effect::Frames => FrameNumbers::read(numbers).err(),
             Effect::Object(read) => read(numbers).err(),
             Effect::Light(read) => read(numbers).err(),

@@ -105,6 +105,8 @@ pub enum Code {
     NeedsSamples,
     /// Colours that need light in a scene without lights.
     NoLight,
+    /// Surfaces have light from nowhere beside that of `Indirect`.
+    AmbientLight,
     /// Several triangles of glass, which do not refract.
     GlassPanes,
     /// A field of view that is probably in radians.

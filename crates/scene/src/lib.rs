@@ -45,8 +45,8 @@ pub use model::shapes::{
 };
 pub use model::{
     Axes, Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, Image,
-    ImageMap, InvalidValue, Lamp, Lens, Light, Look, Material, Parameter, Pattern, PictureFile, Pinhole,
-    Samples, Scene, Screen, Shine, Shutter, Sky, SkyColors, SkyTurn, Tone, Weight,
+    ImageMap, Indirect, InvalidValue, Lamp, Lens, Light, Look, Material, Parameter, Pattern, PictureFile,
+    Pinhole, Rough, Samples, Scene, Screen, Shine, Shutter, Sky, SkyColors, SkyTurn, Tone, Weight,
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;

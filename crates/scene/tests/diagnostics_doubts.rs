@@ -44,6 +44,56 @@ fn a_lens_with_one_ray_per_pixel() {
 }
 
 #[test]
+fn indirect_light_with_one_ray_per_pixel_and_beside_light_from_nowhere() {
+    check(
+        ball("Indirect 2\n", ""),
+        expect![[r#"
+        warning: indirect light has no effect: there is one ray per pixel
+         --> a.txt:3:1
+          |
+        3 | Indirect 2
+          | ^^^^^^^^ expected `Samples` before the `Trace`
+          |
+          = help: write for example `Samples 64`"#]],
+    );
+    check(ball("Indirect 0\n", ""), expect![[""]]);
+    check(
+        ball("Indirect 2\nSamples 16\n", ""),
+        expect![[r#"
+        warning: ambient light comes from nowhere, beside the light that `Indirect` sends round
+         --> a.txt:5:1
+          |
+        5 | Sphere 1 0 0 -5 1 0 0 1 0 0
+          | ^^^^^^ expected `ambient` 0 0 0"#]],
+    );
+    check(ball("Indirect 0\nSamples 16\n", ""), expect![[""]]);
+    // The ball's is told once, and nothing is dark beside what goes round.
+    check(
+        "Screen 4 3\nIndirect 2\nSamples 16\nBackground 1 1 1\nMaterial m ambient .1 0 0 diffuse 1 1 1\nGroup g\nSphere 1 0 0 0 m\nEnd\n\
+         Use g\nTrace\nUse g\nTrace",
+        expect![[r#"
+            warning: ambient light comes from nowhere, beside the light that `Indirect` sends round
+             --> a.txt:9:1
+              |
+            9 | Use g
+              | ^^^ expected `ambient` 0 0 0"#]],
+    );
+    check(
+        "Screen 4 3\nIndirect 2\nSamples 16\nMaterial m diffuse 1 1 1\nSphere 1 0 0 0 m\nSphere 1 2 0 0 0 0 0 1 1 1\nTrace",
+        expect![[""]],
+    );
+    check(
+        "Screen 4 3\nIndirect 17\nTrace",
+        expect![[r#"
+        error: `17` is not a number of bounces
+         --> a.txt:2:10
+          |
+        2 | Indirect 17
+          |          ^^ expected `n`, a whole number up to 16"#]],
+    );
+}
+
+#[test]
 fn a_shutter_with_one_ray_per_pixel() {
     check(
         ball("Shutter .5\n", ""),
@@ -142,7 +192,7 @@ fn a_scene_without_light() {
             3 | Ilite 1 1 1 0 -1 0
               | ^^^^^ expected a command
               |
-              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 

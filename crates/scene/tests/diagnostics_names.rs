@@ -131,7 +131,7 @@ fn clauses() {
             2 | Material a
               |           ^ expected a clause, such as `diffuse .8 .2 .1`
               |
-              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`
+              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`, `glow`, `rough`
 
             error: unknown material clause `difuse`
              --> a.txt:3:12
@@ -147,7 +147,7 @@ fn clauses() {
             4 | Material c colour 1 0 0
               |            ^^^^^^ expected a clause
               |
-              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`
+              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`, `glow`, `rough`
 
             error: a material has one `diffuse` only
              --> a.txt:5:26
@@ -187,7 +187,7 @@ fn clauses() {
             9 | Material h diffuse 1 0 0 1
               |                          ^ expected a clause
               |
-              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`"#]],
+              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`, `glow`, `rough`"#]],
     );
 }
 

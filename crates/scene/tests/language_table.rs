@@ -19,6 +19,7 @@ fn sample(command: Command) -> &'static str {
         Command::Shutter => "Shutter .5",
         Command::Tone => "Tone srgb",
         Command::Depth => "Depth 3",
+        Command::Indirect => "Indirect 4",
         Command::Sphere => "Sphere 1 2 3 4 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Triangle => "Triangle 1 2 3 4 5 7 8 8 9 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Cuboid => "Box 1 2 3 4 5 6 .1 .2 .3 .4 .5 .6 .7 .8 .9",

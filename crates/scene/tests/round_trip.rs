@@ -8,8 +8,8 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use rayfold_scene::{
     Background, Camera, Capsule, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
-    Glass, Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Samples, Scene,
-    Screen, Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
+    Glass, Indirect, Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Rough,
+    Samples, Scene, Screen, Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
 };
 
 fn script(text: &str) -> Script {
@@ -57,8 +57,18 @@ fn material() -> BoxedStrategy<Material> {
     let shine = (vector(), 1.0..1e3).prop_map(|(color, n)| Shine::new(color, n).unwrap());
     let glass = (vector(), size()).prop_map(|(color, ior)| Glass::new(color, ior).unwrap());
     let pattern = (weight(), matte()).prop_map(|(weight, other)| Pattern { weight, other });
-    let finish = (prop::option::of(shine), prop::option::of(glass), prop::option::of(pattern))
-        .prop_map(|(shine, glass, pattern)| Finish { shine, glass, pattern, image: None, own: false });
+    let glow = prop_oneof![Just(DVec3::ZERO), vector()];
+    let rough = prop_oneof![Just(None), (1e-9..=1.0).prop_map(|alpha| Some(Rough::new(alpha).unwrap()))];
+    let finish = (prop::option::of(shine), prop::option::of(glass), prop::option::of(pattern), glow, rough)
+        .prop_map(|(shine, glass, pattern, glow, rough)| Finish {
+            shine,
+            glass,
+            pattern,
+            image: None,
+            own: false,
+            glow,
+            rough,
+        });
     prop_oneof![
         2 => matte().prop_map(Material::from),
         1 => (matte(), finish).prop_map(|(matte, finish)| Material::finished(matte, finish)),
@@ -141,6 +151,7 @@ enum Setting {
     Shutter(Shutter),
     Tone(Tone),
     Depth(Depth),
+    Indirect(Indirect),
     Lens(Lens),
 }
 
@@ -151,6 +162,7 @@ impl Setting {
             Self::Shutter(shutter) => scene.shutter = shutter,
             Self::Tone(tone) => scene.tone = tone,
             Self::Depth(depth) => scene.depth = depth,
+            Self::Indirect(indirect) => scene.indirect = indirect,
             Self::Lens(lens) => scene.lens = lens,
         }
     }
@@ -162,6 +174,7 @@ impl Setting {
             Self::Tone(Tone::Plain) => "Tone PLAIN".into(),
             Self::Tone(Tone::Srgb) => "TONE sRGB".into(),
             Self::Depth(depth) => format!("Depth {}.0", depth.bounces()),
+            Self::Indirect(indirect) => format!("indirect {}", indirect.bounces()),
             Self::Lens(lens) => {
                 let distance = lens.distance().map_or(String::new(), |d| format!("{d:e}"));
                 format!("Lens {:e} {distance}", lens.radius())
@@ -177,6 +190,7 @@ fn setting() -> BoxedStrategy<Setting> {
         (0.0..=1.0).prop_map(|open| Setting::Shutter(Shutter::new(open).unwrap())),
         prop_oneof![Just(Tone::Plain), Just(Tone::Srgb)].prop_map(Setting::Tone),
         (0..=Depth::MOST).prop_map(|n| Setting::Depth(Depth::new(n).unwrap())),
+        (0..=Indirect::MOST).prop_map(|n| Setting::Indirect(Indirect::new(n).unwrap())),
         (prop_oneof![Just(0.0), size()], prop::option::of(size()))
             .prop_map(|(radius, distance)| Setting::Lens(Lens::new(radius, distance).unwrap())),
     ]

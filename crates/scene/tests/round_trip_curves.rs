@@ -244,12 +244,12 @@ fn bits(scene: &impl std::fmt::Debug) -> String {
 fn everything_of_the_language_is_drawn() {
     let mut runner = TestRunner::deterministic();
     let drafts = prop::collection::vec(draft(), 1..40);
-    let texts: Vec<_> = (0..400)
+    let texts: Vec<_> = (0..600)
         .map(|_| script(&drafts.new_tree(&mut runner).unwrap().current()))
         .filter(|text| read(text).is_ok())
         .map(|text| text.to_lowercase())
         .collect();
-    assert!(texts.len() > 100, "{} of 400 are in order", texts.len());
+    assert!(texts.len() > 100, "{} of 600 are in order", texts.len());
     let words = Command::ALL.iter().flat_map(|command| {
         let of_values = command.form().fields.iter().flat_map(|field| match field.values {
             Values::OneOf(words) => words,

@@ -96,6 +96,7 @@ pub(crate) fn new_setting(command: Command) -> Line {
         (_, Range::OneOf(words)) => words.last().copied().unwrap_or_default().to_owned(),
         (Parameter::Samples, _) => "16".to_owned(),
         (Parameter::Depth, _) => "8".to_owned(),
+        (Parameter::Indirect, _) => "2".to_owned(),
         (Parameter::FogDistance, _) => "20".to_owned(),
         (_, Range::Whole(least, _)) => least.max(1).to_string(),
         (_, Range::Share) => "0.5".to_owned(),

@@ -226,6 +226,8 @@ pub(crate) fn toggle(
                 Parameter::GradientEnd => "1",
                 Parameter::Glass => "0.95",
                 Parameter::Ambient => "0.1",
+                Parameter::Glow => "1",
+                Parameter::Roughness => "0.2",
                 _ => "0.5",
             };
             vec![value.to_owned(); field.names.len()]

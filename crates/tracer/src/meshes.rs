@@ -90,7 +90,7 @@ impl<'a> Expanded<'a> {
         if !scene.objects.iter().any(|object| mesh(object).is_some()) {
             return Self { scene, faces: None };
         }
-        let (objects, faces) = expanded(&scene.objects, scene.tone == Tone::Srgb);
+        let (objects, faces) = expanded(&scene.objects, Colors::of(&scene));
         Self {
             scene: Cow::Owned(Scene { objects: objects.into(), ..scene.into_owned() }),
             faces: Some(Arc::new(faces)),
@@ -115,8 +115,24 @@ pub(crate) fn mesh(object: &Object) -> Option<&Mesh> {
     }
 }
 
-/// Expands the meshes among objects. `is_linear` is whether colours are linear light.
-pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Faces) {
+/// The rules for the colours of models.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Colors {
+    /// Whether they are linear light.
+    is_linear: bool,
+    /// Whether surfaces light each other. Then a colour of a file is diffuse, and none of it is ambient.
+    is_indirect: bool,
+}
+
+impl Colors {
+    fn of(scene: &Scene) -> Self {
+        Self { is_linear: scene.tone == Tone::Srgb, is_indirect: scene.indirect_bounces() > 0 }
+    }
+}
+
+/// Expands the meshes among objects.
+pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Faces) {
+    let is_linear = colors.is_linear;
     let mut all = Vec::with_capacity(expanded_count(objects));
     let mut faces = Faces::default();
     // The triangles of a group's mesh, by its place in memory.
@@ -131,7 +147,7 @@ pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Fac
             Object::Instance(instance) => {
                 let triangles = of_groups
                     .entry(std::ptr::from_ref(mesh))
-                    .or_insert_with(|| triangles(mesh, is_linear).collect());
+                    .or_insert_with(|| triangles(mesh, colors).collect());
                 let placement = instance.shared_placement();
                 all.extend(
                     (0..triangles.len()).map(|k| Object::from(Instance::new(triangles, k, placement))),
@@ -139,7 +155,7 @@ pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Fac
                 Some(placement.clone())
             }
             _ => {
-                all.extend(triangles(mesh, is_linear));
+                all.extend(triangles(mesh, colors));
                 None
             }
         };
@@ -165,10 +181,10 @@ pub(crate) fn expanded(objects: &[Object], is_linear: bool) -> (Vec<Object>, Fac
 }
 
 /// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
-fn triangles(mesh: &Mesh, is_linear: bool) -> impl Iterator<Item = Object> {
+fn triangles(mesh: &Mesh, colors: Colors) -> impl Iterator<Item = Object> {
     let model = mesh.model();
     let materials: Vec<Material> =
-        (0..model.looks().len()).map(|look| material(mesh, look, is_linear)).collect();
+        (0..model.looks().len()).map(|look| material(mesh, look, colors)).collect();
     (0..model.triangle_count()).map(move |k| {
         let triangle = Triangle::new(model.corners(k), materials[model.look(k)].clone());
         triangle.unwrap_or_else(|_| unreachable!("positions of a model are finite")).into()
@@ -176,7 +192,8 @@ fn triangles(mesh: &Mesh, is_linear: bool) -> impl Iterator<Item = Object> {
 }
 
 /// Returns the material of the faces of a look.
-fn material(mesh: &Mesh, look: usize, is_linear: bool) -> Material {
+fn material(mesh: &Mesh, look: usize, colors: Colors) -> Material {
+    let Colors { is_linear, is_indirect } = colors;
     let material = mesh.material();
     let Some(finish) = material.finish().filter(|finish| finish.own) else { return material.clone() };
     let model = mesh.model();
@@ -187,7 +204,11 @@ fn material(mesh: &Mesh, look: usize, is_linear: bool) -> Material {
         let made = Coefficients::new(own.ambient() * color, own.diffuse() * color, own.mirror());
         made.unwrap_or(own)
     };
-    let mut coefficients = tinted(material.coefficients());
+    let own = material.coefficients();
+    let mut coefficients = tinted(match is_indirect && !mesh.has_material() {
+        true => Coefficients::new(DVec3::ZERO, DVec3::ONE, own.mirror()).unwrap_or(own),
+        false => own,
+    });
     if !mesh.has_material() {
         let glow = if model.has_vertex_colors() { DVec3::ZERO } else { model.glow(look, is_linear) };
         let made = if unlit {

@@ -58,6 +58,8 @@ parts! {
     shutters, "shutters", |scene| is_sampled(scene) && scene.shutter.open() > 0.0;
     // Lights that have an extent.
     extents, "extents", |scene| is_sampled(scene) && scene.lights.iter().any(has_extent);
+    glows, "glows", |scene| is_made(scene, |f| f.glow != glam::DVec3::ZERO);
+    paths, "paths", Scene::goes_round;
     fogs, "fogs", |scene| scene.fog.get().is_some();
     covers, "covers", |scene| scene.background.is_none();
 }

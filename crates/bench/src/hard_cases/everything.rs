@@ -160,11 +160,18 @@ fn glass(rng: &mut Rng) -> Result<Material> {
 }
 
 fn some(rng: &mut Rng) -> Result<Material> {
-    match rng.u8(0..4) {
+    // By dice of its own, so that a seed keeps its other numbers.
+    let mut dice = rng.clone();
+    let material = match rng.u8(0..4) {
         0 => glass(rng),
         1 => pattern(rng),
         _ => plain(rng),
+    }?;
+    if dice.u8(0..8) != 7 {
+        return Ok(material);
     }
+    let finish = Finish { glow: 0.4 * color(&mut dice), ..material.finish().cloned().unwrap_or_default() };
+    Ok(Material::finished(material.coefficients(), finish))
 }
 
 /// Returns a random object of about this size.

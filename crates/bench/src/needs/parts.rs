@@ -53,6 +53,8 @@ pub(super) const VERSION_2: &[&str] = &[
     "extents",
     "fogs",
     "covers",
+    "glows",
+    "paths",
 ];
 
 /// Halves of version 2, or less: whichever two of its parts are taken, there is one that has the first and not the second.
@@ -62,9 +64,9 @@ const OF_VERSION_2: [&[&str]; 10] = [
     &["planes", "groups", "meshes", "pictures"],
     &["planes", "discs", "capsules", "lenses"],
     &["highlights"],
-    &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb"],
-    &["highlights", "patterns", "fogs", "covers"],
-    &["glass", "skies", "pictures", "extents", "covers"],
+    &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb", "glows", "paths"],
+    &["highlights", "patterns", "fogs", "covers", "paths"],
+    &["glass", "skies", "pictures", "extents", "covers", "glows"],
     &[
         "capsules",
         "turned-boxes",
@@ -91,7 +93,10 @@ const OF_VERSION_2: [&[&str]; 10] = [
         "covers",
     ],
     &["discs", "cones", "tori", "highlights", "patterns", "lamps", "skies", "extents"],
-    &["planes", "discs", "cones", "meshes", "glass", "srgb", "samples", "lenses", "shutters"],
+    &[
+        "planes", "discs", "cones", "meshes", "glass", "srgb", "samples", "lenses", "shutters", "glows",
+        "paths",
+    ],
 ];
 
 /// A build of the tracer.

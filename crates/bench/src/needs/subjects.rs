@@ -54,7 +54,7 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 21] = [
+const OF_VERSION_2: [(&str, &str); 23] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -116,6 +116,22 @@ Use pair  1.5 1 -2  0 0 90
         "Material glossy  diffuse .6 .2 .2  shine .8 .8 .8 50
 Sphere 1  -1 0 0  glossy
 Sphere 1   1 0 -2  glossy
+",
+    ),
+    (
+        "balls that glow",
+        "Material lit  diffuse .6 .2 .2  glow .2 .3 .1
+Sphere 1  -1 0 0  lit
+Sphere 1   1 0 -2  lit
+",
+    ),
+    (
+        "balls that light each other",
+        "Samples 16 0
+Indirect 2
+Background .6 .7 .8
+Sphere 1  -1 0 0  0 0 0  .6 .2 .2
+Sphere 1   1 0 -2  0 0 0  .2 .6 .2
 ",
     ),
     (

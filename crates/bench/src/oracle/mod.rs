@@ -24,10 +24,14 @@ mod line;
 mod noise;
 mod pattern;
 mod real;
+mod rough;
 mod shapes;
 mod sky;
 
+use std::cell::RefCell;
+
 use ::image::RgbImage;
+use fastrand::Rng;
 use glam::DVec3;
 use rayfold_scene::{Object, Scene, Tone};
 use rayon::prelude::*;
@@ -48,13 +52,20 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 /// Returns the colour at fractional pixel indices.
 pub fn color_at(scene: &Scene, x: f64, y: f64) -> DVec3 {
     let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
-    seen_along(scene, &line, &Path::of_camera(scene)).color.to_dvec3()
+    seen_along(scene, &line, &Path::of_camera(scene, None)).color.to_dvec3()
 }
 
 /// Returns the cover of a pixel of a scene without background; 1 with one.
 pub fn cover(scene: &Scene, i: u32, j: u32) -> f64 {
     let line = Line::of_pixel(&scene.camera, scene.screen, f64::from(i), f64::from(j));
-    1.0 - seen_along(scene, &line, &Path::of_camera(scene)).clear
+    1.0 - seen_along(scene, &line, &Path::of_camera(scene, None)).clear
+}
+
+/// Returns the colour of a path of light through fractional pixel indices, unclamped: one sample, by the dice, of the
+/// expectation that the language defines. Lights are points.
+pub fn path_at(scene: &Scene, x: f64, y: f64, dice: &RefCell<Rng>) -> DVec3 {
+    let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
+    seen_along(scene, &line, &Path::of_camera(scene, Some(dice))).color.to_dvec3()
 }
 
 /// Returns the position of the object that a pixel shows, and its normal there.
@@ -89,7 +100,11 @@ pub fn levels(tone: Tone, color: DVec3) -> [u8; 3] {
 }
 
 /// The state of a ray at its start.
-struct Path {
+struct Path<'a> {
+    /// The dice of a path of light, where light goes round.
+    dice: Option<&'a RefCell<Rng>>,
+    /// The number of diffuse reflections so far.
+    scattered: u32,
     /// Hits nearer than this are ignored.
     start: Real,
     bounces: u32,
@@ -100,10 +115,18 @@ struct Path {
     clear: Option<f64>,
 }
 
-impl Path {
-    fn of_camera(scene: &Scene) -> Self {
+impl<'a> Path<'a> {
+    fn of_camera(scene: &Scene, dice: Option<&'a RefCell<Rng>>) -> Self {
         let clear = scene.background.is_none().then_some(1.0);
-        Self { start: Real::zero(), bounces: 0, weight: DVec3::ONE.into(), has_met_glass: false, clear }
+        Self {
+            dice,
+            scattered: 0,
+            start: Real::zero(),
+            bounces: 0,
+            weight: DVec3::ONE.into(),
+            has_met_glass: false,
+            clear,
+        }
     }
 }
 
@@ -119,7 +142,7 @@ impl From<Vector> for Seen {
     }
 }
 
-fn seen_along(scene: &Scene, line: &Line, path: &Path) -> Seen {
+fn seen_along(scene: &Scene, line: &Line, path: &Path<'_>) -> Seen {
     let Some(hit) = nearest_on(&scene.objects, line, &path.start) else {
         if let Some(clear) = path.clear {
             return Seen { color: DVec3::ZERO.into(), clear };
@@ -138,11 +161,14 @@ fn seen_along(scene: &Scene, line: &Line, path: &Path) -> Seen {
 }
 
 /// Returns what a hit sends back along the line.
-fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
+fn seen_at_hit(scene: &Scene, line: &Line, path: &Path<'_>, hit: &Hit) -> Seen {
     let object = &scene.objects[hit.object];
     let material = object.material();
     let (place, face) = shapes::place(object, line, &hit.t);
     let [mut ambient, mut diffuse, mirror] = pattern::coefficients(material, &place, face);
+    if scene.indirect_bounces() > 0 && shapes::is_of_file(object) {
+        (ambient, diffuse) = (DVec3::ZERO.into(), DVec3::ONE.into());
+    }
     if let Some(factor) = image::factor(object, &place.to_dvec3(), line, hit, scene.tone == Tone::Srgb) {
         (ambient, diffuse) = (ambient.times(&factor.into()), diffuse.times(&factor.into()));
     }
@@ -163,8 +189,13 @@ fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
     let farthest = point.to_dvec3().abs().max_element();
     let start = Real::from(shapes::extent(&scene.objects).max(farthest)).shifted(-300);
 
-    let mut color = ambient;
-    let shine = material.finish().and_then(|finish| finish.shine);
+    let finish = material.finish();
+    let glow = finish.map_or(DVec3::ZERO, |finish| finish.glow);
+    let mut color = ambient.plus(&Real::from(1.0), &glow.into());
+    let shine = finish.and_then(|finish| finish.shine);
+    let rough = finish.and_then(|finish| finish.rough).map_or(0.0, |rough| rough.alpha());
+    let rough = (rough > 0.0 && path.dice.is_some()).then_some(rough);
+    let view = line.direction.unit().opposite().to_dvec3();
     for light in scene.lights.iter() {
         let Some(arriving) = light::arriving(scene, light, (&point, lift), normal, &start) else { continue };
         let cosine = normal.dot(&arriving.towards);
@@ -174,9 +205,68 @@ fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
             let part = light::highlight(shine.exponent(), normal, &arriving.towards, &towards_eye);
             answer = answer.plus(&Real::from(part), &shine.color().into());
         }
+        if let Some(alpha) = rough {
+            let part = rough::highlight(alpha, normal.to_dvec3(), view, arriving.towards.to_dvec3());
+            answer = answer.plus(&Real::from(part), &mirror);
+        }
         color = color.plus(&Real::from(1.0), &arriving.color.times(&answer));
     }
 
+    let one = Real::from(1.0);
+    if let Some(dice) = path.dice
+        && path.scattered < scene.indirect.bounces()
+        && diffuse.0.iter().any(|channel| channel.sign() != 0)
+    {
+        let direction = scattered(normal, &hit.normal, dice);
+        let next = Line { origin: point.clone(), direction };
+        let weight = path.weight.times(&diffuse.magnitude());
+        let path = Path { start: start.clone(), scattered: path.scattered + 1, weight, clear: None, ..*path };
+        color = color.plus(&one, &diffuse.times(&seen_along(scene, &next, &path).color));
+    }
+    let onwards = match (rough, path.dice) {
+        (Some(alpha), Some(dice)) => {
+            let normal = normal.unit().to_dvec3();
+            let rough::Facet { normal: facet, weight } = rough::random_facet(alpha, view, normal, dice);
+            let energy = rough::energy(alpha, normal.dot(view));
+            from_facet(line, hit, object, (alpha, normal), (facet, weight), (&mirror, energy), path.clear)
+        }
+        _ => from_surface(line, hit, object, normal, mirror, path.clear),
+    };
+    let mut left_clear = 0.0;
+    for (factor, direction, clear) in onwards.into_iter().flatten() {
+        let weight = path.weight.times(&factor.magnitude());
+        let has_met_glass = path.has_met_glass || glass_of(object).is_some();
+        let least = match scene.tone {
+            Tone::Plain => 2f64.powi(-12),
+            Tone::Srgb => 2f64.powi(-16),
+        };
+        let counts = weight.0.iter().any(|w| {
+            if has_met_glass && path.dice.is_none() { *w >= Real::from(least) } else { w.sign() > 0 }
+        });
+        if path.bounces < scene.depth.bounces() && counts {
+            let next = Line { origin: point.clone(), direction };
+            let bounces = path.bounces + 1;
+            let path = Path { start: start.clone(), bounces, weight, has_met_glass, clear, ..*path };
+            let seen = seen_along(scene, &next, &path);
+            color = color.plus(&one, &factor.times(&seen.color));
+            left_clear += seen.clear;
+        }
+    }
+    Seen { color, clear: left_clear }
+}
+
+/// The rays that go on from a hit: their factors and directions, and the shares of the pixel that they leave clear.
+type Onwards = [Option<(Vector, Vector, Option<f64>)>; 2];
+
+/// Returns the rays that go on from a smooth surface.
+fn from_surface(
+    line: &Line,
+    hit: &Hit,
+    object: &Object,
+    normal: &Vector,
+    mirror: Vector,
+    clear: Option<f64>,
+) -> Onwards {
     let one = Real::from(1.0);
     let normal = onward_normal(line, normal, hit, object);
     let mut mirrored = mirror;
@@ -192,30 +282,64 @@ fn seen_at_hit(scene: &Scene, line: &Line, path: &Path, hit: &Hit) -> Seen {
             let factor = Vector::from(DVec3::ZERO).plus(&(&one - &share), &glass.color().into());
             let mean = (glass.color().x + glass.color().y + glass.color().z) / 3.0;
             let left = (1.0 - share.to_f64()) * mean.clamp(0.0, 1.0);
-            let clear = path.clear.map(|clear| left * clear);
+            let clear = clear.map(|clear| left * clear);
             (factor, if shapes::has_inside(object) { bent } else { direction }, clear)
         });
     }
-    let onwards = [Some((mirrored, reflected(&line.direction, &normal).unit(), None)), through];
-    let mut left_clear = 0.0;
-    for (factor, direction, clear) in onwards.into_iter().flatten() {
-        let weight = path.weight.times(&factor.magnitude());
-        let has_met_glass = path.has_met_glass || glass.is_some();
-        let least = match scene.tone {
-            Tone::Plain => 2f64.powi(-12),
-            Tone::Srgb => 2f64.powi(-16),
+    [Some((mirrored, reflected(&line.direction, &normal).unit(), None)), through]
+}
+
+/// Returns the rays that go on from a microfacet of a surface with this normal, which has been drawn with this weight.
+fn from_facet(
+    line: &Line,
+    hit: &Hit,
+    object: &Object,
+    (alpha, normal): (f64, DVec3),
+    (facet, weight): (DVec3, f64),
+    (mirror, energy): (&Vector, f64),
+    clear: Option<f64>,
+) -> Onwards {
+    let (direction, face) = (line.direction.unit(), hit.normal.unit().to_dvec3());
+    let facet = Vector::from(facet);
+    let towards = reflected(&direction, &facet).unit();
+    let flat = towards.to_dvec3();
+    let shown = if flat.dot(face) > 0.0 { rough::masking(alpha, flat.dot(normal)) } else { 0.0 };
+    let nothing = Vector::from(DVec3::ZERO);
+    let mut mirrored = nothing.plus(&Real::from(shown * weight / energy), mirror);
+    let through = glass_of(object).and_then(|glass| {
+        let (one, ior) = (Real::from(1.0), Real::from(glass.ior()));
+        let index = if hit.leaves && shapes::has_inside(object) { one.over(&ior) } else { ior };
+        let (share, bent) = glass::refracted(&direction, &facet, &index);
+        let share = share.to_f64();
+        mirrored = mirrored.plus(&Real::from(share * shown * weight), &DVec3::ONE.into());
+        let bent = match shapes::has_inside(object) {
+            true => bent?.to_dvec3(),
+            false => flat - 2.0 * flat.dot(normal) * normal,
         };
-        let counts =
-            weight.0.iter().any(|w| if has_met_glass { *w >= Real::from(least) } else { w.sign() > 0 });
-        if path.bounces < scene.depth.bounces() && counts {
-            let next = Line { origin: point.clone(), direction };
-            let path = Path { start: start.clone(), bounces: path.bounces + 1, weight, has_met_glass, clear };
-            let seen = seen_along(scene, &next, &path);
-            color = color.plus(&one, &factor.times(&seen.color));
-            left_clear += seen.clear;
+        let left = if bent.dot(face) < 0.0 { rough::masking(alpha, -bent.dot(normal)) } else { 0.0 };
+        let left = (1.0 - share) * left * weight;
+        let factor = nothing.plus(&Real::from(left), &glass.color().into());
+        let mean = (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
+        Some((factor, Vector::from(bent).unit(), clear.map(|clear| clear * left * mean)))
+    });
+    [Some((mirrored, towards, None)), through]
+}
+
+/// Returns a random unit vector around a normal, with a density in proportion to the cosine: the normal and a point of the
+/// unit sphere, added. One below the face is mirrored to above it.
+fn scattered(normal: &Vector, face: &Vector, dice: &RefCell<Rng>) -> Vector {
+    let normal = normal.unit().to_dvec3();
+    let face = face.unit().to_dvec3();
+    let mut dice = dice.borrow_mut();
+    let direction = loop {
+        let within = DVec3::new(dice.f64(), dice.f64(), dice.f64()) * 2.0 - 1.0;
+        let length = within.length();
+        if length > 1e-6 && length <= 1.0 && (normal + within / length).length() > 1e-9 {
+            break (normal + within / length).normalize();
         }
-    }
-    Seen { color, clear: left_clear }
+    };
+    let below = direction.dot(face).min(0.0);
+    Vector::from(direction - 2.0 * below * face).unit()
 }
 
 /// Returns the normal at which a ray goes on: that of the face if a ray would leave on the wrong side of it.

@@ -92,6 +92,8 @@ class Material:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None: ...
     @property
     def name(self) -> str | None: ...
@@ -315,6 +317,19 @@ class Scene:
         bounces : int
             the depth (`n`): number in bounces, whole, from 0 to 64.
         """
+    def indirect(
+        self,
+        bounces: int,
+    ) -> None:
+        """The largest number of diffuse reflections of a ray.
+
+        In a script: `Indirect n`.
+
+        Parameters
+        ----------
+        bounces : int
+            the number of diffuse reflections (`n`): number in bounces, whole, from 0 to 16.
+        """
     def sphere(
         self,
         radius: Number,
@@ -331,6 +346,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A sphere.
 
@@ -344,7 +361,7 @@ class Scene:
             the centre (`cx cy cz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def triangle(
@@ -364,6 +381,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A triangle.
 
@@ -379,7 +398,7 @@ class Scene:
             the vertex (`wx wy wz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def box(
@@ -398,6 +417,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A box along the axes.
 
@@ -411,7 +432,7 @@ class Scene:
             the corner (`vx vy vz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def plane(
@@ -430,6 +451,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """An infinite plane.
 
@@ -443,7 +466,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def disc(
@@ -463,6 +486,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A flat, round disc.
 
@@ -478,7 +503,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def cylinder(
@@ -498,6 +523,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A closed cylinder.
 
@@ -513,7 +540,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -536,6 +563,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A closed cone or truncated cone.
 
@@ -553,7 +582,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -576,6 +605,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A ring (torus).
 
@@ -593,7 +624,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `R` is greater than `r`.
@@ -615,6 +646,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """A cylinder with round ends.
 
@@ -630,7 +663,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def mesh(
@@ -650,6 +683,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> None:
         """The triangles of a model in a file.
 
@@ -665,7 +700,7 @@ class Scene:
             faces that meet at less than this angle in degrees, 0 to 180, look smooth.
         flat : bool, optional
             whether the normals of the file are left out.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def material(
@@ -682,6 +717,8 @@ class Scene:
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
         own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
     ) -> Material:
         """A surface material with a name.
 
@@ -691,7 +728,7 @@ class Scene:
         ----------
         name : str
             the name of the new material.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def group(

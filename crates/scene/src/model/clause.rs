@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::image::Image;
 use super::invalid::{Faults, InvalidValue, Parameter, finite, positive};
-use super::material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
+use super::material::{Coefficients, Finish, Glass, Material, Pattern, Rough, Shine, Weight};
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
 use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Quotes, Subject, Values};
 
@@ -57,6 +57,8 @@ const GLASS: &[Field] = &[
     Field::new(Parameter::Glass, &["r", "g", "b"], Kind::Coefficients, Values::Any),
     Field::new(Parameter::Ior, &["ior"], Kind::Plain, Values::Positive),
 ];
+const GLOW: &[Field] = &[Field::new(Parameter::Glow, &["r", "g", "b"], Kind::Coefficients, Values::Any)];
+const ROUGH: &[Field] = &[Field::new(Parameter::Roughness, &["a"], Kind::Plain, Values::Share)];
 const ENDS: &[Field] = &[
     Field::new(Parameter::GradientStart, &["a"], Kind::Position, Values::Any),
     Field::new(Parameter::GradientEnd, &["b"], Kind::Position, Values::Any),
@@ -74,6 +76,8 @@ clauses! {
     Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
     Image: Form::new("image", WIDTH).with_subject(Subject::Quotes(Quotes::File)).with_usage("image \"FILE\" uv or flat s [xy or xz or zy] or ball"), "A picture as a factor of ambient and diffuse.";
     Own: Form::new("own", &[]), "The colours of a model's file as factors.";
+    Glow: Form::new("glow", GLOW), "The light that the surface gives off.";
+    Rough: Form::new("rough", ROUGH), "The roughness of mirror and glass.";
 }
 
 impl Clause {
@@ -142,6 +146,11 @@ impl Clauses {
                 }
             }
             Clause::Own => self.finish.own = true,
+            Clause::Rough => {
+                let rough = Rough::new(numbers.number())?;
+                self.finish.rough = Some(rough).filter(|rough| rough.given() > 0.0);
+            }
+            Clause::Glow => self.finish.glow = finite(Parameter::Glow, numbers.vector())?,
         }
         Ok(())
     }
@@ -149,6 +158,11 @@ impl Clauses {
     /// Adds the picture of a clause `image`.
     pub(crate) fn add_image(&mut self, image: Image) {
         self.finish.image = Some(image);
+    }
+
+    /// Keeps a roughness of 0, which is that of a curve at a moment.
+    pub(crate) fn keep_rough(&mut self) {
+        self.finish.rough.get_or_insert(Rough::NONE);
     }
 
     /// Returns the assembled material.

@@ -181,6 +181,8 @@ pub enum Parameter {
     Shutter,
     /// The largest number of bounces.
     Depth,
+    /// The largest number of diffuse reflections.
+    Indirect,
     /// A point of a plane.
     PlanePoint,
     /// The normal of a flat or round shape.
@@ -215,6 +217,10 @@ pub enum Parameter {
     Glass,
     /// The index of refraction.
     Ior,
+    /// The light that a surface gives off.
+    Glow,
+    /// The roughness of a mirror or of glass.
+    Roughness,
     /// The size of a pattern's cells.
     CellSize,
     /// The start of a gradient.
@@ -271,6 +277,7 @@ impl fmt::Display for Parameter {
             Self::SamplingError => "the error e",
             Self::Shutter => "the shutter",
             Self::Depth => "the depth",
+            Self::Indirect => "the number of diffuse reflections",
             Self::PlanePoint => "the point",
             Self::Normal => "the normal",
             Self::AxisEnd => "the axis's end",
@@ -288,6 +295,8 @@ impl fmt::Display for Parameter {
             Self::ShineExponent => "the exponent n",
             Self::Glass => "the glass coefficient",
             Self::Ior => "the index of refraction",
+            Self::Glow => "the glow",
+            Self::Roughness => "the roughness a",
             Self::CellSize => "the size s",
             Self::GradientStart => "the start a",
             Self::GradientEnd => "the end b",

@@ -35,6 +35,45 @@ pub struct Finish {
     pub image: Option<Image>,
     /// Whether the colour of a model's file multiplies the ambient and diffuse coefficients.
     pub own: bool,
+    /// The light that the surface gives off on both sides, per channel; any finite numbers. No pattern changes it.
+    pub glow: DVec3,
+    /// The roughness of mirror and glass; `None` for the number 0.
+    pub rough: Option<Rough>,
+}
+
+/// The width α of the microfacets of a rough mirror or of rough glass (isotropic GGX), from 0 to 1. A curve can be 0 at a
+/// moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rough(f64);
+
+impl Rough {
+    /// The least width above 0.
+    pub const LEAST: f64 = 1.0 / 1024.0;
+
+    /// The roughness of a curve that is 0.
+    pub(crate) const NONE: Self = Self(0.0);
+
+    /// Makes a roughness.
+    ///
+    /// # Errors
+    /// Fails if it is not from 0 to 1.
+    pub fn new(alpha: f64) -> Result<Self, InvalidValue> {
+        if (0.0..=1.0).contains(&alpha) {
+            Ok(Self(alpha))
+        } else {
+            Err(InvalidValue::OutOfRange(Parameter::Roughness, 0.0, 1.0))
+        }
+    }
+
+    /// Returns the width as it was given.
+    pub fn given(self) -> f64 {
+        self.0
+    }
+
+    /// Returns the width: 0, or from [`Self::LEAST`] to 1.
+    pub fn alpha(self) -> f64 {
+        if self.0 > 0.0 { self.0.max(Self::LEAST) } else { 0.0 }
+    }
 }
 
 /// Highlights: for each visible light, light·shine·max(0, N·h)ⁿ (Blinn and Phong).

@@ -10,6 +10,7 @@ mod camera;
 mod clause;
 mod fog;
 mod image;
+mod indirect;
 mod invalid;
 mod lights;
 mod look;
@@ -29,10 +30,11 @@ pub use camera::{Camera, Pinhole};
 pub use clause::Clause;
 pub use fog::Fog;
 pub use image::{Axes, Image, ImageMap};
+pub use indirect::Indirect;
 pub use invalid::{InvalidValue, Parameter};
 pub use lights::{DirectionalLight, Lamp, Light};
 pub use look::Look;
-pub use material::{Coefficients, Finish, Glass, Material, Pattern, Shine, Weight};
+pub use material::{Coefficients, Finish, Glass, Material, Pattern, Rough, Shine, Weight};
 pub use picture_file::PictureFile;
 pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
@@ -69,12 +71,16 @@ pub struct Scene {
     pub lights: SharedSlice<Light>,
     /// The number of rays per pixel.
     pub samples: Samples,
+    /// Whether an object that is hidden at the moment is rough, and none that is seen.
+    pub hides_rough: bool,
     /// The exposure time of a frame.
     pub shutter: Shutter,
     /// The conversion of colours to levels.
     pub tone: Tone,
     /// The largest number of bounces.
     pub depth: Depth,
+    /// The largest number of diffuse reflections of a ray.
+    pub indirect: Indirect,
     /// The lens of the camera.
     pub lens: Lens,
     /// The fog that rays go through.
@@ -92,12 +98,31 @@ impl Scene {
             objects: SharedSlice::default(),
             lights: SharedSlice::default(),
             samples: Samples::default(),
+            hides_rough: false,
             shutter: Shutter::default(),
             tone: Tone::default(),
             depth: Depth::default(),
+            indirect: Indirect::default(),
             lens: Lens::default(),
             fog: Fog::default(),
         }
+    }
+
+    /// Returns how many diffuse reflections a ray of the picture follows: none in a picture of one ray per pixel.
+    pub fn indirect_bounces(&self) -> u32 {
+        if self.samples.most() > 1 { self.indirect.bounces() } else { 0 }
+    }
+
+    /// Returns whether light goes round in the picture: no ray's colour is clamped then, and none is left out because its
+    /// factor is small.
+    pub fn goes_round(&self) -> bool {
+        self.samples.most() > 1 && (self.indirect.bounces() > 0 || self.hides_rough || self.shows_rough())
+    }
+
+    /// Returns whether an object that is not hidden is rough.
+    pub(crate) fn shows_rough(&self) -> bool {
+        let is_rough = |object: &Object| object.material().finish().is_some_and(|f| f.rough.is_some());
+        self.objects.iter().any(is_rough)
     }
 
     /// Returns the colours of rays that hit nothing: those of the sky, of the background, or of the fog, which hides both. A sky

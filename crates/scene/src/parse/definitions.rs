@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::doubts::Looks;
+use super::doubts::{Looks, rough_without_mirror};
 use super::line::Statement;
 use super::meshes::Models;
 use super::text::{Parameters, is_name};
@@ -35,8 +35,8 @@ pub(super) struct GroupInfo {
     pub(super) drawn: usize,
     /// The largest number of groups that drawing it draws.
     pub(super) uses: usize,
-    /// Whether an object has a colour that needs light.
-    pub(super) needs_light: bool,
+    /// The looks of its objects.
+    pub(super) looks: Looks,
     pub(super) reach: Reach,
     /// The models that it draws.
     pub(super) models: Models,
@@ -68,7 +68,7 @@ pub(super) struct OpenGroup<'a> {
     pub(super) recorder: GroupRecorder,
     pub(super) drawn: usize,
     pub(super) uses: usize,
-    pub(super) needs_light: bool,
+    pub(super) looks: Looks,
     reach: Reach,
     pub(super) models: Models,
     contents: Contents,
@@ -189,6 +189,7 @@ impl<'a> Parser<'a> {
             | Effect::Shutter
             | Effect::Tone
             | Effect::Depth
+            | Effect::Indirect
             | Effect::Frames
             | Effect::End
             | Effect::Object(_)
@@ -221,6 +222,15 @@ impl<'a> Parser<'a> {
             };
             named.still = named.at(0.0, Tone::Plain, coefficients).ok();
         }
+        let is_in_use =
+            |line: &ClauseLine| matches!(line.clause, Clause::Mirror | Clause::Glass) || line.other.is_some();
+        if is_good
+            && let Some(place) = self.place_of_clause(s, subject.end, Clause::Rough)
+            && named.clauses.iter().any(ClauseLine::is_rough)
+            && !named.clauses.iter().any(is_in_use)
+        {
+            self.report.warning(s.line, place, rough_without_mirror);
+        }
         let info = MaterialInfo {
             still: named.still.clone(),
             is_plain: named.clauses.iter().all(is_plain),
@@ -241,6 +251,12 @@ impl<'a> Parser<'a> {
                 self.report.error(s.line, subject, || wording::defined_twice(Kinds::Materials, name, first));
             }
         }
+    }
+
+    /// Returns the place of the name of a clause after byte `at`.
+    fn place_of_clause(&self, s: &Statement<'a, '_>, at: usize, clause: Clause) -> Option<Range<usize>> {
+        let words = Parameters::read(s.text.as_bytes(), at).words;
+        words.into_iter().find(|word| Clause::from_name(&s.text[word.clone()]) == Some(clause))
     }
 
     /// Parses the clauses after byte `at`. Returns them, and those with curves as indices of all lines with curves.
@@ -418,7 +434,7 @@ impl<'a> Parser<'a> {
             recorder: GroupRecorder::default(),
             drawn: 0,
             uses: 0,
-            needs_light: false,
+            looks: Looks::default(),
             reach: Reach::NONE,
             models: Models::default(),
             contents: Contents::default(),
@@ -461,20 +477,9 @@ impl<'a> Parser<'a> {
 
     pub(super) fn close_group(&mut self) {
         let Some(group) = self.group.take() else { return };
-        let OpenGroup {
-            name,
-            line,
-            subject,
-            recorder,
-            drawn,
-            uses,
-            needs_light,
-            reach,
-            models,
-            contents,
-            ..
-        } = group;
-        let info = GroupInfo { drawn, uses, needs_light, reach, models, contents, visible_span: None };
+        let OpenGroup { name, line, subject, recorder, drawn, uses, looks, reach, models, contents, .. } =
+            group;
+        let info = GroupInfo { drawn, uses, looks, reach, models, contents, visible_span: None };
         if self.groups.define(name, line, subject, Some(info)).is_ok() {
             self.record(|script| script.add_group(recorder.finish(name, drawn)));
         }

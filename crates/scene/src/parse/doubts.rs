@@ -7,16 +7,17 @@ use std::ops::Range;
 use super::line::{Statement, decimal_comma};
 use super::{Parser, wording};
 use crate::command::{Command, Effect};
+use crate::diagnostic::Code;
 use crate::form::{Form, Kind};
 use crate::model::{Camera, Clause, ImageMap, Light, Material, Parameter};
-use crate::report::Line;
+use crate::report::{Fault, Line};
 use crate::row::{Number, Row};
 use crate::script::{ClauseLine, Value};
 
 /// The bound from which a coefficient of a surface is probably a level from 0 to 255.
 const FAR_ABOVE_ONE: f64 = 10.0;
 
-/// The bound from which a colour of a light is probably a level from 0 to 255. It is higher, because bright lights are
+/// The bound from which a colour of a light, or a glow, is probably a level from 0 to 255. It is higher, because bright lights are
 /// usual.
 const FAR_TOO_BRIGHT: f64 = 32.0;
 
@@ -36,6 +37,15 @@ pub(super) struct Doubts<'a> {
     lens: Option<Place<'a>>,
     shutter: Option<Place<'a>>,
     light: Option<Place<'a>>,
+    /// The line of the last `Indirect` above 0.
+    indirect: Option<Place<'a>>,
+    /// Whether it is not rendered yet.
+    is_indirect_new: bool,
+    /// The first object of the scene with light from nowhere, until a warning was given.
+    ambient: Option<Place<'a>>,
+    /// The first rough object of the scene, until a warning was given.
+    rough: Option<Place<'a>>,
+    is_ambient_told: bool,
     /// The number of glass triangles so far, and the first of them.
     panes: usize,
     first_pane: Option<Place<'a>>,
@@ -48,14 +58,32 @@ pub(super) struct Doubts<'a> {
 }
 
 /// The properties of a material on which warnings depend.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Looks {
     pub(super) is_diffuse: bool,
     pub(super) refracts: bool,
     /// Whether it has the colours of a file.
     pub(super) is_own: bool,
+    /// Whether it has ambient light.
+    pub(super) is_ambient: bool,
+    /// Whether it is rough.
+    pub(super) is_rough: bool,
     /// Whether it has a picture by texture coordinates.
     pub(super) needs_uv: bool,
+}
+
+impl Looks {
+    /// Returns the looks of several objects.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            is_diffuse: self.is_diffuse || other.is_diffuse,
+            refracts: self.refracts || other.refracts,
+            is_own: self.is_own || other.is_own,
+            is_ambient: self.is_ambient || other.is_ambient,
+            is_rough: self.is_rough || other.is_rough,
+            needs_uv: self.needs_uv || other.needs_uv,
+        }
+    }
 }
 
 impl Looks {
@@ -73,6 +101,9 @@ impl Looks {
             needs_uv: has(Clause::Image)
                 .and_then(|line| line.image.as_ref())
                 .is_some_and(|image| image.map() == ImageMap::Uv),
+            is_rough: clauses.iter().any(ClauseLine::is_rough),
+            is_ambient: has(Clause::Ambient).is_some_and(is_bright)
+                || other.is_some_and(|other| other.is_ambient),
         }
     }
 }
@@ -120,7 +151,9 @@ impl<'a> Parser<'a> {
     ) {
         for (i, field) in form.fields.iter().enumerate() {
             let least = match (field.kind, field.parameter) {
-                (Kind::Color, Parameter::LightColor | Parameter::Sky | Parameter::SkyTop) => FAR_TOO_BRIGHT,
+                (_, Parameter::LightColor | Parameter::Sky | Parameter::SkyTop | Parameter::Glow) => {
+                    FAR_TOO_BRIGHT
+                }
                 (Kind::Color | Kind::Coefficients, _) => FAR_ABOVE_ONE,
                 _ => continue,
             };
@@ -172,10 +205,7 @@ impl<'a> Parser<'a> {
 
     /// Records an object with `looks`, which is drawn or part of a group.
     pub(super) fn doubt_object(&mut self, s: &Statement<'a, '_>, looks: Looks) {
-        match &mut self.group {
-            Some(group) => group.needs_light |= looks.is_diffuse,
-            None => self.doubts.needs_light |= looks.is_diffuse,
-        }
+        self.doubt_group(s, looks);
         if !looks.refracts || s.command != Command::Triangle {
             return;
         }
@@ -196,27 +226,51 @@ impl<'a> Parser<'a> {
     }
 
     /// Records a group that is drawn.
-    pub(super) fn doubt_group(&mut self, needs_light: bool) {
+    pub(super) fn doubt_group(&mut self, s: &Statement<'a, '_>, looks: Looks) {
         match &mut self.group {
-            Some(group) => group.needs_light |= needs_light,
-            None => self.doubts.needs_light |= needs_light,
+            Some(group) => group.looks = group.looks.and(looks),
+            None => {
+                self.doubts.needs_light |= looks.is_diffuse;
+                let span = || s.surface.clone().unwrap_or_else(|| s.words.command.clone());
+                if looks.is_ambient {
+                    self.doubts.ambient.get_or_insert_with(|| (s.line, span()));
+                }
+                if looks.is_rough {
+                    self.doubts.rough.get_or_insert_with(|| (s.line, span()));
+                }
+            }
         }
+    }
+
+    pub(super) fn doubt_indirect(&mut self, s: &Statement<'a, '_>) {
+        self.doubts.indirect = (self.recorder.indirect.bounces() > 0).then(|| s.place());
+        self.doubts.is_indirect_new = true;
     }
 
     pub(super) fn doubt_no_more_of_scene(&mut self) {
         (self.doubts.light, self.doubts.needs_light, self.doubts.sky) = (None, false, None);
+        (self.doubts.ambient, self.doubts.rough) = (None, None);
     }
 
     /// Warns of settings and lights without an effect in the picture that is rendered now, each only once.
     pub(super) fn doubt_picture(&mut self, s: &Statement<'a, '_>) {
         let Doubts { lens, shutter, light, .. } = &mut self.doubts;
         let (lens, shutter, light) = (lens.take(), shutter.take(), light.take());
+        let rough = self.doubts.rough.take();
+        let is_new = std::mem::take(&mut self.doubts.is_indirect_new);
+        let indirect = self.doubts.indirect.clone();
         if self.has_errors() {
             return;
         }
         if self.recorder.samples.most() == 1 {
             let lens = lens.filter(|_| self.picture.has_lens_effect());
-            let found = [(lens, "the lens"), (shutter, "the shutter"), (light, "the size of the light")];
+            let found = [
+                (lens, "the lens"),
+                (shutter, "the shutter"),
+                (light, "the size of the light"),
+                (indirect.filter(|_| is_new), "indirect light"),
+                (rough, "the roughness"),
+            ];
             for (place, what) in found {
                 let Some((line, span)) = place else { continue };
                 self.report.warning(line, span, || wording::needs_samples(what));
@@ -227,7 +281,15 @@ impl<'a> Parser<'a> {
         {
             self.report.warning(line, span, wording::sky_in_fog);
         }
+        let goes_round = self.recorder.samples.most() > 1 && self.doubts.indirect.is_some();
+        if goes_round
+            && let Some((line, span)) = self.doubts.ambient.take()
+            && !std::mem::replace(&mut self.doubts.is_ambient_told, true)
+        {
+            self.report.warning(line, span, ambient_beside_indirect);
+        }
         if self.lights == 0
+            && !goes_round
             && self.doubts.needs_light
             && !std::mem::replace(&mut self.doubts.is_dark_told, true)
         {
@@ -244,13 +306,42 @@ pub(super) fn looks_of(material: &Material) -> Looks {
         refracts: material.finish().and_then(|finish| finish.glass).is_some_and(|glass| glass.ior() != 1.0),
         is_own: material.finish().is_some_and(|finish| finish.own),
         needs_uv: false,
+        is_rough: material.finish().is_some_and(|finish| finish.rough.is_some()),
+        is_ambient: material.ambient() != glam::DVec3::ZERO
+            || material
+                .finish()
+                .and_then(|finish| finish.pattern)
+                .is_some_and(|pattern| pattern.other.ambient() != glam::DVec3::ZERO),
     }
 }
 
 /// Returns the looks of an object whose coefficients are in `row`.
 pub(super) fn looks_in(form: &Form, row: &Row) -> Looks {
+    let is_seen = |parameter: Parameter| {
+        let mut of = form.numbers().enumerate().filter(|(_, (_, field))| field.parameter == parameter);
+        of.any(|(i, _)| row.largest(i).is_some_and(|value| value != 0.0))
+    };
     let mut diffuse =
         form.numbers().enumerate().filter(|(_, (_, field))| field.parameter == Parameter::Diffuse);
-    let is_diffuse = diffuse.any(|(i, _)| row.largest(i) != Some(0.0));
-    Looks { is_diffuse, refracts: false, is_own: false, needs_uv: false }
+    Looks {
+        is_diffuse: diffuse.any(|(i, _)| row.largest(i) != Some(0.0)),
+        refracts: false,
+        is_own: false,
+        is_ambient: is_seen(Parameter::Ambient),
+        is_rough: false,
+        needs_uv: false,
+    }
+}
+
+pub(super) fn rough_without_mirror() -> Fault {
+    Fault::new(Code::NoEffect, "`rough` has no effect: the material has neither `mirror` nor `glass`")
+        .expected("expected `mirror` or `glass` beside it")
+}
+
+fn ambient_beside_indirect() -> Fault {
+    Fault::new(
+        Code::AmbientLight,
+        "ambient light comes from nowhere, beside the light that `Indirect` sends round",
+    )
+    .expected("expected `ambient` 0 0 0")
 }

@@ -36,7 +36,7 @@ use crate::report::{Line, Report};
 use crate::script::{Drawn, Recorder, Script, Template, Value};
 pub use curve::parse_curve;
 use definitions::{GroupInfo, MaterialInfo, OpenGroup, Pending};
-use doubts::{Doubts, looks_in, looks_of};
+use doubts::{Doubts, Looks, looks_in, looks_of};
 use line::Statement;
 use meshes::Named;
 use names::Names;
@@ -243,6 +243,7 @@ impl<'a> Parser<'a> {
             | Effect::Shutter
             | Effect::Tone
             | Effect::Depth
+            | Effect::Indirect
             | Effect::Frames
             | Effect::Material
             | Effect::Use
@@ -277,6 +278,10 @@ impl<'a> Parser<'a> {
             }
             Effect::Tone => self.set(s, |recorder, tone| recorder.tone = tone),
             Effect::Depth => self.set(s, |recorder, depth| recorder.depth = depth),
+            Effect::Indirect => {
+                self.set(s, |recorder, indirect| recorder.indirect = indirect);
+                self.doubt_indirect(s);
+            }
             Effect::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
             Effect::Material => self.material(s),
             Effect::Group => self.open_group(s),
@@ -531,7 +536,7 @@ impl<'a> Parser<'a> {
         let row = s.row.clone().unwrap_or_else(|| s.still_row());
         let Some(info) = self.groups.get(number).value.as_ref() else { return };
         let (reach, scale) = info.reach.placed(&row);
-        let needs_light = info.needs_light && still != Some(None);
+        let looks = if still == Some(None) { Looks::default() } else { info.looks };
         let is_hidden = still == Some(None) || info.drawn == 0;
         let (drawn, uses) = if is_hidden { (0, 0) } else { (info.drawn, info.uses.saturating_add(1)) };
         if !is_hidden && !(4.0 * reach).is_finite() || !scale.is_finite() {
@@ -541,7 +546,7 @@ impl<'a> Parser<'a> {
         }
         let models = if is_hidden { Default::default() } else { info.models.clone() };
         self.see_group(number, reach, scale);
-        self.doubt_group(needs_light);
+        self.doubt_group(s, looks);
         let before = self.named.models.clone();
         match &mut self.group {
             Some(group) => group.models.extend(&models),

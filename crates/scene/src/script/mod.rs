@@ -18,10 +18,10 @@ use std::ops::Range;
 
 use crate::command::Command;
 use crate::model::{
-    Background, Camera, Clause, Depth, Fog, FrameNumbers, Image, InvalidValue, Lens, Light, Material, Mesh,
-    Object, PictureFile, Samples, Scene, Screen, Shutter, SkyColors, SkyTurn, Tone,
+    Background, Camera, Clause, Depth, Fog, FrameNumbers, Image, Indirect, InvalidValue, Lens, Light,
+    Material, Mesh, Object, PictureFile, Samples, Scene, Screen, Shutter, SkyColors, SkyTurn, Tone,
 };
-use crate::row::Row;
+use crate::row::{Number, Row};
 use crate::shared_slice::SharedSlice;
 
 pub(crate) use recorder::{GroupRecorder, Recorder};
@@ -74,6 +74,7 @@ pub(crate) struct View {
     pub(crate) shutter: Shutter,
     pub(crate) tone: Tone,
     pub(crate) depth: Depth,
+    pub(crate) indirect: Indirect,
 }
 
 /// A value that is the same in all frames, or evaluated for each.
@@ -164,6 +165,13 @@ pub(crate) struct ClauseLine {
     pub(crate) other: Option<usize>,
     /// The picture of a clause `image`; its width is in the row.
     pub(crate) image: Option<Image>,
+}
+
+impl ClauseLine {
+    /// Returns whether it is `rough` with anything but the number 0.
+    pub(crate) fn is_rough(&self) -> bool {
+        self.clause == Clause::Rough && !matches!(self.row.numbers(), [Number::Constant(0.0)])
+    }
 }
 
 /// A named group with its objects.
@@ -266,6 +274,21 @@ impl Script {
         Some(script)
     }
 
+    /// Returns whether an object is rough, also one that is hidden.
+    fn is_rough(&self, extent: &Extent) -> bool {
+        let rough: Vec<bool> =
+            self.materials.iter().map(|m| m.clauses.iter().any(ClauseLine::is_rough)).collect();
+        if !rough.contains(&true) {
+            return false;
+        }
+        let mut groups: Vec<bool> = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            let is_rough = group.objects.are_rough(&group.objects.list.whole(), &rough, &groups);
+            groups.push(is_rough);
+        }
+        self.objects.are_rough(extent, &rough, &groups)
+    }
+
     /// Returns the shot of frame `k`, and its frame number.
     fn shot_of(&self, k: usize) -> Option<(&Shot, f64)> {
         let shot = &self.shots[self.shots.partition_point(|shot| shot.before <= k).checked_sub(1)?];
@@ -362,6 +385,18 @@ impl Objects {
             surfaces.insert(0, (0, Some(surface)));
         }
         Self { list: self.list.part(extent), surfaces }
+    }
+
+    /// Returns whether one of these objects is rough. `rough` says it of each material, and `groups` of each group.
+    fn are_rough(&self, extent: &Extent, rough: &[bool], groups: &[bool]) -> bool {
+        let Range { start, end } = extent.still;
+        let has = |surface: &Option<usize>| surface.is_some_and(|material| rough[material]);
+        start < end && has(&self.surface_of(start))
+            || self.surfaces.iter().any(|(from, surface)| (start + 1..end).contains(from) && has(surface))
+            || self.list.others[extent.others.clone()].iter().any(|(_, drawn)| match drawn {
+                Drawn::Object { surface, .. } | Drawn::Mesh { surface, .. } => has(surface),
+                Drawn::Use { group, .. } => groups.get(*group).is_some_and(|is_rough| *is_rough),
+            })
     }
 
     /// Returns the named material of constant object `i`.

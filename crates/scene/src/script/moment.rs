@@ -58,8 +58,9 @@ impl Script {
         scene.lens = view.lens.at(frame, view.tone, |_| Some(Scripted::read))?;
         scene.fog = view.fog.at(frame, view.tone, |_| Some(Scripted::read))?;
         (scene.samples, scene.shutter) = (view.samples, view.shutter);
-        (scene.tone, scene.depth) = (view.tone, view.depth);
+        (scene.tone, scene.depth, scene.indirect) = (view.tone, view.depth, view.indirect);
         scene.objects = self.objects_at(&shot.objects, frame, view.tone)?;
+        scene.hides_rough = self.is_rough(&shot.objects) && !scene.shows_rough();
         scene.lights = self.lights_at(&shot.lights, frame, view.tone)?;
         Ok(scene)
     }
@@ -250,6 +251,9 @@ impl NamedMaterial {
             clauses.add(line.clause, &mut Numbers::new(&values, line.row.len(), None), coefficients)?;
             if let Some(image) = &line.image {
                 clauses.add_image(image.with_width(values[..line.row.len()].first().copied())?);
+            }
+            if line.is_rough() {
+                clauses.keep_rough();
             }
         }
         Ok(clauses.material()?)

@@ -41,6 +41,7 @@ impl From<&Scene> for Script {
         recorder.set_fog(Value::Constant(scene.fog));
         (recorder.samples, recorder.shutter) = (scene.samples, scene.shutter);
         (recorder.tone, recorder.depth) = (scene.tone, scene.depth);
+        recorder.indirect = scene.indirect;
         recorder.numbers = FrameNumbers::default();
         scene.lights.iter().for_each(|light| recorder.add_light(Value::Constant(*light)));
         recorder.trace(scene.screen, scene.objects.len());
@@ -119,6 +120,12 @@ impl Namer {
         }
         if finish.own {
             clauses.push(line(Clause::Own, &[], None));
+        }
+        if finish.glow != DVec3::ZERO {
+            clauses.push(line(Clause::Glow, &[&finish.glow.to_array()], None));
+        }
+        if let Some(rough) = finish.rough {
+            clauses.push(line(Clause::Rough, &[&[rough.given()]], None));
         }
         let number = self.name(clauses, material.clone());
         self.last_material = Some((material.clone(), number));

@@ -4,7 +4,8 @@ use super::{
     Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, SkyLine, Template, Value, View,
 };
 use crate::model::{
-    Background, Camera, Depth, Fog, FrameNumbers, Lens, Light, Object, Samples, Screen, Shutter, Tone,
+    Background, Camera, Depth, Fog, FrameNumbers, Indirect, Lens, Light, Object, Samples, Screen, Shutter,
+    Tone,
 };
 
 /// The state that commands change, and the shots so far.
@@ -25,6 +26,7 @@ pub(crate) struct Recorder {
     pub(crate) shutter: Shutter,
     pub(crate) tone: Tone,
     pub(crate) depth: Depth,
+    pub(crate) indirect: Indirect,
     pub(crate) numbers: FrameNumbers,
     views: Vec<View>,
     shots: Vec<Shot>,
@@ -155,6 +157,7 @@ impl Recorder {
                 shutter: self.shutter,
                 tone: self.tone,
                 depth: self.depth,
+                indirect: self.indirect,
             });
         }
         let (objects, lights) = (self.objects.note(), self.lights.note());
@@ -179,14 +182,27 @@ impl Recorder {
 
     /// Returns whether `view` equals the current state, which is the common case.
     fn is_seen_by(&self, view: &View, screen: Screen) -> bool {
-        let View { screen: size, camera, background, sky, lens, fog, samples, shutter, tone, depth } = view;
+        let View {
+            screen: size,
+            camera,
+            background,
+            sky,
+            lens,
+            fog,
+            samples,
+            shutter,
+            tone,
+            depth,
+            indirect,
+        } = view;
         *size == screen
             && *camera == self.camera
             && *background == self.background
             && *sky == self.sky
             && *lens == self.lens
             && *fog == self.fog
-            && (*samples, *shutter, *tone, *depth) == (self.samples, self.shutter, self.tone, self.depth)
+            && (*samples, *shutter, *tone) == (self.samples, self.shutter, self.tone)
+            && (*depth, *indirect) == (self.depth, self.indirect)
     }
 
     /// Returns the script, or `None` if there are no frames.

@@ -143,6 +143,7 @@ impl View {
             shutter: Default::default(),
             tone: Default::default(),
             depth: Default::default(),
+            indirect: Default::default(),
         }
     }
 
@@ -210,6 +211,9 @@ impl View {
         }
         if self.depth != last.depth {
             write_line(f, &self.depth, None)?;
+        }
+        if self.indirect != last.indirect {
+            write_line(f, &self.indirect, None)?;
         }
         Ok(())
     }

@@ -45,6 +45,7 @@ use crate::fast::shapes::naive;
 use crate::fast::shapes::shape::Robust;
 use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::parts;
+use crate::sampling::rough::Energies;
 use crate::{Exposure, Precision, RenderError, RenderOptions};
 
 pub(crate) use crate::fast::film::tone::encoded;
@@ -331,8 +332,10 @@ fn sampled_backend<'a>(
             (scene.into_owned(), faces)
         })
         .unzip();
+    let energies = if parts::BUILT.paths { Energies::of(&moments) } else { Energies::default() };
     let geometries = moments.iter().zip(&faces).map(|(moment, faces)| {
-        Geometry::new(moment, options.tree).map(|geometry| geometry.with_faces(faces.as_ref()))
+        let geometry = Geometry::new(moment, options.tree);
+        geometry.map(|geometry| geometry.with_faces(faces.as_ref()).with_energies(&energies))
     });
     let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let precisions = geometries.iter().zip(&moments);

@@ -6,16 +6,16 @@ use rayfold_scene::model::unit;
 
 /// The reflection and refraction of a ray at glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Refraction {
+pub(crate) struct Refraction {
     /// The reflected share, from 0 to 1, by Fresnel's equations for unpolarised light.
-    pub(super) mirrored: f64,
+    pub(crate) mirrored: f64,
     /// The direction of the refracted ray; without meaning in total reflection.
-    pub(super) direction: DVec3,
+    pub(crate) direction: DVec3,
 }
 
 /// Refracts a ray of this direction at glass whose `normal` faces it. A ray from `within` leaves the inside. Glass that
 /// `is_flat` has no inside, and is entered from both sides.
-pub(super) fn refract(
+pub(crate) fn refract(
     glass: Glass,
     direction: DVec3,
     normal: DVec3,

@@ -28,12 +28,13 @@ mod world;
 
 use core::ops::Range;
 use std::borrow::Cow;
+use std::sync::atomic::Ordering;
 
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
 
-pub(crate) use glass::onward_normal;
+pub(crate) use glass::{Refraction, onward_normal, refract};
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;
 pub use sampled::{Estimate, estimate, light_and_cover, render_exposed};
@@ -46,7 +47,7 @@ pub(crate) use shapes::{
 pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
-use crate::meshes::{Expanded, expanded, mesh};
+use crate::meshes::{Colors, Expanded, expanded, mesh};
 use crate::parallel::{CHANNELS, bands};
 use crate::{RenderError, RenderOptions};
 use shading::Shader;
@@ -76,7 +77,6 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
     let expanded = Expanded::new(Cow::Borrowed(scene));
     let world = World::of(&expanded);
     let lights = world.middles();
-    let shader = Shader { world: &world, lights: &lights, cancel: options.cancel };
     let image = bands(
         scene.screen,
         rows,
@@ -84,6 +84,7 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
         options,
         || (),
         |(), row, band| {
+            let shader = Shader { world: &world, lights: &lights, cancel: options.cancel, paths: None };
             let j = scene.screen.height() - 1 - row;
             for (pixel, i) in band.chunks_exact_mut(CHANNELS).zip(0u32..) {
                 let ray = world.rays.ray(f64::from(i), f64::from(j));
@@ -93,7 +94,8 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
         },
     )?;
     // A pixel with much glass stops halfway if the picture is cancelled.
-    if shader.is_cancelled() { Err(RenderError::Cancelled) } else { Ok(image) }
+    let is_cancelled = options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
+    if is_cancelled { Err(RenderError::Cancelled) } else { Ok(image) }
 }
 
 /// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
@@ -101,7 +103,8 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
     let expanded = Expanded::new(Cow::Borrowed(scene));
     let world = World::of(&expanded);
     let ray = world.rays.ray(f64::from(i), f64::from(j));
-    Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces())
+    Shader { world: &world, lights: &world.middles(), cancel: None, paths: None }
+        .color(ray, scene.depth.bounces())
 }
 
 /// Returns the nearest hit of a ray. Hits are equal if they are within the bound on rounding errors of each other. If
@@ -110,7 +113,7 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     if objects.iter().any(|object| mesh(object).is_some()) {
-        let (objects, faces) = expanded(objects, false);
+        let (objects, faces) = expanded(objects, Colors::default());
         let hit = nearest(&objects, origin, direction)?;
         return Some(Hit { object: faces.origin(hit.object), ..hit });
     }

@@ -9,20 +9,23 @@ use image::RgbImage;
 use rayfold_scene::{Camera, Light, Scene};
 use rayon::prelude::*;
 
-use super::shading::{Seen, Shader};
+use super::shading::{PathNumbers, Seen, Shader};
 use super::tone;
 use super::world::World;
 use crate::camera::Ray;
 use crate::cover::Lit;
 use crate::meshes::Expanded;
 use crate::parallel::{CHANNELS, bands, bands_of};
+use crate::sampling::paths::{Way, choice, choice_dimension, direction_dimension};
 use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
+use crate::sampling::rough::Energies;
 use crate::sampling::{Dimensions, coordinate, pixel_seed};
 use crate::{Exposure, RenderError, RenderOptions};
 
 /// A scene at a moment.
 struct Moment<'a> {
     world: World<'a>,
+    energies: Energies,
     dimensions: &'a Dimensions,
     bounces: u32,
 }
@@ -118,17 +121,21 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
     let samples = scene.samples.most();
     let scenes = exposure.moments();
     let dimensions = Dimensions::new(&scenes);
+    let energies = Energies::of(&scenes);
     let bounces = options.bounces(scene);
     let scenes: Vec<Expanded> = scenes.iter().map(|scene| Expanded::new(Cow::Borrowed(scene))).collect();
-    let moments =
-        scenes.iter().map(|scene| Moment { world: World::of(scene), dimensions: &dimensions, bounces });
+    let moments = scenes.iter().map(|scene| {
+        let energies = energies.clone();
+        Moment { world: World::of(scene), energies, dimensions: &dimensions, bounces }
+    });
     let moments: Vec<Moment> = moments.collect();
     let middles = moments[0].world.middles();
     draw(&|column, row| {
         if samples == 1 {
             let world = &moments[0].world;
             let ray = world.rays.ray(f64::from(column), f64::from(scene.screen.height() - 1 - row));
-            return clamped(Shader { world, lights: &middles, cancel: options.cancel }.seen(ray, bounces));
+            let shader = Shader { world, lights: &middles, cancel: options.cancel, paths: None };
+            return clamped(shader.seen(ray, bounces));
         }
         let seed = pixel_seed(column, row);
         let mut sum = Seen::BLACK;
@@ -136,11 +143,12 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
             let number = |dimension| coordinate(seed, sample, dimension);
             let time = dimensions.time.map_or(0.0, number) * moments.len() as f64;
             let moment = &moments[time as usize];
-            let seen = moment.seen(scene, (column, row), number, options);
+            let choice = |hits, way| choice(seed, sample, hits, way);
+            let seen = moment.seen(scene, (column, row), (&number, &choice), options);
             sum = Seen { color: sum.color + seen.color, clear: sum.clear + seen.clear };
         }
         let count = f64::from(samples);
-        Seen { color: sum.color / count, clear: sum.clear / count }
+        clamped(Seen { color: sum.color / count, clear: sum.clear / count })
     })
 }
 
@@ -154,20 +162,29 @@ fn is_cancelled(options: &RenderOptions) -> bool {
 }
 
 impl Moment<'_> {
-    /// Returns what a sample of a pixel shows, its colour clamped. Rows count from the top. `number` gives its coordinates.
+    /// Returns what a sample of a pixel shows, its colour clamped unless light goes round. Rows count from the top. `number`
+    /// gives its coordinates, `choice` the numbers that decide which rays are followed.
     fn seen(
         &self,
         scene: &Scene,
         (column, row): (u32, u32),
-        number: impl Fn(usize) -> f64,
+        (number, choice): Numbers,
         options: &RenderOptions,
     ) -> Seen {
         let i = f64::from(column) + number(0) - 0.5;
         let j = f64::from(scene.screen.height() - 1 - row) + number(1) - 0.5;
-        let ray = self.ray(i, j, &number);
-        let lights = self.light_points(&number);
-        let shader = Shader { world: &self.world, lights: &lights, cancel: options.cancel };
-        clamped(shader.seen(ray, self.bounces))
+        let ray = self.ray(i, j, number);
+        let lights = self.light_points(number);
+        let direction = |hits| {
+            let first = direction_dimension(self.dimensions, hits);
+            (number(first), number(first + 1))
+        };
+        let goes_round = scene.goes_round();
+        let paths =
+            goes_round.then_some(PathNumbers { direction: &direction, choice, energies: &self.energies });
+        let seen = Shader { world: &self.world, lights: &lights, cancel: options.cancel, paths }
+            .seen(ray, self.bounces);
+        if goes_round { seen } else { clamped(seen) }
     }
 
     /// Returns the ray from a point of the lens through the point where the eye's own ray is in focus.
@@ -208,10 +225,13 @@ impl Moment<'_> {
     }
 }
 
+/// The coordinates of a sample, and the numbers that decide which rays are followed.
+type Numbers<'a> = (&'a dyn Fn(usize) -> f64, &'a dyn Fn(u32, Way) -> f64);
+
 /// An estimate of a picture before it is rounded: the means of independent samples.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// The means of the pixels, row by row from the top, in 0..1, before [`rayfold_scene::Tone`].
+    /// The means of the pixels, row by row from the top, in 0..1 unless light goes round, before [`rayfold_scene::Tone`].
     pub means: Vec<DVec3>,
     /// The standard errors of the means.
     pub errors: Vec<DVec3>,
@@ -234,14 +254,17 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
     let batch = if exposure.motion().is_some() { 1 } else { samples };
     for first in (0..samples).step_by(batch as usize) {
         let time = independent(seed, u64::MAX, first.into(), 0);
-        let of_moment = Expanded::new(Cow::Owned(exposure.at(time)));
-        let moment = Moment { world: World::of(&of_moment), dimensions: &dimensions, bounces };
+        let at = exposure.at(time);
+        let energies = Energies::of(core::slice::from_ref(&at));
+        let of_moment = Expanded::new(Cow::Owned(at));
+        let moment = Moment { world: World::of(&of_moment), energies, dimensions: &dimensions, bounces };
         sums.par_iter_mut().enumerate().for_each(|(place, sum)| {
             let place = place as u64;
             let pixel = ((place % u64::from(width)) as u32, (place / u64::from(width)) as u32);
             for sample in first..first + batch {
                 let number = |dimension| independent(seed, place, sample.into(), dimension);
-                let color = moment.seen(scene, pixel, number, &options).color;
+                let choice = |hits, way| number(choice_dimension(hits, way));
+                let color = moment.seen(scene, pixel, (&number, &choice), &options).color;
                 *sum = (sum.0 + color, sum.1 + color * color);
             }
         });

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
-use rayfold_scene::Tone;
+use rayfold_scene::{Glass, Object, Tone};
 
 use super::Hit;
 use super::glass::{Refraction, refract};
@@ -13,6 +13,8 @@ use super::shapes::Surface;
 use super::world::{World, glass};
 use crate::camera::Ray;
 use crate::meshes::Shading;
+use crate::sampling::paths::{Way, scattered};
+use crate::sampling::rough::{Energies, Microfacets};
 
 /// The weight below which, in every channel, a ray is not followed once its path has met glass.
 pub(crate) const FAINT: f64 = 1.0 / 4096.0;
@@ -31,6 +33,19 @@ pub(super) struct Shader<'a> {
     /// The sampled point of each light, as for [`arriving`].
     pub(super) lights: &'a [DVec3],
     pub(super) cancel: Option<&'a AtomicBool>,
+    /// The random numbers of paths, where light goes round.
+    pub(super) paths: Option<PathNumbers<'a>>,
+}
+
+/// The random numbers of a path.
+#[derive(Clone, Copy)]
+pub(super) struct PathNumbers<'a> {
+    /// Returns the numbers of the direction after so many hits.
+    pub(super) direction: &'a dyn Fn(u32) -> (f64, f64),
+    /// Returns the number that decides whether the path goes a way after so many hits.
+    pub(super) choice: &'a dyn Fn(u32, Way) -> f64,
+    /// The microfacets of rough objects.
+    pub(super) energies: &'a Energies,
 }
 
 /// A path from the camera.
@@ -41,6 +56,10 @@ struct Path {
     /// The absolute value of the product of all factors so far.
     weight: DVec3,
     has_met_glass: bool,
+    /// The number of hits before.
+    hits: u32,
+    /// The number of further diffuse reflections that are followed.
+    scatters: u32,
     /// The share of the pixel that stays clear if the ray reaches nothing; `None` for rays that see the surroundings.
     clear: Option<f64>,
 }
@@ -67,7 +86,17 @@ impl Shader<'_> {
     /// Returns what a ray from the camera brings.
     pub(super) fn seen(&self, ray: Ray, bounces: u32) -> Seen {
         let clear = self.world.scene.background.is_none().then_some(1.0);
-        self.seen_along(ray, Path { bounces, weight: DVec3::ONE, has_met_glass: false, clear })
+        self.seen_along(
+            ray,
+            Path {
+                bounces,
+                weight: DVec3::ONE,
+                has_met_glass: false,
+                hits: 0,
+                scatters: self.paths.map_or(0, |_| self.world.scene.indirect_bounces()),
+                clear,
+            },
+        )
     }
 
     pub(super) fn is_cancelled(&self) -> bool {
@@ -107,7 +136,12 @@ impl Shader<'_> {
         if let Some(shading) = shading {
             color = held(color * tint + shading.glow);
         }
-        let shine = object.material().finish().and_then(|finish| finish.shine);
+        let finish = object.material().finish();
+        if let Some(finish) = finish {
+            color = held(color + finish.glow);
+        }
+        let shine = finish.and_then(|finish| finish.shine);
+        let facets = self.paths.and_then(|numbers| numbers.energies.microfacets(object));
         for (light, point) in world.lights.iter().zip(self.lights) {
             let Some(arriving) = arriving(light, *point, &hit.surface) else { continue };
             let cosine = normal.dot(arriving.towards);
@@ -123,34 +157,45 @@ impl Shader<'_> {
                 let part = highlight(&shine, normal, arriving.towards, -ray.direction);
                 color = held(color + light * shine.color() * part);
             }
+            if let Some(facets) = &facets {
+                let part = facets.highlight(normal, -ray.direction, arriving.towards);
+                color = held(color + light * coefficients.mirror() * part);
+            }
         }
         let mut clear = 0.0;
+        if path.scatters > 0
+            && let Some(numbers) = self.paths
+        {
+            let factor = coefficients.diffuse() * tint;
+            if let Some((next, factor)) = self.sent(path, factor, Way::Scattered) {
+                let direction = scattered((numbers.direction)(path.hits), normal, face);
+                let seen = self.seen_along(Ray { origin: start, direction }, Path { clear: None, ..next });
+                color = held(color + factor * seen.color);
+            }
+        }
         if path.bounces == 0 {
             return Seen { color, clear };
         }
 
-        let normal = shading.map_or(face, |shading| shading.onward);
-        let mut factor = coefficients.mirror();
-        let mut refracted = None;
-        if let Some(glass) = glass(object) {
-            let within = shading.map_or(hit.surface.within, |shading| shading.within);
-            let Refraction { mirrored, direction } =
-                refract(glass, ray.direction, normal, within, !world.has_inside(hit.object, object));
-            factor += mirrored;
-            let share = (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
-            let clear = path.clear.map(|clear| clear * (1.0 - mirrored) * share);
-            refracted = Some(((1.0 - mirrored) * glass.color(), direction, clear));
-        }
+        let Onward { mut factor, mirrored, refracted } = match (&facets, self.paths) {
+            (Some(facets), Some(numbers)) => {
+                let facet = facets.normal(-ray.direction, normal, (numbers.direction)(path.hits));
+                self.onward_of_facet(ray, hit, (facets, facet), coefficients.mirror(), shading)
+            }
+            _ => self.onward_of_surface(ray, hit, coefficients.mirror(), shading),
+        };
+        factor = held(factor);
+        let refracted = refracted
+            .map(|(factor, direction, share)| (factor, direction, path.clear.map(|clear| clear * share)));
         let has_met_glass = path.has_met_glass || refracted.is_some();
-        if let Some(path) = self.scattered(path, factor, has_met_glass) {
-            // The normal faces the ray. If rounding has changed the sign, the ray grazes.
-            let towards_surface = ray.direction.dot(normal).min(0.0);
-            let direction = (ray.direction - 2.0 * towards_surface * normal).normalize();
-            let mirrored = self.seen_along(Ray { origin: start, direction }, Path { clear: None, ..path });
+        let path = Path { has_met_glass, ..path };
+        if let Some((path, factor)) = self.sent(path, factor, Way::Mirrored) {
+            let mirrored =
+                self.seen_along(Ray { origin: start, direction: mirrored }, Path { clear: None, ..path });
             color = held(color + factor * mirrored.color);
         }
         if let Some((factor, direction, share)) = refracted
-            && let Some(path) = self.scattered(path, factor, has_met_glass)
+            && let Some((path, factor)) = self.sent(path, factor, Way::Refracted)
         {
             let origin = hit.surface.point - hit.surface.offset * face;
             let seen = self.seen_along(Ray { origin, direction }, Path { clear: share, ..path });
@@ -160,16 +205,97 @@ impl Shader<'_> {
         Seen { color, clear }
     }
 
-    /// Returns the path of a ray with this factor, or `None` if it is not followed.
-    fn scattered(&self, path: Path, factor: DVec3, has_met_glass: bool) -> Option<Path> {
+    /// Returns how rays go on from a smooth surface with this mirror coefficient.
+    fn onward_of_surface(&self, ray: Ray, hit: &Hit, mirror: DVec3, shading: Option<Shading>) -> Onward {
+        let (object, within, is_flat) = self.side(hit, shading);
+        let normal = shading.map_or(hit.surface.normal, |shading| shading.onward);
+        let mut factor = mirror;
+        let refracted = glass(object).map(|glass| {
+            let Refraction { mirrored, direction } = refract(glass, ray.direction, normal, within, is_flat);
+            factor += mirrored;
+            ((1.0 - mirrored) * glass.color(), direction, (1.0 - mirrored) * clearness_of(glass))
+        });
+        Onward { factor, mirrored: reflected(ray.direction, normal), refracted }
+    }
+
+    /// Returns how rays go on from a microfacet with this normal.
+    fn onward_of_facet(
+        &self,
+        ray: Ray,
+        hit: &Hit,
+        (facets, facet): (&Microfacets, DVec3),
+        mirror: DVec3,
+        shading: Option<Shading>,
+    ) -> Onward {
+        let (object, within, is_flat) = self.side(hit, shading);
+        let face = hit.surface.normal;
+        let normal = shading.map_or(face, |shading| shading.normal);
+        let towards = reflected(ray.direction, facet);
+        let shown = if towards.dot(face) > 0.0 { facets.masking(towards.dot(normal)) } else { 0.0 };
+        let mut factor = mirror / facets.energy(-ray.direction.dot(normal));
+        let refracted = glass(object).map(|glass| {
+            let Refraction { mirrored, direction } = refract(glass, ray.direction, facet, within, is_flat);
+            factor += mirrored;
+            // Through a pane, the ray goes on as the mirrored one does on the other side.
+            let direction = if is_flat { towards - 2.0 * towards.dot(normal) * normal } else { direction };
+            let left = if direction.dot(face) < 0.0 { facets.masking(-direction.dot(normal)) } else { 0.0 };
+            let left = left * (1.0 - mirrored);
+            (left * glass.color(), direction, left * clearness_of(glass))
+        });
+        Onward { factor: factor * shown, mirrored: towards, refracted }
+    }
+
+    /// Returns the object of a hit, whether the ray comes from within it, and whether it has no inside.
+    fn side(&self, hit: &Hit, shading: Option<Shading>) -> (&Object, bool, bool) {
+        let (object, ..) = self.world.in_script(hit.object, &hit.surface);
+        let within = shading.map_or(hit.surface.within, |shading| shading.within);
+        (object, within, !self.world.has_inside(hit.object, object))
+    }
+
+    /// Returns the path of a ray with this factor, and the factor with which it counts; `None` if it is not followed.
+    fn sent(&self, path: Path, factor: DVec3, way: Way) -> Option<(Path, DVec3)> {
         let weight = held(path.weight * factor.abs());
         let faint = match self.world.scene.tone {
             Tone::Plain => FAINT,
             Tone::Srgb => FAINT_LINEAR,
         };
-        let is_followed = if has_met_glass { weight.max_element() >= faint } else { factor != DVec3::ZERO };
-        is_followed.then(|| Path { bounces: path.bounces - 1, weight, has_met_glass, clear: path.clear })
+        let chance = match self.paths {
+            Some(numbers) => {
+                let chance = way.chance(weight);
+                let is_followed = chance >= 1.0 || (numbers.choice)(path.hits, way) < chance;
+                if is_followed { chance } else { 0.0 }
+            }
+            None if path.has_met_glass => f64::from(weight.max_element() >= faint),
+            None => f64::from(factor != DVec3::ZERO),
+        };
+        let next = Path { weight: weight / chance, hits: path.hits + 1, ..path };
+        let next = match way {
+            Way::Scattered => Path { scatters: path.scatters - 1, ..next },
+            Way::Mirrored | Way::Refracted => Path { bounces: path.bounces - 1, ..next },
+        };
+        (chance > 0.0).then_some((next, factor / chance))
     }
+}
+
+/// How rays go on from a hit.
+struct Onward {
+    /// The factor of the mirrored ray.
+    factor: DVec3,
+    /// The direction of the mirrored ray.
+    mirrored: DVec3,
+    /// The factor and the direction of the refracted ray, and the share of a pixel that it leaves clear; `None` at what is
+    /// opaque.
+    refracted: Option<(DVec3, DVec3, f64)>,
+}
+
+/// Returns the share of what is behind glass that stays clear where nothing is reflected.
+fn clearness_of(glass: Glass) -> f64 {
+    (glass.color().element_sum() / 3.0).clamp(0.0, 1.0)
+}
+
+/// Returns the mirrored direction. The normal faces the ray. If rounding has changed the sign, the ray grazes.
+fn reflected(direction: DVec3, normal: DVec3) -> DVec3 {
+    (direction - 2.0 * direction.dot(normal).min(0.0) * normal).normalize()
 }
 
 /// Returns where the shadow ray towards a light starts on a face with normals. A face that the start is lifted off can
@@ -219,7 +345,9 @@ mod tests {
     fn down(scene: &Scene, x: f64) -> f64 {
         let ray = Ray { origin: DVec3::new(x, 5.0, 0.0), direction: DVec3::NEG_Y };
         let world = World::new(scene);
-        Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, scene.depth.bounces()).x
+        Shader { world: &world, lights: &world.middles(), cancel: None, paths: None }
+            .color(ray, scene.depth.bounces())
+            .x
     }
 
     fn lamp(position: DVec3, reach: f64) -> Option<Lamp> {
@@ -267,7 +395,7 @@ mod tests {
         let from_below = |scene: &Scene| {
             let ray = Ray { origin: DVec3::new(0.2, 0.1, 0.0), direction: DVec3::NEG_Y };
             let world = World::new(scene);
-            Shader { world: &world, lights: &world.middles(), cancel: None }.color(ray, 0).x
+            Shader { world: &world, lights: &world.middles(), cancel: None, paths: None }.color(ray, 0).x
         };
         let open = from_below(&world_of(vec![floor.clone()]));
         assert!(open > 0.5);
@@ -295,7 +423,7 @@ mod tests {
         endless.depth = Depth::new(16).unwrap();
         let flag = AtomicBool::new(true);
         let world = World::new(&endless);
-        let shader = Shader { world: &world, lights: &world.middles(), cancel: Some(&flag) };
+        let shader = Shader { world: &world, lights: &world.middles(), cancel: Some(&flag), paths: None };
         let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X };
         assert_eq!((shader.color(ray, 16), shader.is_cancelled()), (DVec3::ZERO, true));
     }

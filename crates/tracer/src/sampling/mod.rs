@@ -6,7 +6,9 @@
 //! up and says where more rays are due. Nothing here knows how rays are traced.
 
 pub(crate) mod film;
+pub(crate) mod paths;
 pub(crate) mod places;
+pub(crate) mod rough;
 mod sobol;
 
 use rayfold_scene::{Camera, Light, Scene};
@@ -133,6 +135,16 @@ impl Points {
         Self { sampler, first, rows: (0..own).map(row).collect() }
     }
 
+    /// The coordinate of a sample of a pixel along a dimension.
+    #[inline(always)]
+    pub(crate) fn coordinate(&self, dimension: usize, pixel_seed: u32, sample: u32) -> f64 {
+        match self.sampler {
+            Sampler::Sobol => coordinate(pixel_seed, sample, dimension),
+            Sampler::Pairs => in_pairs(pixel_seed, sample, dimension),
+            Sampler::Independent => independent(pixel_seed, sample, dimension),
+        }
+    }
+
     /// The coordinates of at most [`BATCH`] samples of pixels along a dimension: those of [`coordinate`].
     #[inline(always)]
     pub(crate) fn coordinates(
@@ -155,11 +167,7 @@ impl Points {
             }
             None => {
                 for ((into, &pixel), &sample) in into.iter_mut().zip(pixel_seeds).zip(samples) {
-                    *into = match self.sampler {
-                        Sampler::Sobol => coordinate(pixel, sample, dimension),
-                        Sampler::Pairs => in_pairs(pixel, sample, dimension),
-                        Sampler::Independent => independent(pixel, sample, dimension),
-                    };
+                    *into = self.coordinate(dimension, pixel, sample);
                 }
             }
         }

@@ -60,6 +60,15 @@ impl Shape for Mesh {
     }
 }
 
+/// Returns whether an object, also in a group, is a mesh with the colours of its file alone.
+pub(in crate::oracle) fn is_of_file(object: &Object) -> bool {
+    match object {
+        Object::Mesh(mesh) => !mesh.has_material(),
+        Object::Instance(instance) => is_of_file(instance.object()),
+        _ => false,
+    }
+}
+
 /// Returns the texture coordinates of a hit on a mesh, also in a group, and whether they count from the top of a picture.
 pub(in crate::oracle) fn texture(object: &Object, line: &Line, hit: &Hit) -> Option<([f64; 2], bool)> {
     let (mesh, local, _) = mesh_of(object, line)?;

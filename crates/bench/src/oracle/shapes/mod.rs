@@ -14,7 +14,7 @@ mod triangle;
 use glam::DVec3;
 use rayfold_scene::Object;
 
-pub(super) use mesh::{shaded, texture};
+pub(super) use mesh::{is_of_file, shaded, texture};
 pub use sphere::sphere_clearance;
 pub use triangle::edge_clearance;
 

@@ -11,6 +11,7 @@ use crate::fast::materials::faces::ShadedFaces;
 use crate::fast::materials::finish::Finishes;
 use crate::fast::materials::fog::Fog;
 use crate::fast::materials::glass::Glass;
+use crate::fast::materials::paths::Paths;
 use crate::fast::placement::geometry::Geometry;
 use crate::parts;
 
@@ -23,6 +24,7 @@ pub(crate) struct Extensions<E> {
     glass: Option<Glass<E>>,
     fog: Option<Fog>,
     shaded: Option<ShadedFaces>,
+    paths: Option<Paths>,
 }
 
 impl<E: Real> Extensions<E> {
@@ -35,6 +37,7 @@ impl<E: Real> Extensions<E> {
             glass: Glass::new(scene, geometry.faces.as_deref()),
             fog: Fog::new(scene, geometry.scale),
             shaded: ShadedFaces::new(scene, geometry),
+            paths: Paths::new(scene, geometry),
         })
     }
 
@@ -62,6 +65,12 @@ impl<E: Real> Extensions<E> {
         if parts::BUILT.meshes { self.shaded.as_ref() } else { None }
     }
 
+    /// Returns the surfaces from which paths go on, if light goes round.
+    #[inline(always)]
+    pub(crate) fn paths(&self) -> Option<&Paths> {
+        if parts::BUILT.paths { self.paths.as_ref() } else { None }
+    }
+
     #[inline(always)]
     pub(crate) fn lamps(&self) -> &[Lamp<E>] {
         if parts::BUILT.lamps { &self.lamps } else { &[] }
@@ -70,15 +79,33 @@ impl<E: Real> Extensions<E> {
     /// Returns the finishes, if any surface has highlights.
     #[inline(always)]
     pub(crate) fn glossy(&self) -> Option<&Finishes> {
-        self.finishes.as_ref().filter(|finishes| parts::BUILT.highlights && finishes.has_highlights)
+        let has_highlights = |finishes: &&Finishes| parts::BUILT.highlights && finishes.has_highlights;
+        self.finishes.as_ref().filter(|finishes| has_highlights(finishes) || self.has_rough())
     }
 
-    /// Returns the finishes, if any surface has a pattern or a picture.
+    /// Returns the finishes, if any surface has a pattern or a picture, or if highlights need the mirror coefficients.
     #[inline(always)]
     pub(crate) fn patterned(&self) -> Option<&Finishes> {
-        self.finishes
-            .as_ref()
-            .filter(|finishes| (parts::BUILT.patterns || parts::BUILT.pictures) && finishes.has_patterns)
+        let has_patterns =
+            |finishes: &&Finishes| (parts::BUILT.patterns || parts::BUILT.pictures) && finishes.has_patterns;
+        self.finishes.as_ref().filter(|finishes| has_patterns(finishes) || self.has_rough())
+    }
+
+    /// Returns the surfaces of paths, if any is rough.
+    #[inline(always)]
+    pub(crate) fn rough(&self) -> Option<&Paths> {
+        self.paths().filter(|paths| paths.has_rough())
+    }
+
+    #[inline(always)]
+    fn has_rough(&self) -> bool {
+        self.rough().is_some()
+    }
+
+    /// Returns the finishes, if any surface glows.
+    #[inline(always)]
+    pub(crate) fn glowing(&self) -> Option<&Finishes> {
+        self.finishes.as_ref().filter(|finishes| parts::BUILT.glows && finishes.glows())
     }
 
     pub(crate) fn has_glass(&self) -> bool {
@@ -92,5 +119,6 @@ pub(crate) fn is_needed(geometry: &Geometry) -> bool {
         || !geometry.lamps.is_empty()
         || geometry.is_finished
         || geometry.is_foggy
+        || geometry.goes_round
         || geometry.faces.is_some()
 }

@@ -143,6 +143,7 @@ impl Colors {
         let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
         // The additional light that glass transmits.
         let mut through = 0f64;
+        let mut glow = 0f64;
         for object in scene.objects.iter() {
             let material = object.material();
             ambient = ambient.max(material.ambient().abs().max_element());
@@ -152,6 +153,7 @@ impl Colors {
             least = least.min(signs.min_element());
             // Such scenes are drawn in `f64`, so only its limits matter.
             let Some(finish) = material.finish() else { continue };
+            glow = glow.max(finish.glow.abs().max_element());
             if let Some(other) = finish.pattern.map(|pattern| pattern.other) {
                 ambient = ambient.max(other.ambient().abs().max_element());
                 diffuse = diffuse.max(other.diffuse().abs().max_element());
@@ -167,6 +169,7 @@ impl Colors {
             }
         }
         mirror += through;
+        ambient += glow;
         for light in scene.lights.iter() {
             least = least.min(light.color().min_element());
         }

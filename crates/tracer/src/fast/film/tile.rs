@@ -28,6 +28,7 @@ use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns
 use crate::fast::rays::kind::ByKind;
 use crate::fast::rays::pixels::Rays;
 use crate::fast::transport::light::{Occluders, add_all_lights, add_sun_light};
+use crate::fast::transport::paths::{PathNumbers, spawn_paths};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::fast::transport::scatter::spawn_rays;
 use crate::fast::transport::soft_light::{SoftLight, light_up_softly};
@@ -115,6 +116,7 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 waiting,
                 soft: None,
                 is_first: true,
+                paths: None,
             };
             shade::<S, E, N, true>(simd, scene, met, hits, occluders);
         }
@@ -136,6 +138,7 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 waiting,
                 soft: None,
                 is_first: true,
+                paths: None,
             };
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
         }
@@ -143,7 +146,7 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if scene.is_clear() {
         cover_hits(hits, rays_of::<S, E>((tile.width, tile.height)), Lanes::<S, E>::LEN, cover);
     }
-    scratch.follow::<S, N>(simd, scene, tile.bounces, None);
+    scratch.follow::<S, N>(simd, scene, tile.bounces, None, None);
     let hits = &scratch.hits;
     if scene.is_clear() {
         return write_lit::<S, E>(tile, &hits.color, &scratch.cover, band);
@@ -164,7 +167,11 @@ impl<E: Real> Scratch<'_, E> {
         scene: &Prepared<E>,
         bounces: u32,
         soft: Option<SoftLight<E>>,
+        paths: Option<PathNumbers>,
     ) {
+        if let Some(numbers) = paths.filter(|_| parts::BUILT.paths) {
+            return follow_paths::<S, E, N>(simd, scene, (soft, numbers), self);
+        }
         if scene.has_glass() {
             return follow_through_glass::<S, E, N>(simd, scene, soft, self);
         }
@@ -194,6 +201,7 @@ impl<E: Real> Scratch<'_, E> {
                 waiting,
                 soft,
                 is_first: false,
+                paths: None,
             };
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
             for ray in 0..queue.count {
@@ -239,6 +247,52 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
             waiting: &mut *waiting,
             soft,
             is_first: false,
+            paths: None,
+        };
+        shade_more::<S, E, N, false>(simd, scene, met, hits, occluders);
+        if scene.is_clear() {
+            let_through(waiting, queue, hits, Lanes::<S, E>::LEN);
+        }
+        waiting.add(queue, hits);
+    }
+    waiting.sum_up(pixels);
+    if scene.is_clear() {
+        waiting.uncover(cover, PIXELS);
+    }
+    core::mem::swap(&mut hits.color, pixels);
+}
+
+/// Traces the rays of paths until none is left, in scenes in which light goes round.
+#[inline(never)]
+fn follow_paths<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    (soft, numbers): (Option<SoftLight<E>>, PathNumbers),
+    scratch: &mut Scratch<E>,
+) {
+    let Scratch { queue, hits, waiting, pixels, cover, occluders, .. } = scratch;
+    let tree = BUILT.tree && scene.tree.is_some();
+    core::mem::swap(&mut hits.color, pixels);
+    while waiting.take_paths(queue) {
+        hits.packets.clear();
+        queue.fill_up(Lanes::<S, E>::LEN);
+        let (near, bodies) = met_by::<S, E>(simd, scene, queue);
+        let (kinds, background, count) = (near.kinds, scene.background, queue.count);
+        fitted!(N, kinds, tree, C T D => {
+            trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
+        });
+        let (waiting_rays, paths) = (&mut *waiting, Some(numbers));
+        let met = HitBatch {
+            kinds,
+            bodies,
+            background,
+            queue,
+            count,
+            next: None,
+            waiting: waiting_rays,
+            soft,
+            is_first: false,
+            paths,
         };
         shade_more::<S, E, N, false>(simd, scene, met, hits, occluders);
         if scene.is_clear() {
@@ -280,6 +334,8 @@ pub(crate) struct HitBatch<'a, 'b, E> {
     pub(crate) soft: Option<SoftLight<'a, E>>,
     /// Whether the rays are those of the camera.
     pub(crate) is_first: bool,
+    /// The random numbers of paths, where light goes round.
+    pub(crate) paths: Option<PathNumbers<'a>>,
 }
 
 /// Shades hits: surfaces, their light, and the rays that mirrors spawn.
@@ -352,6 +408,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     shade_faces::<S, E, EYE>(Some(beyond), queue, hits);
+    glow::<S, E, EYE>(Some(beyond), queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.bodies().is_some() {
         occluders.find_bodies(simd, scene, hits);
@@ -361,7 +418,6 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     } else {
         add_all_lights::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, occluders);
     }
-    hits.leave_faces();
     let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
@@ -426,12 +482,12 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
     shade_faces::<S, E, EYE>(beyond, queue, hits);
+    glow::<S, E, EYE>(beyond, queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.is_some_and(|beyond| beyond.bodies().is_some()) {
         occluders.find_bodies(simd, scene, hits);
     }
     light_up_softly::<S, E, Anything<N::By>, EYE>(simd, scene, soft, queue, hits, occluders);
-    hits.leave_faces();
     let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
@@ -464,6 +520,18 @@ fn shade_faces<S: Simd, E: Real, const EYE: bool>(
     }
 }
 
+/// Adds the glow of objects to the colours of hits.
+#[inline(always)]
+fn glow<S: Simd, E: Real, const EYE: bool>(
+    beyond: Option<&Extensions<E>>,
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+) {
+    if let Some(finishes) = beyond.and_then(Extensions::glowing) {
+        finishes.glow::<E, EYE>(queue, hits, Lanes::<S, E>::LEN);
+    }
+}
+
 /// Mixes fog into the colours of hits. Returns whether the mirror coefficients are stored with the hits: after patterns
 /// (`is_painted`) and in fog.
 #[inline(always)]
@@ -485,9 +553,16 @@ fn go_on<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
     is_painted: bool,
-    HitBatch { queue, next, waiting, .. }: HitBatch<E>,
+    HitBatch { queue, next, waiting, paths, .. }: HitBatch<E>,
     hits: &mut Hits<E>,
 ) {
+    if let Some(numbers) = paths
+        && let Some(paths) = scene.beyond.as_ref().and_then(Extensions::paths)
+    {
+        let lanes = Lanes::<S, E>::LEN;
+        return spawn_paths::<E>((scene, paths), numbers, (queue, hits), (lanes, is_painted), waiting);
+    }
+    hits.leave_faces();
     if let Some(glass) = scene.beyond.as_ref().and_then(Extensions::glass) {
         if !waiting.is_last_bounce() {
             let spawn_rays =

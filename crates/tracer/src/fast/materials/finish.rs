@@ -1,5 +1,4 @@
-//! What few surfaces have beyond coefficients: highlights, patterns of other coefficients, and
-//! pictures.
+//! What few surfaces have beyond coefficients: highlights, patterns of other coefficients, pictures, and glow.
 //!
 //! Both are worked out lane by lane, with the functions of the plain tracer: they are powers and lattices of few pixels,
 //! which must be the same bytes everywhere. Patterns are read off the numbers of the script, so that a hit is taken back
@@ -12,6 +11,7 @@ use rayfold_scene::model::Finish;
 use rayfold_scene::{Coefficients, ImageMap, Object, Scene, Tone};
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::materials::paths::Paths;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Column, Hits, ROOM, RayBatch};
 use crate::fast::rays::packet::Ray;
@@ -25,12 +25,16 @@ pub(crate) struct Finishes {
     scale: f64,
     pub(crate) has_patterns: bool,
     pub(crate) has_highlights: bool,
+    /// The glow of each object; empty if none glows.
+    glows: Vec<DVec3>,
 }
 
 /// The highlights of a packet of hits.
 pub(crate) struct Gloss<'a> {
     finishes: &'a Finishes,
     sum: [DVec3; 16],
+    /// The same of rough mirrors, times the weights of the rays.
+    of_mirrors: [DVec3; 16],
     /// Whether any light adds something.
     pub(crate) is_seen: bool,
 }
@@ -42,8 +46,43 @@ impl Finishes {
         finishes().next()?;
         let has_patterns = finishes().any(is_painted);
         let has_highlights = finishes().any(|finish| finish.shine.is_some());
+        let glow = |object: &Object| object.material().finish().map_or(DVec3::ZERO, |finish| finish.glow);
+        let glows = if finishes().any(|finish| finish.glow != DVec3::ZERO) {
+            scene.objects.iter().map(glow).collect()
+        } else {
+            vec![]
+        };
         let (center, scale) = (geometry.center, geometry.scale);
-        Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights })
+        Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights, glows })
+    }
+
+    /// Whether any object glows.
+    #[inline(always)]
+    pub(crate) fn glows(&self) -> bool {
+        !self.glows.is_empty()
+    }
+
+    /// Adds the glow of the objects to the colours of the hits; `EYE` says that the rays count for 1.
+    #[inline(never)]
+    pub(crate) fn glow<E: Real, const EYE: bool>(
+        &self,
+        queue: &RayBatch<E>,
+        hits: &mut Hits<E>,
+        lanes: usize,
+    ) {
+        for &(at, _) in &hits.packets {
+            for lane in at..at + lanes {
+                if !hits.is_hit(lane) {
+                    continue;
+                }
+                let glow = self.glows[hits.order.0[lane].to_index()];
+                for channel in 0..3 {
+                    let weight = if EYE { 1.0 } else { queue.weight[channel].0[lane].widen() };
+                    let color = &mut hits.color[channel].0[lane];
+                    *color = E::narrow(color.widen() + weight * glow[channel]);
+                }
+            }
+        }
     }
 
     /// Mixes the coefficients of patterns and the factors of pictures into the colours and diffuse coefficients of the hits, and notes the mirror
@@ -120,7 +159,7 @@ impl Finishes {
         for (lane, order) in orders.iter().enumerate() {
             let object = self.scene.objects.get(order.to_index());
             let finish = object.and_then(|object| object.material().finish());
-            if finish.is_some_and(|finish| finish.shine.is_some()) {
+            if finish.is_some_and(|finish| finish.shine.is_some() || finish.rough.is_some()) {
                 shines[lane] = E::narrow(1.0);
             }
         }
@@ -129,7 +168,8 @@ impl Finishes {
     }
 
     pub(crate) fn gloss(&self) -> Gloss<'_> {
-        Gloss { finishes: self, sum: [DVec3::ZERO; 16], is_seen: false }
+        let nothing = [DVec3::ZERO; 16];
+        Gloss { finishes: self, sum: nothing, of_mirrors: nothing, is_seen: false }
     }
 }
 
@@ -177,11 +217,45 @@ impl Gloss<'_> {
         }
     }
 
-    /// The sum of all highlights.
+    /// Adds the highlights that a light makes on rough mirrors. `mirror` are their coefficients times the weights of the rays, from
+    /// that of the first lane on.
+    #[inline(never)]
+    pub(crate) fn add_rough<S: Simd, E: Real>(
+        &mut self,
+        paths: &Paths,
+        Lit { lanes, towards, color }: Lit<S, E>,
+        (ray, normal): (Ray<S, E>, Vec3<S, E>),
+        (orders, mirror, at): (&[E], &[Vec<E>; 3], usize),
+    ) {
+        let mut bits = lanes.to_bitmask();
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let Some(facets) = paths.microfacets(orders[lane].to_index()) else { continue };
+            let of = |v: Vec3<S, E>| DVec3::new(v.x[lane].widen(), v.y[lane].widen(), v.z[lane].widen());
+            let mirror = DVec3::from_array(mirror.each_ref().map(|channel| channel[at + lane].widen()));
+            let seen = facets.highlight(of(normal), -of(ray.direction), of(towards));
+            self.of_mirrors[lane] += of(color) * mirror * seen;
+            self.is_seen = true;
+        }
+    }
+
+    /// The sum of all highlights on rough mirrors, times the weights of the rays.
+    #[inline(always)]
+    pub(crate) fn sum_of_mirrors<S: Simd, E: Real>(&self, simd: S) -> Vec3<S, E> {
+        Self::loaded(simd, &self.of_mirrors)
+    }
+
+    /// The sum of all other highlights.
     #[inline(always)]
     pub(crate) fn sum<S: Simd, E: Real>(&self, simd: S) -> Vec3<S, E> {
+        Self::loaded(simd, &self.sum)
+    }
+
+    #[inline(always)]
+    fn loaded<S: Simd, E: Real>(simd: S, sums: &[DVec3; 16]) -> Vec3<S, E> {
         let mut columns = [[E::narrow(0.0); 16]; 3];
-        for (lane, color) in self.sum.iter().enumerate() {
+        for (lane, color) in sums.iter().enumerate() {
             for (column, channel) in columns.iter_mut().zip(color.to_array()) {
                 column[lane] = E::narrow(channel);
             }

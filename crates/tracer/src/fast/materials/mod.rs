@@ -6,4 +6,5 @@ pub(crate) mod faces;
 pub(crate) mod finish;
 pub(crate) mod fog;
 pub(crate) mod glass;
+pub(crate) mod paths;
 pub(crate) mod sky;

@@ -25,6 +25,7 @@ use crate::fast::shared::SharedSurfaces;
 use crate::meshes::Faces;
 use crate::parallel::map;
 use crate::sampling::places::spread;
+use crate::sampling::rough::Energies;
 use crate::scale::below_inverse;
 
 /// A scene, recentred and scaled.
@@ -43,6 +44,10 @@ pub(crate) struct Geometry {
     pub(crate) lens: Option<Lens>,
     /// Whether any surface has a finish in addition to its coefficients.
     pub(crate) is_finished: bool,
+    /// The microfacets of rough objects, where light goes round.
+    pub(crate) energies: Energies,
+    /// Whether light goes round.
+    pub(crate) goes_round: bool,
     /// Whether there is fog.
     pub(crate) is_foggy: bool,
     /// The objects that share surfaces, after [the search for them](Self::with_shared_surfaces).
@@ -114,6 +119,8 @@ impl Geometry {
             lamps,
             lens: lens.map(|lens| lens.scaled(scale)),
             is_finished,
+            energies: Energies::default(),
+            goes_round: scene.goes_round(),
             is_foggy: scene.fog.get().is_some(),
             shared: None,
             faces: None,
@@ -127,6 +134,11 @@ impl Geometry {
     /// Adds what the faces of meshes have beyond triangles.
     pub(crate) fn with_faces(self, faces: Option<&Arc<Faces>>) -> Self {
         Self { faces: faces.filter(|faces| faces.are_shaded()).cloned(), ..self }
+    }
+
+    /// Adds the microfacets of rough objects.
+    pub(crate) fn with_energies(self, energies: &Energies) -> Self {
+        Self { energies: energies.clone(), ..self }
     }
 
     /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.

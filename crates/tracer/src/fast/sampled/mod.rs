@@ -200,7 +200,9 @@ impl<'a, E: Real> Sampled<'a, E> {
         let size = (scene.screen.width(), rows.end - rows.start);
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
         let has_cover = parts::BUILT.covers && scene.background.is_none();
-        Film::new(size, self.side, scene.samples, scene.tone, PASS, has_cover).ok_or_else(too_large)
+        let is_unclamped = parts::BUILT.paths && scene.goes_round();
+        Film::new(size, self.side, scene.samples, scene.tone, PASS, (has_cover, is_unclamped))
+            .ok_or_else(too_large)
     }
 
     /// The first samples of the pixels of some rows, which are whole rows of tiles.
@@ -214,7 +216,9 @@ impl<'a, E: Real> Sampled<'a, E> {
 
     /// Gives each pixel the samples that it lacks.
     fn pass(&self, film: &mut Film, above: u32, (first, end): (u32, u32)) -> Result<(), RenderError> {
-        let points = Points::new(&self.dimensions, self.options.sampler, first, end);
+        // Where light goes round the first look is no sample, so that samples count from 0 after it.
+        let start = if self.scene.goes_round() && first == 1 { 0 } else { first };
+        let points = Points::new(&self.dimensions, self.options.sampler, start, end);
         let level = self.options.level.unwrap_or_else(Level::new);
         let side = film.side();
         let watched = self.options.progress.map(|progress| (progress, progress.done(), film.work()));
@@ -362,6 +366,7 @@ impl<E: Real> Job<'_, E> {
                     points: self.points,
                     dimensions,
                     bounces: options.bounces(scene),
+                    indirect: scene.indirect_bounces(),
                     wanted: self.wanted,
                     height: height as u32,
                 };

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DVec3;
 
 use super::Moment;
 use crate::fast::acceleration::candidates::Candidates;
@@ -16,6 +17,7 @@ use crate::fast::film::trace::trace_queue;
 use crate::fast::placement::lens::Aperture;
 use crate::fast::rays::bounce::{Column, Hits, RayBatch};
 use crate::fast::rays::pixels::Rays;
+use crate::fast::transport::paths::PathNumbers;
 use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
 use crate::parts;
@@ -38,6 +40,8 @@ pub(super) struct Pass<'a, E> {
     pub(super) points: &'a Points,
     pub(super) dimensions: &'a Dimensions,
     pub(super) bounces: u32,
+    /// The largest number of diffuse reflections.
+    pub(super) indirect: u32,
     pub(super) wanted: PassTargets<'a>,
     /// Rows of the image.
     pub(super) height: u32,
@@ -126,8 +130,11 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 ) {
     let mut items = core::mem::take(&mut workspace.items);
     items.clear();
+    let is_unclamped = pass.wanted.is_unclamped();
     let still = if let [moment] = pass.moments { Some(moment) } else { None };
     let nothing = still.filter(|moment| moment.shows_nothing(tile));
+    let backdrop = nothing.map_or([0.0; 3], |moment| moment.prepared.backdrop().map(E::widen));
+    let backdrop = DVec3::from_array(backdrop);
     let nothing = nothing.map(|moment| moment.prepared.backdrop().map(|channel| quantised(channel.widen())));
     if pass.wanted.is_first_look {
         match (nothing, &mut first) {
@@ -143,21 +150,27 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         pixels.resize(tile.side.0 * tile.side.1, Pixel::default());
         tile.each_wanted_pixel(pass.wanted, |at| {
             let pixel = &mut pixels[tile.in_tile(at)];
-            if let (0, Some(first)) = (pixel.count(), &first) {
+            let looked = u32::from(first.is_some());
+            let goal = pass.wanted.goal(pixel.count().max(looked));
+            if let (0, Some(first), false) = (pixel.count(), &first, is_unclamped) {
                 pixel.add_equal(first.color(tile.in_rows(at)), 1);
             }
-            let goal = pass.wanted.goal(pixel.count());
             if let Some(cover) = &mut cover {
                 cover.begin(tile.side.0 * tile.side.1);
                 let covered = &mut cover.pixels[tile.in_tile(at)];
-                if let (0, Some(first)) = (covered.count(), &cover.first) {
+                if let (0, Some(first), false) = (covered.count(), &cover.first, is_unclamped) {
                     covered.add_equal(first.color(tile.in_rows(at)), 1);
                 }
                 if nothing.is_some() {
-                    covered.add_equal([0; CHANNELS], goal - covered.count());
+                    let count = goal - covered.count();
+                    match is_unclamped {
+                        true => covered.add_unclamped(DVec3::ZERO, count),
+                        false => covered.add_equal([0; CHANNELS], count),
+                    }
                 }
             }
             match nothing {
+                Some(_) if is_unclamped => pixel.add_unclamped(backdrop, goal - pixel.count()),
                 Some(color) => pixel.add_equal(color, goal - pixel.count()),
                 None => {
                     items.extend((pixel.count()..goal).map(|sample| Item { moment: 0, sample, pixel: at }))
@@ -176,6 +189,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                 Some(first) if pass.wanted.is_first_look => {
                     put_first::<S, E>(simd, tile, batch, workspace, first);
                 }
+                Some(_) | None if is_unclamped => add_up_unclamped(tile, batch, workspace, pixels),
                 Some(_) | None => add_up::<S, E>(simd, tile, batch, workspace, pixels),
             }
             if let Some(cover) = &mut cover {
@@ -330,13 +344,22 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     workspace: &mut Workspace<E>,
 ) {
     place::<S, E>(simd, pass, (tile, moment), batch, workspace);
-    let Workspace { scratch, lights, objects, .. } = workspace;
+    let Workspace { scratch, lights, objects, seeds, samples, .. } = workspace;
     let (scene, count) = (&moment.prepared, batch.len());
     let soft = moment
         .extents
         .as_ref()
         .filter(|_| parts::BUILT.extents)
         .map(|extents| SoftLight { extents, points: lights });
+    // The first look at pixels is one by closed paths alone.
+    let paths = (pass.wanted.is_unclamped() && !pass.wanted.is_first_look).then_some(PathNumbers {
+        points: pass.points,
+        dimensions: pass.dimensions,
+        seeds,
+        samples,
+        bounces: pass.bounces,
+        indirect: pass.indirect,
+    });
     aim::<S, E>(simd, moment, &mut scratch.queue);
     let Scratch { queue, hits, next, waiting, occluders, sights, cover, .. } = &mut *scratch;
     let tree = BUILT.tree && scene.tree.is_some();
@@ -349,8 +372,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     };
     next.count = 0;
     hits.packets.clear();
-    if scene.has_glass() {
+    if scene.has_glass() || paths.is_some() {
         waiting.begin(pass.bounces);
+        waiting.paths.begin();
     }
     let (kinds, background) = (candidates.kinds, scene.backdrop());
     let bodies = moment.bodies_in(tile);
@@ -359,14 +383,16 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
             trace_queue::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true };
+        let met =
+            HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, true>(simd, scene, met, hits, occluders);
     } else {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
         });
         let next = Some(&mut *next);
-        let met = HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true };
+        let met =
+            HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, false>(simd, scene, met, hits, occluders);
     }
     if pass.wanted.is_first_look {
@@ -375,7 +401,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     if scene.is_clear() {
         cover_hits(hits, count, Lanes::<S, E>::LEN, cover);
     }
-    scratch.follow::<S, N>(simd, scene, pass.bounces, soft);
+    scratch.follow::<S, N>(simd, scene, pass.bounces, soft, paths);
 }
 
 /// The colours of a batch as parts.
@@ -420,12 +446,19 @@ fn cover_batch<E: Real>(
     cover: &mut CoverTile,
 ) {
     for (k, item) in batch.iter().enumerate() {
-        let level = [quantised(workspace.scratch.cover.0[k].widen()); CHANNELS];
+        let covered = workspace.scratch.cover.0[k].widen();
+        let level = [quantised(covered); CHANNELS];
         match &mut cover.first {
             Some(first) if pass.wanted.is_first_look => {
                 first.put(tile.in_rows(item.pixel), level, workspace.objects[k]);
             }
-            Some(_) | None => cover.pixels[tile.in_tile(item.pixel)].add_equal(level, 1),
+            Some(_) | None => {
+                let pixel = &mut cover.pixels[tile.in_tile(item.pixel)];
+                match pass.wanted.is_unclamped() {
+                    true => pixel.add_unclamped(DVec3::splat(covered.clamp(0.0, 1.0)), 1),
+                    false => pixel.add_equal(level, 1),
+                }
+            }
         }
     }
 }
@@ -452,6 +485,21 @@ fn add_up<S: Simd, E: Real>(
             }
         },
     );
+}
+
+/// Adds the colours of a batch to its pixels, as they are.
+#[inline(never)]
+fn add_up_unclamped<E: Real>(
+    tile: &SampledTile,
+    batch: &[Item],
+    workspace: &Workspace<E>,
+    pixels: &mut [Pixel],
+) {
+    let [red, green, blue] = &workspace.scratch.hits.color;
+    for (k, item) in batch.iter().enumerate() {
+        let color = [red, green, blue].map(|column| column.0[k].widen());
+        pixels[tile.in_tile(item.pixel)].add_unclamped(DVec3::from_array(color), 1);
+    }
 }
 
 /// Where the rays of a batch go: columns and rows of the image, points of the lens and of the lights.

@@ -157,6 +157,7 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
             // Checked once here, not for each packet.
             let (bodies, lamps) = (beyond.bodies(), beyond.lamps());
             let (glossy, glass) = (beyond.glossy(), beyond.glass().filter(|_| GLASS));
+            let rough = beyond.rough();
             for &(at, others) in &hits.packets {
                 let normal = Vec3::load(simd, &hits.normal, at);
                 let start = Vec3::load(simd, &hits.start, at);
@@ -193,7 +194,11 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     }
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
+                        let lit = Lit { lanes: lit, towards, color };
+                        gloss.add(lit, (seen, normal), orders);
+                        if let Some(paths) = rough {
+                            gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
+                        }
                     }
                 }
                 for lamp in lamps {
@@ -233,10 +238,13 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     if let Some(gloss) = &mut gloss {
                         let lit = Lit { lanes: lit, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
+                        if let Some(paths) = rough {
+                            gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
+                        }
                     }
                 }
                 let colors = (&hits.diffuse, &mut hits.color);
-                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss));
+                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss, rough.is_some()));
             }
         },
     );
@@ -267,7 +275,7 @@ pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
     queue: &RayBatch<E>,
     at: usize,
     (diffuse, colors): (&Columns<E>, &mut Columns<E>),
-    (sum, gloss): (Vec3<S, E>, Option<Gloss>),
+    (sum, gloss, is_rough): (Vec3<S, E>, Option<Gloss>, bool),
 ) {
     let diffuse = Vec3::load(simd, diffuse, at);
     let color = Vec3::load(simd, colors, at);
@@ -280,6 +288,7 @@ pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
         Some(gloss) if gloss.is_seen => {
             let one = constant::<S, E>(simd, 1.0);
             let sum = gloss.sum::<S, E>(simd);
+            let lit = if is_rough { gloss.sum_of_mirrors::<S, E>(simd).scale_add(one, lit) } else { lit };
             if EYE {
                 sum.scale_add(one, lit)
             } else {

@@ -4,6 +4,8 @@
 
 pub(crate) mod hulls;
 pub(crate) mod light;
+pub(crate) mod path_queue;
+pub(crate) mod paths;
 pub(crate) mod ray_queue;
 pub(crate) mod scatter;
 pub(crate) mod search;

@@ -14,6 +14,7 @@ use fearless_simd::prelude::*;
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
 use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, ROOM, RayBatch};
+use crate::fast::transport::path_queue::PathQueues;
 
 /// The number of rays in a full batch.
 const FULL: usize = PIXELS;
@@ -116,7 +117,9 @@ pub(crate) struct RayQueues<'a, E> {
     most: u32,
     /// For each ray of the current batch, 0 if it has not met glass. In scenes without background, the share of the pixel
     /// that stays clear if the ray reaches nothing, if it has come through glass alone. 1 or -1 for the others.
-    marks: Column<E>,
+    pub(super) marks: Column<E>,
+    /// The rays of paths, in scenes in which light goes round.
+    pub(crate) paths: PathQueues<E>,
     /// The clear share of each pixel, in scenes without background.
     clear: Vec<i128>,
 }
@@ -130,6 +133,7 @@ impl<'a, E: Real> RayQueues<'a, E> {
             depth: 0,
             most: 0,
             marks: Column::new(),
+            paths: PathQueues::new(),
             clear: vec![],
         }
     }
@@ -213,6 +217,11 @@ impl<'a, E: Real> RayQueues<'a, E> {
         let [wx, wy, wz] = &mut queue.weight;
         rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, &mut queue.pixel, &mut self.marks]);
         true
+    }
+
+    #[inline(always)]
+    pub(super) fn is_cancelled(&self) -> bool {
+        self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// Counts a ray of the batch that has hit nothing as clear in its pixel if it has come through glass alone. Returns whether

@@ -185,6 +185,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
             let lamps = beyond.map_or(&[][..], Extensions::lamps);
             let bodies = beyond.and_then(Extensions::bodies);
             let finishes = beyond.and_then(Extensions::glossy);
+            let rough = beyond.and_then(Extensions::rough);
             let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
             let all = |mask: u64| match &extents.hulls {
                 Some(_) => Candidates::masked(scene.masks(mask)),
@@ -262,7 +263,11 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     }
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        gloss.add(Lit { lanes: lit, towards, color }, (seen, normal), orders);
+                        let lit = Lit { lanes: lit, towards, color };
+                        gloss.add(lit, (seen, normal), orders);
+                        if let Some(paths) = rough {
+                            gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
+                        }
                     }
                 }
                 for (index, lamp) in lamps.iter().enumerate() {
@@ -306,10 +311,13 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     if let Some(gloss) = &mut gloss {
                         let lit = Lit { lanes: lit, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
+                        if let Some(paths) = rough {
+                            gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
+                        }
                     }
                 }
                 let colors = (&hits.diffuse, &mut hits.color);
-                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss));
+                add_light::<S, E, EYE>(simd, queue, at, colors, (sum, gloss, rough.is_some()));
             }
         },
     );

@@ -13,6 +13,9 @@ const SECOND: u32 = 4;
 /// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
+/// The same where light goes round: many dimensions, and little that is smooth.
+const SLOPE_OF_PATHS: f64 = -0.5;
+
 /// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary
 /// ([`super::density`]), the fewer others there are that have less.
 pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 1.0];
@@ -26,20 +29,28 @@ pub(super) struct SampleSchedule {
     /// No pass adds more samples to a pixel.
     pub(super) step: u32,
     tone: Tone,
+    /// Whether samples are not clamped, as where light goes round.
+    is_unclamped: bool,
     /// The largest variance of the samples of a settled pixel, by how much varies around it and by the logarithm of their
     /// number to the base 2.
     limits: [[f64; u32::BITS as usize]; SPARED.len()],
 }
 
 impl SampleSchedule {
-    pub(super) fn new(samples: Samples, tone: Tone, step: u32) -> Self {
+    pub(super) fn new(samples: Samples, tone: Tone, step: u32, is_unclamped: bool) -> Self {
+        let slope = if is_unclamped { SLOPE_OF_PATHS } else { SLOPE };
         let limits = SPARED.map(|spared| {
             core::array::from_fn(|at| {
-                let limit = spared * samples.error() * libm::pow(f64::from(1_u32 << at), -SLOPE);
+                let limit = spared * samples.error() * libm::pow(f64::from(1_u32 << at), -slope);
                 limit * limit
             })
         });
-        Self { samples, step, tone, limits }
+        Self { samples, step, tone, is_unclamped, limits }
+    }
+
+    /// Whether samples are not clamped.
+    pub(super) fn is_unclamped(&self) -> bool {
+        self.is_unclamped
     }
 
     /// Whether there is an error to be reached: without, the first number is the only one.
@@ -99,6 +110,11 @@ impl SampleSchedule {
         let count = pixel.count();
         count < self.most()
             && count.is_power_of_two()
-            && pixel.variance(self.tone) > self.limits[density][count.trailing_zeros() as usize]
+            && self.variance(pixel) > self.limits[density][count.trailing_zeros() as usize]
+    }
+
+    #[inline(always)]
+    fn variance(&self, pixel: &Pixel) -> f64 {
+        if self.is_unclamped { pixel.unclamped_variance(self.tone) } else { pixel.variance(self.tone) }
     }
 }

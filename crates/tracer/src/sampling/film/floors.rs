@@ -47,6 +47,11 @@ impl Floors {
         }
     }
 
+    /// Adds the sets of others.
+    pub(super) fn add_all(&mut self, others: Self) {
+        self.sets.extend(others.sets);
+    }
+
     /// The sets whose pixels go on from so many samples.
     pub(super) fn above(&self, count: u32) -> impl Iterator<Item = &Bits> {
         self.sets.iter().filter(move |(floor, _)| *floor > count).map(|(_, bits)| bits)

@@ -34,6 +34,9 @@ use crate::parallel::CHANNELS;
 /// it in the first look, one more for each time that it is decided who goes on, and those in which it is counted what varies.
 pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32;
 
+/// The samples that each pixel gets where they are not clamped: in fewer, what is rare and bright is seen by none.
+const FEWEST: u32 = 16;
+
 /// An image of samples, or a band of one, its first row at the top.
 #[derive(Debug)]
 pub(crate) struct Film {
@@ -69,7 +72,7 @@ impl Film {
         samples: Samples,
         tone: Tone,
         step: u32,
-        has_cover: bool,
+        (has_cover, is_unclamped): (bool, bool),
     ) -> Option<Self> {
         let size = (size.0 as usize, size.1 as usize);
         // No tile is larger than the image.
@@ -83,7 +86,10 @@ impl Film {
             Vec::<Pixel>::new().try_reserve_exact(pixels).ok()?;
             None
         };
-        let plan = Plan::new(size, SampleSchedule::new(samples, tone, step))?;
+        let mut plan = Plan::new(size, SampleSchedule::new(samples, tone, step, is_unclamped))?;
+        if is_unclamped {
+            plan.raise(FEWEST)?;
+        }
         let cover = if has_cover {
             Some(Layer {
                 first: first.as_ref().map_or(Some(None), |_| First::new(pixels).map(Some))?,
@@ -97,7 +103,7 @@ impl Film {
 
     /// Gives pixels some number of samples in any case.
     pub(crate) fn raise(&mut self, floors: Floors) {
-        self.plan.floors = floors;
+        self.plan.floors.add_all(floors);
     }
 
     /// The first samples of its pixels.
@@ -244,7 +250,8 @@ mod tests {
     use crate::reference::encoded;
 
     fn film(most: u32, error: f64, step: u32) -> Film {
-        Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step, false).unwrap()
+        Film::new((8, 4), (3, 2), Samples::new(most, error).unwrap(), Tone::Plain, step, (false, false))
+            .unwrap()
     }
 
     fn counts(film: &Film) -> Vec<u32> {
@@ -332,7 +339,7 @@ mod tests {
     #[test]
     fn a_sliver_is_found_along_its_length() {
         let samples = Samples::new(64, 1.0).unwrap();
-        let mut film = Film::new((64, 9), (16, 16), samples, Tone::Plain, 1024, false).unwrap();
+        let mut film = Film::new((64, 9), (16, 16), samples, Tone::Plain, 1024, (false, false)).unwrap();
         let mut dice = fastrand::Rng::with_seed(3);
         let mut seen = |place: usize, _| f64::from(u8::from(place / 64 == 4 && dice.f64() < 0.15));
         expose(&mut film, &mut seen);
@@ -347,7 +354,8 @@ mod tests {
     fn pixels_that_are_raised_get_what_they_are_raised_to() {
         for (floor, given) in [(16, 16), (100, 64), (1, 1)] {
             let mut film =
-                Film::new((70, 9), (16, 16), Samples::new(64, 1.0).unwrap(), Tone::Plain, 10, false).unwrap();
+                Film::new((70, 9), (16, 16), Samples::new(64, 1.0).unwrap(), Tone::Plain, 10, (false, false))
+                    .unwrap();
             let mut floors = Floors::new((70, 9), &[floor]).unwrap();
             floors.sets[0].1.put(66, 4);
             film.raise(floors);
@@ -388,7 +396,7 @@ mod tests {
             let side = (dice.u32(1..40), dice.u32(1..20));
             let (most, tone) = (dice.u32(2..70), [Tone::Plain, Tone::Srgb][dice.usize(..2)]);
             let samples = Samples::new(most, 1.0).unwrap();
-            let mut film = Film::new(size, side, samples, tone, 256, false).unwrap();
+            let mut film = Film::new(size, side, samples, tone, 256, (false, false)).unwrap();
             let width = size.0 as usize;
             let share = [5, 120, 230][dice.usize(..3)];
             let lively: Vec<f64> =

@@ -12,10 +12,16 @@ pub(super) const ONE: f64 = 65535.0;
 /// What a pixel has got so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
+    /// Where samples are not clamped, these have a sign.
     sum: [u64; CHANNELS],
+    /// Where samples are not clamped, the bits of an `f64`: squares of bright samples are beyond whole numbers, and a
+    /// pixel's samples always come in the same order.
     squares: [u64; CHANNELS],
     count: u32,
 }
+
+/// The brightest sample that is not clamped, in parts of [`ONE`].
+const BRIGHTEST: f64 = (1u64 << 46) as f64;
 
 /// 2^52: what is added to it is rounded to a whole number, which its lowest bits are.
 const WHOLE: f64 = 4_503_599_627_370_496.0;
@@ -53,14 +59,52 @@ impl Pixel {
         self.count += count;
     }
 
+    /// Adds `count` samples of the same colour, which is not clamped.
+    pub(crate) fn add_unclamped(&mut self, color: DVec3, count: u32) {
+        let of_each = color.to_array();
+        for ((sum, squares), channel) in self.sum.iter_mut().zip(&mut self.squares).zip(of_each) {
+            // What is not a number is black.
+            let level = (channel * ONE).round().clamp(-BRIGHTEST, BRIGHTEST) as i64;
+            *sum = sum.wrapping_add_signed(level * i64::from(count));
+            *squares =
+                (f64::from_bits(*squares) + (level as f64) * (level as f64) * f64::from(count)).to_bits();
+        }
+        self.count += count;
+    }
+
     #[inline(always)]
     pub(crate) fn count(&self) -> u32 {
         self.count
     }
 
-    /// Of all samples.
+    /// Of all samples, in 0..1.
     pub(crate) fn mean(&self) -> DVec3 {
-        DVec3::from_array(self.sum.map(|sum| sum as f64)) / (ONE * f64::from(self.count.max(1)))
+        let mean =
+            DVec3::from_array(self.sum.map(|sum| sum as i64 as f64)) / (ONE * f64::from(self.count.max(1)));
+        mean.clamp(DVec3::ZERO, DVec3::ONE)
+    }
+
+    /// The variance of samples that are not clamped, in squares of levels: the mean over the channels. Where the mean is
+    /// far beyond black or white, the samples make no difference.
+    pub(super) fn unclamped_variance(&self, tone: Tone) -> f64 {
+        let count = f64::from(self.count);
+        let mut sum = 0.0;
+        for channel in 0..CHANNELS {
+            let mean = self.sum[channel] as i64 as f64 / count;
+            let spread = (f64::from_bits(self.squares[channel]) / count - mean * mean).max(0.0) / (ONE * ONE);
+            let spread = spread * count / (count - 1.0);
+            // The error of the mean, and what it makes of what is shown.
+            let error = (spread / count).sqrt();
+            let shown = |light: f64| match tone {
+                Tone::Plain => light.clamp(0.0, 1.0),
+                Tone::Srgb => encoded(light.clamp(0.0, 1.0)),
+            };
+            let mean = mean / ONE;
+            let apart = if error < 1e-9 { 0.0 } else { shown(mean + error) - shown(mean - error) };
+            let slope = if error < 1e-9 { 0.0 } else { apart / (2.0 * error) };
+            sum += spread * slope * slope;
+        }
+        255.0 * 255.0 * sum / CHANNELS as f64
     }
 
     /// The variance of its samples in squares of levels: the mean over the channels.

@@ -16,6 +16,7 @@ use super::density::Density;
 use super::first::First;
 use super::floors::Floors;
 use super::pixel::{ONE, Pixel};
+use crate::parts;
 
 /// So many times the error that is asked for, two neighbours with a sample each may differ by.
 pub(super) const CONTRAST: f64 = 1.5;
@@ -43,6 +44,12 @@ impl PassTargets<'_> {
     #[inline(always)]
     pub(crate) fn goal(&self, count: u32) -> u32 {
         self.chain.goal(count)
+    }
+
+    /// Whether samples are not clamped. Then the first look at pixels is no sample.
+    #[inline(always)]
+    pub(crate) fn is_unclamped(&self) -> bool {
+        parts::BUILT.paths && self.chain.is_unclamped()
     }
 
     /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
@@ -115,6 +122,14 @@ impl Plan {
             wanted: none()?,
             stage: Stage::Begins,
         })
+    }
+
+    /// Gives all pixels so many samples in any case; `None` where there is no memory for it.
+    pub(super) fn raise(&mut self, count: u32) -> Option<()> {
+        let mut all = self.wanted.empty()?;
+        all.fill();
+        self.floors.sets.push((count, all));
+        Some(())
     }
 
     /// Whether a pixel has the second number of the chain.

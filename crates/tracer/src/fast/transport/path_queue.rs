@@ -1,0 +1,160 @@
+//! Queues of the rays of paths, in scenes in which light goes round.
+//!
+//! Rays wait by the number of hits before them, and by how they went on from the last. They are traced a batch at a time, from
+//! the longest paths of which there are enough for a batch. So no queue holds more than some batches, however many rays there
+//! are. What a ray adds to a pixel is summed as that of [`RayQueues`] is.
+
+use crate::fast::arithmetic::real::Real;
+use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
+use crate::fast::transport::ray_queue::RayQueues;
+use crate::sampling::paths::Way;
+
+/// The number of rays in a full batch.
+const FULL: usize = PIXELS;
+
+/// How often a path has gone on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Turns {
+    /// By mirrors and glass.
+    pub(crate) bounced: u8,
+    /// By surfaces that scatter light.
+    pub(crate) scattered: u8,
+}
+
+impl Turns {
+    /// Returns the number of hits before.
+    #[inline(always)]
+    pub(crate) fn hits(self) -> u32 {
+        u32::from(self.bounced) + u32::from(self.scattered)
+    }
+}
+
+/// A ray that waits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PathRay<E> {
+    pub(crate) origin: [E; 3],
+    pub(crate) direction: [E; 3],
+    /// The factor of its colour in the colour of the pixel.
+    pub(crate) weight: [E; 3],
+    pub(crate) pixel: E,
+    /// In scenes without background, the share of the pixel that stays clear if the ray reaches nothing; -1 if it counts for
+    /// nothing then.
+    pub(crate) clear: E,
+    pub(crate) turns: Turns,
+}
+
+/// The rays of the paths of a tile.
+pub(crate) struct PathQueues<E> {
+    /// By hits before, and by [`Way`].
+    waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
+    /// Those of the rays of the current batch.
+    turns: [Turns; ROOM],
+}
+
+impl<E: Real> PathQueues<E> {
+    pub(crate) fn new() -> Self {
+        Self { waiting: vec![], turns: [Turns::default(); ROOM] }
+    }
+
+    /// Starts with a batch of camera rays.
+    pub(crate) fn begin(&mut self) {
+        self.waiting.as_flattened_mut().iter_mut().for_each(Vec::clear);
+        self.turns.fill(Turns::default());
+    }
+
+    /// Returns how often the path of a ray of the batch has gone on.
+    #[inline(always)]
+    pub(crate) fn turns(&self, ray: usize) -> Turns {
+        self.turns[ray]
+    }
+
+    /// Adds a ray that goes on this way.
+    #[inline(always)]
+    pub(crate) fn push(&mut self, way: Way, ray: PathRay<E>) {
+        let before = ray.turns.hits() as usize - 1;
+        if self.waiting.len() <= before {
+            self.waiting.resize_with(before + 1, || [const { vec![] }; Way::COUNT]);
+        }
+        self.waiting[before][way as usize].push(ray);
+    }
+
+    /// Fills the batch with rays that wait. Returns false if there are none. `marks` gets their clear shares.
+    pub(super) fn take(&mut self, queue: &mut RayBatch<E>, marks: &mut Column<E>) -> bool {
+        let waiting = self.waiting.as_flattened_mut();
+        let full = waiting.iter().rposition(|rays| rays.len() >= FULL);
+        let found = full.or_else(|| waiting.iter().position(|rays| !rays.is_empty()));
+        let Some(at) = found else { return false };
+        let rays = &mut waiting[at];
+        let first = rays.len().saturating_sub(FULL);
+        queue.count = rays.len() - first;
+        for (k, ray) in rays.drain(first..).enumerate() {
+            for axis in 0..3 {
+                queue.origin[axis].0[k] = ray.origin[axis];
+                queue.direction[axis].0[k] = ray.direction[axis];
+                queue.weight[axis].0[k] = ray.weight[axis];
+            }
+            queue.pixel.0[k] = ray.pixel;
+            marks.0[k] = ray.clear;
+            self.turns[k] = ray.turns;
+        }
+        true
+    }
+}
+
+impl<E: Real> RayQueues<'_, E> {
+    /// Fills the batch with rays of paths. Returns false if there are none, or if the drawing was cancelled.
+    pub(crate) fn take_paths(&mut self, queue: &mut RayBatch<E>) -> bool {
+        !self.is_cancelled() && self.paths.take(queue, &mut self.marks)
+    }
+
+    /// Returns the share of its pixel that stays clear if a ray of the batch reaches nothing after so many hits, in scenes
+    /// without background; at most 0 if it counts for nothing then.
+    #[inline(always)]
+    pub(crate) fn clear_share(&self, ray: usize, hits: u32) -> f64 {
+        if hits == 0 { 1.0 } else { self.marks.0[ray].widen() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ray(pixel: usize, bounced: u8, scattered: u8) -> PathRay<f64> {
+        let turns = Turns { bounced, scattered };
+        PathRay {
+            origin: [0.0; 3],
+            direction: [1.0; 3],
+            weight: [1.0; 3],
+            pixel: pixel as f64,
+            clear: -1.0,
+            turns,
+        }
+    }
+
+    #[test]
+    fn all_rays_are_taken_and_few_wait() {
+        let mut queues = PathQueues::new();
+        let (mut queue, mut marks) = (RayBatch::new(), Column::new());
+        queues.begin();
+        let mut sent = 0;
+        for pixel in 0..FULL {
+            queues.push(Way::Scattered, ray(pixel, 0, 1));
+            sent += 1;
+        }
+        let (mut taken, mut most) = (0, 0);
+        while queues.take(&mut queue, &mut marks) {
+            taken += queue.count;
+            for k in 0..queue.count {
+                let Turns { bounced, scattered } = queues.turns(k);
+                if queues.turns(k).hits() < 7 {
+                    queues.push(Way::Mirrored, ray(k, bounced + 1, scattered));
+                    queues.push(Way::Scattered, ray(k, bounced, scattered + 1));
+                    sent += 2;
+                }
+            }
+            most = queues.waiting.as_flattened().iter().map(Vec::len).fold(most, usize::max);
+        }
+        assert_eq!((taken, taken), (sent, FULL * 127));
+        assert!(most <= 3 * FULL, "{most}");
+    }
+}

@@ -1,0 +1,195 @@
+//! The rays that go on from hits in scenes in which light goes round: this step replaces `reflect` and `spawn_rays` there.
+//!
+//! It goes lane by lane, with the functions of the reference tracer.
+
+use glam::DVec3;
+use rayfold_scene::Glass;
+
+use crate::fast::arithmetic::real::Real;
+use crate::fast::build::prepare::Prepared;
+use crate::fast::materials::paths::Paths;
+use crate::fast::rays::bounce::{Column, Hits, RayBatch};
+use crate::fast::transport::path_queue::{PathRay, Turns};
+use crate::fast::transport::ray_queue::RayQueues;
+use crate::reference::{Refraction, refract};
+use crate::sampling::paths::{Way, choice, direction_dimension, scattered};
+use crate::sampling::{Dimensions, Points};
+
+/// The random numbers of a tile's paths.
+#[derive(Clone, Copy)]
+pub(crate) struct PathNumbers<'a> {
+    pub(crate) points: &'a Points,
+    pub(crate) dimensions: &'a Dimensions,
+    /// The seed and the sample of each pixel of the batch of camera rays.
+    pub(crate) seeds: &'a [u32],
+    pub(crate) samples: &'a [u32],
+    /// The largest number of mirrorings and refractions.
+    pub(crate) bounces: u32,
+    /// The largest number of diffuse reflections.
+    pub(crate) indirect: u32,
+}
+
+impl PathNumbers<'_> {
+    /// Returns the numbers of the direction in which a path goes on.
+    #[inline(always)]
+    fn direction(&self, slot: usize, hits: u32) -> (f64, f64) {
+        let first = direction_dimension(self.dimensions, hits);
+        let of = |dimension| self.points.coordinate(dimension, self.seeds[slot], self.samples[slot]);
+        (of(first), of(first + 1))
+    }
+}
+
+/// Adds the rays that go on from the hits of a batch to the queues. `is_painted` says that the hits have their mirror
+/// coefficients, as in patterns and fog.
+#[inline(never)]
+pub(crate) fn spawn_paths<E: Real>(
+    (scene, paths): (&Prepared<E>, &Paths),
+    numbers: PathNumbers,
+    (queue, hits): (&RayBatch<E>, &Hits<E>),
+    (lanes, is_painted): (usize, bool),
+    waiting: &mut RayQueues<E>,
+) {
+    let is_foggy = scene.fog().is_some();
+    let has_faces = !hits.face[0].is_empty();
+    for &(at, _) in &hits.packets {
+        for lane in at..at + lanes {
+            let pixel = queue.pixel.0[lane];
+            // Lanes that repeat another lane spawn no rays.
+            if !hits.is_hit(lane) || pixel.widen() < 0.0 {
+                continue;
+            }
+            let turns = waiting.paths.turns(lane);
+            let from = Origin { slot: pixel.to_index(), pixel, turns, numbers };
+            let direction = read(&queue.direction, lane);
+            let normal = read(&hits.normal, lane);
+            let (start, face) = match has_faces {
+                true => (read_of(&hits.place, lane), read_of(&hits.face, lane)),
+                false => (read(&hits.start, lane), normal),
+            };
+            if u32::from(turns.scattered) < numbers.indirect {
+                let mut weight = read(&hits.diffuse, lane);
+                if is_foggy {
+                    weight *= hits.clearness[lane].widen();
+                }
+                from.send(waiting, Way::Scattered, weight, -1.0, |from| {
+                    (start, scattered(from.numbers(), normal, face))
+                });
+            }
+            let order = hits.order.0[lane].to_index();
+            let entry = &scene.entries[order];
+            if !entry.mirrors || u32::from(turns.bounced) >= numbers.bounces {
+                continue;
+            }
+            let mut weight = read(&queue.weight, lane);
+            let mut mirror = if is_painted {
+                read_of(&hits.mirror, lane)
+            } else {
+                DVec3::from_array(entry.mirror.map(E::widen)) * weight
+            };
+            if is_foggy {
+                weight *= hits.clearness[lane].widen();
+            }
+            let clear = waiting.clear_share(lane, turns.hits());
+            let glass = paths.glass(order);
+            let [offset, within] = hits.sides.each_ref().map(|side| side.0[lane].widen());
+            let mean = |glass: Glass| (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
+            if let Some(facets) = paths.microfacets(order) {
+                let cosine = -direction.dot(normal);
+                let facet = facets.normal(-direction, normal, from.numbers());
+                let towards = reflected(direction, facet);
+                let shown = if towards.dot(face) > 0.0 { facets.masking(towards.dot(normal)) } else { 0.0 };
+                mirror /= facets.energy(cosine);
+                if let Some((glass, is_flat)) = glass {
+                    let Refraction { mirrored, direction: bent } =
+                        refract(glass, direction, facet, within != 0.0, is_flat);
+                    mirror += mirrored * weight;
+                    let bent = if is_flat { towards - 2.0 * towards.dot(normal) * normal } else { bent };
+                    let left = if bent.dot(face) < 0.0 { facets.masking(-bent.dot(normal)) } else { 0.0 };
+                    let left = left * (1.0 - mirrored);
+                    let clear = if clear > 0.0 { clear * left * mean(glass) } else { -1.0 };
+                    let weight = weight * glass.color() * left;
+                    from.send(waiting, Way::Refracted, weight, clear, |_| {
+                        (start - 2.0 * offset * face, bent)
+                    });
+                }
+                from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| (start, towards));
+                continue;
+            }
+            let normal = if has_faces { read_of(&hits.onward, lane) } else { normal };
+            if let Some((glass, is_flat)) = glass {
+                let Refraction { mirrored, direction: bent } =
+                    refract(glass, direction, normal, within != 0.0, is_flat);
+                mirror += mirrored * weight;
+                let clear = if clear > 0.0 { clear * (1.0 - mirrored) * mean(glass) } else { -1.0 };
+                let weight = weight * glass.color() * (1.0 - mirrored);
+                from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
+            }
+            from.send(waiting, Way::Mirrored, mirror, -1.0, |_| (start, reflected(direction, normal)));
+        }
+    }
+}
+
+/// The hit from which rays go on.
+struct Origin<'a, E> {
+    slot: usize,
+    pixel: E,
+    turns: Turns,
+    numbers: PathNumbers<'a>,
+}
+
+impl<E: Real> Origin<'_, E> {
+    /// Returns the random numbers of a direction.
+    #[inline(always)]
+    fn numbers(&self) -> (f64, f64) {
+        self.numbers.direction(self.slot, self.turns.hits())
+    }
+
+    /// Adds a ray of this weight, if it is followed. `place` gives its start and its direction.
+    #[inline(always)]
+    fn send(
+        &self,
+        waiting: &mut RayQueues<E>,
+        way: Way,
+        weight: DVec3,
+        clear: f64,
+        place: impl FnOnce(&Self) -> (DVec3, DVec3),
+    ) {
+        let Self { slot, pixel, turns, numbers } = *self;
+        let chance = way.chance(weight);
+        let (seed, sample) = (numbers.seeds[slot], numbers.samples[slot]);
+        if chance < 1.0 && choice(seed, sample, turns.hits(), way) >= chance {
+            return;
+        }
+        let (origin, direction) = place(self);
+        let narrow = |v: DVec3| v.to_array().map(E::narrow);
+        let turns = match way {
+            Way::Scattered => Turns { scattered: turns.scattered + 1, ..turns },
+            Way::Mirrored | Way::Refracted => Turns { bounced: turns.bounced + 1, ..turns },
+        };
+        let ray = PathRay {
+            origin: narrow(origin),
+            direction: narrow(direction),
+            weight: narrow(weight / chance),
+            pixel,
+            clear: E::narrow(clear),
+            turns,
+        };
+        waiting.paths.push(way, ray);
+    }
+}
+
+/// Returns the direction of a mirrored ray. The normal faces the ray; if rounding has changed the sign, the ray grazes.
+#[inline(always)]
+fn reflected(direction: DVec3, normal: DVec3) -> DVec3 {
+    (direction - 2.0 * direction.dot(normal).min(0.0) * normal).normalize()
+}
+
+#[inline(always)]
+fn read<E: Real>(columns: &[Column<E>; 3], lane: usize) -> DVec3 {
+    DVec3::new(columns[0].0[lane].widen(), columns[1].0[lane].widen(), columns[2].0[lane].widen())
+}
+
+#[inline(always)]
+fn read_of<E: Real>(columns: &[Vec<E>; 3], lane: usize) -> DVec3 {
+    DVec3::new(columns[0][lane].widen(), columns[1][lane].widen(), columns[2][lane].widen())
+}
