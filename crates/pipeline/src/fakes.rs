@@ -11,6 +11,7 @@
 //! | `big …`     | the same, each frame of it in bands     |
 //! | `with A,B …` | the same, drawn from these files; a file `also C` refers to C, which may be absent |
 
+use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::time::Duration;
 
@@ -86,7 +87,12 @@ pub fn referred(file: &[u8]) -> Option<String> {
 pub fn drawn_text(script: &[u8], file: impl Fn(&str) -> Option<Vec<u8>>) -> Result<Vec<u8>, String> {
     let mut text = script.to_vec();
     let mut names: Vec<(String, bool)> = named(script).into_iter().map(|name| (name, true)).collect();
+    let mut seen = BTreeSet::new();
     while let Some((name, is_needed)) = names.pop() {
+        // Files may refer to each other.
+        if !seen.insert(name.clone()) {
+            continue;
+        }
         match file(&name) {
             Some(body) => {
                 text.extend(format!(" | {name} = {}", String::from_utf8_lossy(&body)).bytes());

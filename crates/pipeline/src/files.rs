@@ -87,6 +87,12 @@ impl<'a> FileSets<'a> {
         self.0.values().flat_map(BTreeMap::values).any(|set| set.entries.iter().any(|(name, _)| name == file))
     }
 
+    /// The files of a version's set.
+    fn files_of(&self, name: &ScriptName, version: &ETag) -> Vec<&NameHash> {
+        let set = self.0.get(&(name, version.script())).and_then(|sets| sets.get(version));
+        set.into_iter().flat_map(|set| set.entries.iter().map(|(name, _)| name)).collect()
+    }
+
     /// Returns the version of a script whose set agrees with the files of a folder. If two renderers have read a
     /// model differently, it is the newer one's.
     pub(crate) fn current(
@@ -124,6 +130,28 @@ impl<'a> FileSets<'a> {
         let set: Vec<Entry> = names.into_iter().map(|name| (name.clone(), now(name))).collect();
         Some(script.with_files(&set))
     }
+}
+
+/// Whether a version of a script is drawn, or invocations are at it. Those for parts and bands of it that began before a
+/// file was `changed` may have drawn nothing; without a time it is absent now.
+fn is_drawn(
+    receipts: &[ReceiptFound],
+    name: &ScriptName,
+    version: &ETag,
+    changed: Option<Timestamp>,
+) -> bool {
+    let (mut is_taken, mut is_cut) = (false, false);
+    for found in receipts.iter().filter(|found| found.receipt.is_of(name, version)) {
+        let is_newer = changed.is_some_and(|changed| found.modified > changed);
+        match found.receipt {
+            Receipt::Frame { .. } | Receipt::Fault { .. } | Receipt::Waits { .. } => return true,
+            Receipt::Split { .. } => return is_newer,
+            Receipt::Cut { .. } => is_cut |= !is_newer,
+            Receipt::Taken { .. } => is_taken = true,
+            _ => {}
+        }
+    }
+    is_taken && !is_cut
 }
 
 /// Returns the version of each script of an animation, from listings of its scripts and of its receipts.
@@ -184,29 +212,36 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         script: ETag,
     ) -> Result<ETag> {
         let receipts = self.receipts_of_all_versions(animation, name, &script).await?;
-        self.agreed_version(animation, name, &script, &receipts)
-            .await
-            .map(|version| version.unwrap_or(script))
+        let agreed = self.agreed_version(animation, name, &script, &receipts).await?;
+        Ok(agreed.map_or(script, |(version, _)| version))
     }
 
-    /// Returns the version whose set of files agrees with the folder, if one does. Without sets nothing is listed.
+    /// Returns the version whose set of files agrees with the folder, if one does, and since when it may have done so.
+    /// Without sets nothing is listed.
     pub(crate) async fn agreed_version(
         &self,
         animation: &Animation,
         name: &ScriptName,
         script: &ETag,
         receipts: &[ReceiptFound],
-    ) -> Result<Option<ETag>> {
+    ) -> Result<Option<(ETag, Timestamp)>> {
         let sets = FileSets::of(receipts);
         if sets.is_empty() {
             return Ok(None);
         }
         let (scripts, _) = self.list_scripts(animation, &[]).await?;
-        Ok(sets.current(name, script, &scripts.files).cloned())
+        let Some(version) = sets.current(name, script, &scripts.files) else { return Ok(None) };
+        // No listing shows since when a file is absent.
+        let since = |file: &NameHash| {
+            scripts.files.get(file).map_or_else(|| self.clock.now(), |found| found.modified)
+        };
+        let since = sets.files_of(name, version).into_iter().map(since).max();
+        Ok(Some((version.clone(), since.unwrap_or_default())))
     }
 
     /// Reads the files that a script's drawing needs, and gives it the version that it has with them. If `agreed`
-    /// is a version that a listing has just shown to be current and the files are of it, nothing is written.
+    /// is a version whose set is there already, and the files are of it, nothing is written. If they are not and the
+    /// event is about that version alone (`is_only`), nothing is written either: nothing is to be drawn.
     ///
     /// # Errors
     ///
@@ -218,7 +253,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         name: &ScriptName,
         script: &ETag,
         body: &Bytes,
-        agreed: Option<&ETag>,
+        (agreed, is_only): (Option<&ETag>, bool),
     ) -> Result<(ETag, Files)> {
         let mut may_keep = true;
         for _ in 0..MAX_READS {
@@ -238,7 +273,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             let set = set_of(&files);
             let version = script.with_files(&set);
-            if agreed == Some(&version) {
+            if is_only || agreed == Some(&version) {
                 return Ok((version, Arc::new(files)));
             }
             self.put_set(animation, name, &version, &set).await?;
@@ -267,6 +302,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             renderer.keep(&key, file);
         }
         Ok(file)
+    }
+
+    /// Says that this version is being drawn. Its event wakes no other invocation any more.
+    pub(crate) async fn take_version(
+        &self,
+        animation: &Animation,
+        name: &ScriptName,
+        version: &ETag,
+    ) -> Result<()> {
+        let tag = Tag { version: version.clone(), pixels: self.policy.pixels };
+        let key = animation.receipt(&Receipt::Taken { name: name.clone(), tag });
+        self.put_receipt(&key, Bytes::new(), "text/plain").await.map(drop)
     }
 
     async fn put_set(
@@ -313,13 +360,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             return Ok(false);
         }
         let (scripts, _) = self.list_scripts(animation, &[]).await?;
+        let changed = scripts.files.get(&file).map(|found| found.modified);
         for script in &scripts.found {
-            if sets.current(&script.name, &script.version, &scripts.files).is_some() {
-                continue;
-            }
-            let expected = sets.expected(&script.name, &script.version, &file, &scripts.files);
+            let expected = match sets.current(&script.name, &script.version, &scripts.files) {
+                Some(version) if is_drawn(&receipts, &script.name, version, changed) => None,
+                // Whoever put the set has found other files after that.
+                Some(version) => Some(version.clone()),
+                None => sets.expected(&script.name, &script.version, &file, &scripts.files),
+            };
             if let Some(version) = expected {
-                let changed = scripts.files.get(&file).map(|found| found.modified);
                 self.wake_script(animation, &script.name, version, changed).await?;
             }
         }

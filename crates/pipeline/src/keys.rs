@@ -208,6 +208,8 @@ pub enum Receipt {
     },
     /// `<name>@<tag>.files-<i>-of-<n>-<entries>`: the files that this version of the script is drawn from.
     Files { name: ScriptName, tag: Tag, list: FileList },
+    /// `<name>@<tag>.taken`: an invocation draws this version, whose files were current after its set was put.
+    Taken { name: ScriptName, tag: Tag },
     /// `<name>@<tag>.waits.json`: the frame cannot be drawn before files come that the script names.
     Waits { name: ScriptName, tag: Tag },
     /// `@<generation>.error.json`: this set of frames gives no GIF.
@@ -459,6 +461,7 @@ impl Receipt {
             | Receipt::Band { name, tag, .. }
             | Receipt::Split { name, tag, .. }
             | Receipt::Files { name, tag, .. }
+            | Receipt::Taken { name, tag }
             | Receipt::Waits { name, tag } => Some((name, &tag.version)),
             Receipt::Refusal { .. } => None,
         }
@@ -564,6 +567,7 @@ fn receipt_of_kind(name: ScriptName, tag: Tag, part: Part, kind: &str) -> Option
     Some(match kind {
         "png" => Receipt::Frame { name, tag, part },
         "error.json" => Receipt::Fault { name, tag, part },
+        "taken" => part.is_none().then_some(Receipt::Taken { name, tag })?,
         "waits.json" => part.is_none().then_some(Receipt::Waits { name, tag })?,
         _ if kind.starts_with("files-") => {
             part.is_none().then_some(Receipt::Files { name, tag, list: FileList::parse(kind)? })?
@@ -675,6 +679,7 @@ impl fmt::Display for Receipt {
                 write!(f, "{name}@{tag}/{number}.{band}.band")
             }
             Receipt::Files { name, tag, list } => write!(f, "{name}@{tag}.{list}"),
+            Receipt::Taken { name, tag } => write!(f, "{name}@{tag}.taken"),
             Receipt::Waits { name, tag } => write!(f, "{name}@{tag}.waits.json"),
             Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
         }

@@ -279,6 +279,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             | Receipt::Band { part, .. } => part.is_some(),
             Receipt::Split { .. }
             | Receipt::Files { .. }
+            | Receipt::Taken { .. }
             | Receipt::Waits { .. }
             | Receipt::Refusal { .. } => false,
         }));

@@ -208,6 +208,7 @@ fn resolve(results: &Results) -> BTreeMap<(&ScriptName, &ETag), Resolution<'_>> 
             | Receipt::Cut { .. }
             | Receipt::Band { .. }
             | Receipt::Files { .. }
+            | Receipt::Taken { .. }
             | Receipt::Refusal { .. } => {}
         }
     }

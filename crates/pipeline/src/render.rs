@@ -403,6 +403,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             None => {
                 let receipts = self.receipts_of_all_versions(animation, name, &etag).await?;
                 let agreed = self.agreed_version(animation, name, &etag, &receipts).await?;
+                let (agreed, since) = agreed.unzip();
+                script.uploaded = script.uploaded.max(since.unwrap_or_default());
                 (receipts, agreed)
             }
         };
@@ -412,10 +414,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             script.version = version;
             return Ok((script, of_agreed));
         }
-        let (read, files) =
-            self.read_files(renderer, animation, name, &etag, &script.body, agreed.as_ref()).await?;
+        let (read, files) = self
+            .read_files(renderer, animation, name, &etag, &script.body, (agreed.as_ref(), only.is_some()))
+            .await?;
         (script.version, script.files) = (read, files);
         receipts = of_version(receipts, &script.version);
+        if only.is_none() && script.version.has_files() && version_result(&receipts, *part).is_none() {
+            self.take_version(animation, name, &script.version).await?;
+        }
         Ok((script, receipts))
     }
 

@@ -90,7 +90,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     }
                     continue;
                 }
-                Receipt::Split { .. } | Receipt::Files { .. } | Receipt::Waits { .. } => continue,
+                Receipt::Split { .. }
+                | Receipt::Files { .. }
+                | Receipt::Taken { .. }
+                | Receipt::Waits { .. } => continue,
             };
             if named.contains(&(name, &tag.version, part)) {
                 doomed.push(animation.receipt(&found.receipt));

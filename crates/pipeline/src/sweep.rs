@@ -513,6 +513,7 @@ fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
                 | Receipt::Band { name, tag, part: None, .. }
                 | Receipt::Split { name, tag, .. }
                 | Receipt::Files { name, tag, .. }
+                | Receipt::Taken { name, tag }
                 | Receipt::Waits { name, tag },
             ..
         } => Some((name, &tag.version)),

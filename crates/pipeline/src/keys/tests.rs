@@ -41,6 +41,7 @@ fn every_kind_of_key_reads_back() {
         Key::Wake { animation: a(), name: name.clone(), tag: t() },
     );
     for (text, receipt) in [
+        ("00 1@x@d41d8cd9-2-p3.taken", Receipt::Taken { name: name.clone(), tag: t() }),
         ("00 1@x@d41d8cd9-2-p3.waits.json", Receipt::Waits { name: name.clone(), tag: t() }),
         ("00 1@x@d41d8cd9-2-p3.png", Receipt::Frame { name: name.clone(), tag: t(), part: None }),
         ("00 1@x@d41d8cd9-2-p3/12.png", Receipt::Frame { name: name.clone(), tag: t(), part: Some(number) }),
