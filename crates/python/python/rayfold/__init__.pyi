@@ -703,6 +703,47 @@ class Scene:
         ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
+    def text(
+        self,
+        text: str,
+        size: FixedNumber,
+        depth: FixedNumber,
+        material: Material | str | None = None,
+        align: Literal["left", "centre", "right"] | None = None,
+        font: str | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+        own: bool | None = None,
+    ) -> None:
+        """Letters cut out of a plate.
+
+        In a script: `Text "TEXT" SIZE DEPTH [M] [left or centre or right] [font "FILE"]`.
+
+        Parameters
+        ----------
+        text : str
+            the words; a line feed begins a line.
+        size : FixedNumber
+            the size of the letters (`SIZE`): length in world units, greater than 0.
+        depth : FixedNumber
+            the depth of the letters (`DEPTH`): length in world units, at least 0.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By default .8 grey.
+        align : Literal["left", "centre", "right"], optional
+            the end of the lines that is at x = 0: they begin there, have their middles there or end there; by default "left".
+        font : str, optional
+            the name of a TrueType or OpenType file, as that of a model; by default Noto Sans Bold, which comes with rayfold.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own
+            the clauses of a material, as those of `Material`.
+        """
     def material(
         self,
         name: str,
