@@ -8,7 +8,7 @@ use std::fmt::Write;
 use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::assets::{Library, MemoryFiles};
-use rayfold_scene::{Limits, Scene, parse_with_files};
+use rayfold_scene::{Limits, Object, Scene, parse_with_files};
 use rayfold_tracer::probe::nearest_hits;
 use rayfold_tracer::{RenderOptions, reference, render};
 
@@ -167,6 +167,39 @@ fn the_packets_draw_meshes_like_the_reference() {
                 "{tone}Group g\n{mesh}\nEnd\nUse g .3 .1 -.4 10 20 30 .8\nUse g -1.2 .2 0 0 40 0 .5"
             ));
         }
+    }
+}
+
+#[test]
+fn the_packets_draw_letters_like_the_reference() {
+    for text in [
+        "Text \"B&\" 1.2 .4",
+        "Text \"8\\ng\" 1 .3 red centre",
+        "Text \"O\" 1.5 .5 chrome centre",
+        "Text \"S\" 1.5 .5 glassy centre",
+        "Text \"R\" 1.5 0 glassy right",
+        "Text \"Q\" 1.5 .2 checks",
+        "Text \"a\" 2 .2 own centre",
+    ] {
+        compare(text);
+        compare(&format!("Tone srgb\nGroup g\n{text}\nEnd\nUse g .3 .1 -.4 10 20 30 .8"));
+    }
+}
+
+#[test]
+fn a_letter_that_is_a_box_is_drawn_as_one() {
+    // The letter I of the font is a rectangle.
+    let letter = scene("Text \"I\" 2.4 .5 centre");
+    let [low, high] = letter.objects.iter().find(|o| matches!(o, Object::Mesh(_))).unwrap().bounds().unwrap();
+    let [low, high] = [low, high].map(|p| format!("{} {} {}", p.x, p.y, p.z));
+    for (material, most) in [("red", 0.01), ("chrome", 0.01), ("glassy", 0.02), ("checks", 0.01)] {
+        let used =
+            |inner: &str| drawn(&scene(&format!("Group g\n{inner}\nEnd\nUse g .3 -.7 .4 10 25 15 .8")));
+        let text = used(&format!("Text \"I\" 2.4 .5 {material} centre"));
+        let cuboid = used(&format!("Box {low} {high} {material}"));
+        let off = difference(&text, &cuboid);
+        assert!(off < most, "{material}: {off} levels");
+        assert!(difference(&text, &used("")) > 1.0, "{material}: it is seen");
     }
 }
 

@@ -45,6 +45,14 @@ pub enum AssetError {
         /// The description of the fault.
         what: String,
     },
+    /// The content of the file is no font that can be used.
+    #[error("`{name}`: {what}")]
+    NoFont {
+        /// The name of the file.
+        name: String,
+        /// The description of the fault.
+        what: String,
+    },
     /// The content of a picture is faulty, or not read.
     #[error("`{name}`: {what}")]
     Picture {
@@ -102,6 +110,7 @@ impl AssetError {
             Self::Malformed { .. } | Self::NoTriangle { .. } => {
                 "models are OBJ, PLY, STL, glTF (.gltf) and binary glTF (.glb)".into()
             }
+            Self::NoFont { .. } => "fonts are TrueType and OpenType (.ttf, .otf, .ttc)".into(),
             _ => return None,
         })
     }
@@ -125,6 +134,10 @@ impl Fault {
 
     pub(crate) fn at(line: usize, what: impl Into<String>) -> Self {
         Self { line: Some(line), what: what.into() }
+    }
+
+    pub(crate) fn of_font(self, name: &str) -> AssetError {
+        AssetError::NoFont { name: name.into(), what: self.what }
     }
 
     pub(crate) fn of(self, name: &str) -> AssetError {

@@ -1,7 +1,8 @@
-//! The files that scripts name, from bytes to models and pictures.
+//! The files that scripts name, from bytes to models and pictures, and letters.
 //!
 //! Knows no other crate of the project and does no I/O. A caller implements [`Files`], which hands over files as bytes by
-//! name, and asks a [`Library`] for models and pictures. The content decides what a file is, not its name.
+//! name, and asks a [`Library`] for models and pictures, and for letters cut out of a plate. The content decides what a file is,
+//! not its name.
 //!
 //! Invariants: what a file claims about its size is compared with its bytes and with [`limits`] before memory is spent.
 //! Numbers of a [`Model`] and a [`Picture`] are finite, and indices in range. Foreign bytes never cause a panic.
@@ -21,6 +22,7 @@ mod decode;
 mod error;
 mod files;
 mod gltf;
+mod letters;
 mod library;
 pub mod limits;
 mod model;
@@ -36,6 +38,7 @@ pub use closure::Closure;
 pub use decode::decode;
 pub use error::AssetError;
 pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, same_but_for_case};
+pub use letters::{Align, LetterError, Lettering};
 pub use library::{Library, Purpose};
 pub use model::{Colors, Look, Model, Smoothing};
 pub use picture::Picture;

@@ -1,4 +1,4 @@
-//! Models and pictures by name, each read and decoded once.
+//! Models and pictures by name, and letters by their words, each made once.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,16 +6,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::decode::decode;
 use crate::error::AssetError;
 use crate::files::{FileInfo, Files, NoFiles};
+use crate::letters::{Font, LetterError, Lettering, cut};
 use crate::limits;
 use crate::model::{Model, Smoothing};
 use crate::picture::{self, Picture};
 use crate::referred::{Referred, absent, content};
 
-/// The models and pictures of a folder. One is decoded again only if its files have changed.
+/// The models and pictures of a folder, and letters. One is made again only if its files have changed.
 pub struct Library {
     files: Box<dyn Files>,
     kept: Mutex<Vec<Kept>>,
     pictures: Mutex<Vec<KeptPicture>>,
+    letters: Mutex<Letters>,
 }
 
 /// The use of a picture.
@@ -33,6 +35,25 @@ struct KeptPicture {
     info: FileInfo,
     picture: Arc<Picture>,
 }
+
+/// Letters that were made, and their fonts.
+#[derive(Default)]
+struct Letters {
+    kept: Vec<KeptLetters>,
+    /// Fonts, the latest last, by the names and states of their files.
+    fonts: Vec<(Option<(String, FileInfo)>, Font)>,
+}
+
+/// A model of letters, and the state of their font's file; `None` as the model if no letter has an outline.
+struct KeptLetters {
+    lettering: Lettering,
+    info: Option<FileInfo>,
+    model: Option<Arc<Model>>,
+}
+
+/// The most fonts that are kept, and models of letters.
+const FONTS: usize = 4;
+const LETTERINGS: usize = 1024;
 
 /// A decoded model, and the files that it was made of.
 struct Kept {
@@ -53,7 +74,12 @@ struct Source {
 impl Library {
     /// Makes the library of some files.
     pub fn new(files: impl Files + 'static) -> Self {
-        Self { files: Box::new(files), kept: Mutex::default(), pictures: Mutex::default() }
+        Self {
+            files: Box::new(files),
+            kept: Mutex::default(),
+            pictures: Mutex::default(),
+            letters: Mutex::default(),
+        }
     }
 
     /// Makes a library for callers that read no files: every model and picture is an error that says so.
@@ -130,6 +156,48 @@ impl Library {
         Ok(picture)
     }
 
+    /// Returns letters cut out of a plate, or `None` if none has an outline.
+    ///
+    /// # Errors
+    /// If a letter cannot be drawn, or there is no such font.
+    pub fn letters(&self, lettering: &Lettering) -> Result<Option<Arc<Model>>, LetterError> {
+        let info = match &lettering.font {
+            None => None,
+            Some(name) if !self.files.are_readable() => {
+                return Err(AssetError::NotHere { name: name.clone() }.into());
+            }
+            Some(name) => Some(self.look(name)?.ok_or_else(|| absent(&*self.files, name))?),
+        };
+        let mut letters = self.letters.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = letters.kept.iter().find(|kept| kept.lettering == *lettering && kept.info == info);
+        if let Some(known) = known {
+            return Ok(known.model.clone());
+        }
+        let font = self.font(&mut letters, lettering.font.as_deref().zip(info))?;
+        let model = cut(lettering, &font)?.map(Arc::new);
+        letters.kept.push(KeptLetters { lettering: lettering.clone(), info, model: model.clone() });
+        forget_unused_letters(&mut letters.kept);
+        Ok(model)
+    }
+
+    fn font(&self, letters: &mut Letters, file: Option<(&str, FileInfo)>) -> Result<Font, AssetError> {
+        let key = file.map(|(name, info)| (name.to_string(), info));
+        if let Some((_, font)) = letters.fonts.iter().find(|(of, _)| *of == key) {
+            return Ok(font.clone());
+        }
+        let font = match file {
+            None => Font::built_in(),
+            Some((name, _)) => {
+                Font::read(content(&*self.files, name)?).map_err(|fault| fault.of_font(name))?
+            }
+        };
+        if letters.fonts.len() >= FONTS {
+            letters.fonts.remove(0);
+        }
+        letters.fonts.push((key, font.clone()));
+        Ok(font)
+    }
+
     /// Returns the names of the files that a model was made of, or lacks, with their paths in it: after itself those that it
     /// refers to. There are none for a model that was not asked for, or is faulty.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
@@ -200,6 +268,20 @@ fn forget_unused(kept: &mut Vec<impl Keepable>) {
         let is_dropped = bytes > limits::KEPT_BYTES && !kept.is_used();
         if is_dropped {
             bytes -= kept.bytes();
+        }
+        !is_dropped
+    });
+}
+
+/// Drops the oldest letters, until the others are within the bounds. Those that a script uses stay in its memory.
+fn forget_unused_letters(kept: &mut Vec<KeptLetters>) {
+    let bytes_of = |kept: &KeptLetters| kept.model.as_ref().map_or(0, |model| model.bytes());
+    let (mut bytes, mut count) = (kept.iter().map(bytes_of).sum::<usize>(), kept.len());
+    kept.retain(|kept| {
+        let is_dropped = bytes > limits::KEPT_BYTES / 2 || count > LETTERINGS;
+        if is_dropped {
+            bytes -= bytes_of(kept);
+            count -= 1;
         }
         !is_dropped
     });

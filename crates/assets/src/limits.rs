@@ -15,6 +15,9 @@ pub(crate) const VERTICES: usize = 3 * TRIANGLES;
 /// The pixels of a picture.
 pub const PIXELS: u64 = 1 << 26;
 
+/// The code points of a text, ends of lines counted.
+pub const CODE_POINTS: usize = 10_000;
+
 /// The bytes of decoded models, and those of pictures, that a [`Library`](crate::Library) keeps although no script uses them.
 pub(crate) const KEPT_BYTES: usize = 512 << 20;
 

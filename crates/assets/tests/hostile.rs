@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use exr::prelude::{Compression, Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
 use proptest::prelude::*;
-use rayfold_assets::{Library, MemoryFiles, Purpose, Smoothing};
+use rayfold_assets::{Align, LetterError, Lettering, Library, MemoryFiles, Purpose, Smoothing};
 
 fn error(bytes: impl Into<Vec<u8>>) -> String {
     let library = Library::new(MemoryFiles::from([("x", bytes.into())]));
@@ -229,6 +229,58 @@ proptest! {
         attempt_picture(&bytes);
         bytes.truncate((cut * bytes.len() as f64) as usize);
         attempt_picture(&bytes);
+    }
+}
+
+/// Cuts letters with a font. Returns the error, if there is one.
+fn letters(font: &[u8]) -> Option<LetterError> {
+    let library = Library::new(MemoryFiles::from([("f", font.to_vec())]));
+    let font = Some("f".to_string());
+    let lettering =
+        Lettering { text: "AVfi\u{e9}%\n8".into(), size: 1.0, depth: 0.1, align: Align::Center, font };
+    let model = library.letters(&lettering);
+    if let Ok(Some(model)) = &model {
+        let _ = model.closure();
+        assert!((0..model.triangle_count()).all(|k| model.corners(k).iter().all(|p| p.is_finite())));
+    }
+    model.err()
+}
+
+#[test]
+fn fonts_that_are_none_are_errors() {
+    let said = |bytes: &[u8]| letters(bytes).unwrap().to_string();
+    let font = dejavu::sans::bold();
+    assert!(said(b"").contains("no font"));
+    assert!(said(b"wOF2 and more").contains("WOFF is not read"));
+    assert!(said(b"%!PS-AdobeFont-1.0: Some").contains("no font"));
+    assert!(said(PLY).contains("no font"));
+    for length in [4, 12, 100, 1000] {
+        said(&font[..length]);
+    }
+    // Every table at 0.
+    let mut mad = font.to_vec();
+    let tables = usize::from(u16::from_be_bytes([mad[4], mad[5]]));
+    (0..tables).for_each(|k| mad[12 + 16 * k + 8..][..8].fill(0));
+    said(&mad);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn changed_fonts_do_no_harm(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..60),
+        // Most are in the tables before the outlines.
+        within in prop::sample::select(vec![2_000, 40_000, notosans::BOLD_TTF.len()]),
+        cut in 0.0..2.0f64,
+    ) {
+        let mut bytes = notosans::BOLD_TTF.to_vec();
+        for (at, byte) in changes {
+            let at = at.index(within);
+            bytes[at] = byte;
+        }
+        bytes.truncate((cut * bytes.len() as f64) as usize);
+        letters(&bytes);
     }
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use rayfold_scene::{Clause, Curve, Field, Form, Kind, Mode, Names, Quotes, Subject, Unit, Values};
 
-use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, is_color};
+use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, aligns, is_color};
 
 /// The parts of the stub that are written by hand, with lines in place of what the table gives.
 const TEMPLATE: &str = include_str!("stub.pyi");
@@ -59,9 +59,27 @@ pub(crate) fn method_doc(method: &Signature) -> String {
             Role::Name(Subject::Quotes(Quotes::File)) => {
                 "the name of a file in the script's folder; of a scene that has none, in the current folder".to_owned()
             }
+            Role::Name(Subject::Quotes(Quotes::Words)) => {
+                "the words; a line feed begins a line".to_owned()
+            }
+            Role::Align => {
+                "the end of the lines that is at x = 0: they begin there, have their middles there or end there; by default \
+                 \"left\""
+                    .to_owned()
+            }
+            Role::Font => {
+                "the name of a TrueType or OpenType file, as that of a model; by default Noto Sans Bold, which comes with \
+                 rayfold"
+                    .to_owned()
+            }
             Role::Smooth => "faces that meet at less than this angle in degrees, 0 to 180, look smooth".to_owned(),
             Role::Flat => "whether the normals of the file are left out".to_owned(),
             Role::Field(i) => field_doc(&form.fields[i]),
+            Role::Material(_) if form.subject == Some(Subject::Quotes(Quotes::Words)) => {
+                "the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By \
+                 default .8 grey"
+                    .to_owned()
+            }
             Role::Material(_) if form.takes(0) => {
                 "the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By \
                  default that of the file"
@@ -192,14 +210,18 @@ fn write_method(text: &mut String, method: &Signature) {
 fn parameter_type(form: &Form, parameter: &Parameter) -> String {
     match parameter.role {
         Role::Name(_) => "str".to_owned(),
-        Role::Field(i) => field_type(form, &form.fields[i]),
+        Role::Field(i) => field_type(form, i),
         Role::Material(_) => "Material | str".to_owned(),
         Role::Smooth => "FixedNumber".to_owned(),
         Role::Flat => "bool".to_owned(),
+        Role::Align => format!("Literal[{}]", quoted(aligns(form).iter().copied())),
+        Role::Font => "str".to_owned(),
     }
 }
 
-fn field_type(form: &Form, field: &Field) -> String {
+fn field_type(form: &Form, place: usize) -> String {
+    let field = &form.fields[place];
+    let first = form.fields[..place].iter().map(|field| field.names.len()).sum();
     match field.values {
         Values::OneOf(words) => return format!("Literal[{}]", quoted(words.iter().copied())),
         Values::Whole(..) => return "int".to_owned(),
@@ -210,7 +232,7 @@ fn field_type(form: &Form, field: &Field) -> String {
         (1, _) => "Number",
         _ => "Vector",
     };
-    if form.curves { name.to_owned() } else { format!("Fixed{name}") }
+    if form.takes_curve(first) { name.to_owned() } else { format!("Fixed{name}") }
 }
 
 /// Returns the type of a clause's value.
@@ -222,7 +244,7 @@ fn keyword_type(keyword: &Keyword) -> String {
             "tuple[str, Literal[\"uv\", \"ball\"]] | {flat}] | {flat}, Literal[\"xy\", \"xz\", \"zy\"]]"
         );
     }
-    let mut types: Vec<String> = form.fields.iter().map(|field| field_type(form, field)).collect();
+    let mut types: Vec<String> = (0..form.fields.len()).map(|i| field_type(form, i)).collect();
     types.extend(form.ends_with.map(|_| "Material | str".to_owned()));
     match types.as_slice() {
         [] => "bool".to_owned(),

@@ -39,7 +39,11 @@ fn methods() -> Vec<Method> {
         let numbers = match parameter.role {
             signature::Role::Field(i) => method.command.form().fields[i].names.len(),
             signature::Role::Smooth => 1,
-            signature::Role::Name(_) | signature::Role::Material(_) | signature::Role::Flat => 0,
+            signature::Role::Name(_)
+            | signature::Role::Material(_)
+            | signature::Role::Flat
+            | signature::Role::Align
+            | signature::Role::Font => 0,
         };
         (parameter.name.clone(), parameter.is_required, numbers)
     };

@@ -15,7 +15,7 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use rayfold_files::library_beside;
 use rayfold_scene::assets::file_name;
 use rayfold_scene::{
-    Command, Diagnostic as SceneDiagnostic, Limits, Names, Quotes, Script as Parsed, Subject,
+    Command, Diagnostic as SceneDiagnostic, Form, Limits, Names, Quotes, Script as Parsed, Subject,
     parse_with_files, quoted_word,
 };
 
@@ -24,7 +24,7 @@ use crate::material::{
     Given as Clause, Material, Materials, clause_of, name_from, surface_of, surface_of_color,
 };
 use crate::place::{Place, flag_of, quoted, shown};
-use crate::signature::{METHODS, Role, Signature};
+use crate::signature::{METHODS, Role, Signature, aligns};
 use crate::value::{Numbers, check_alone, refused, write_number};
 
 /// The name of a script that has none.
@@ -204,7 +204,12 @@ impl Script {
                     }
                     (false, _) => {}
                 },
-                (Role::Name(_) | Role::Smooth | Role::Flat, _) => {}
+                (Role::Align, Some(value)) => options += &align(value, form, place)?,
+                (Role::Font, Some(value)) => {
+                    let file = self.name_of(Subject::Quotes(Quotes::File), value, place)?;
+                    options += &format!(" font {file}");
+                }
+                (Role::Name(_) | Role::Smooth | Role::Flat | Role::Align | Role::Font, _) => {}
             }
         }
         let names =
@@ -214,7 +219,7 @@ impl Script {
         } else if let Some(fault) = method.command.check(numbers.values()).into_iter().next() {
             return Err(refused(&method.method, form, &names().collect::<Vec<_>>(), numbers.values(), fault));
         }
-        let is_bare = form.takes(0) && given.clauses.is_empty();
+        let is_bare = form.is_bare(numbers.values().len()) && given.clauses.is_empty();
         if let Some(value) = surface.filter(|value| !is_bare || value.is_some()) {
             line.push(' ');
             self.material_of(method, value.as_ref(), given.clauses, &mut line)?;
@@ -235,6 +240,17 @@ impl Script {
                 .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
             file_name(&name).map_err(|fault| PyValueError::new_err(format!("{place}: {fault}")))?;
             return Ok(quoted_word(&name));
+        }
+        if matches!(kind, Subject::Quotes(Quotes::Words)) {
+            let words = value
+                .extract::<String>()
+                .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
+            let control = words.chars().find(|c| c.is_control() && *c != '\n');
+            if let Some(control) = control {
+                let message = format!("{place} has the control character U+{:04X}", u32::from(control));
+                return Err(PyValueError::new_err(message));
+            }
+            return Ok(quoted_word(&words));
         }
         let name = name_from(value, place)?;
         let (is_known, noun) = match kind {
@@ -538,6 +554,19 @@ fn smooth(angle: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
     let mut words = " smooth ".to_owned();
     write_number(&mut words, degrees);
     Ok(words)
+}
+
+/// Returns the word for the place of the lines of a text, which is one of those that the command takes before `font`.
+///
+/// # Errors
+/// Fails for another word.
+fn align(value: &Bound<'_, PyAny>, form: &Form, place: Place<'_>) -> PyResult<String> {
+    let words = aligns(form);
+    let word = value.extract::<String>().ok().filter(|word| words.contains(&word.as_str()));
+    let word = word.ok_or_else(|| {
+        PyValueError::new_err(format!("{place} is one of {}, not {}", words.join(", "), shown(value)))
+    })?;
+    Ok(format!(" {word}"))
 }
 
 /// Returns whether a word is the only argument.

@@ -50,6 +50,10 @@ pub(crate) enum Role {
     Smooth,
     /// Whether a mesh is flat.
     Flat,
+    /// The place of the lines of a text.
+    Align,
+    /// The file of the font of a text.
+    Font,
 }
 
 /// All methods, in the order of the documentation.
@@ -68,6 +72,7 @@ impl Signature {
             let is_required = true;
             let name = match subject {
                 Subject::Quotes(Quotes::File) => "file",
+                Subject::Quotes(Quotes::Words) => "text",
                 Subject::Defines(_) | Subject::Refers(_) => "name",
             };
             parameters.push(Parameter { name: name.to_owned(), role: Role::Name(subject), is_required });
@@ -81,9 +86,11 @@ impl Signature {
             let (name, role) = ("material".to_owned(), Role::Material(own));
             parameters.push(Parameter { name, role, is_required: false });
         }
-        if command == Command::Mesh {
-            let option = |name: &str, role| Parameter { name: name.to_owned(), role, is_required: false };
-            parameters.extend([option("smooth", Role::Smooth), option("flat", Role::Flat)]);
+        let option = |name: &str, role| Parameter { name: name.to_owned(), role, is_required: false };
+        match command {
+            Command::Mesh => parameters.extend([option("smooth", Role::Smooth), option("flat", Role::Flat)]),
+            Command::Text => parameters.extend([option("align", Role::Align), option("font", Role::Font)]),
+            _ => {}
         }
         // Two commands are named `Sky`.
         let method = match command {
@@ -200,6 +207,11 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::LastFrame => "b",
         _ => return None,
     })
+}
+
+/// Returns the words for the place of the lines of a text: those that stand alone behind its surface.
+pub(crate) fn aligns(form: &Form) -> &'static [&'static str] {
+    form.options.split_last().map_or(&[], |(_font, words)| words)
 }
 
 /// Returns the table's words for a parameter, without the article and the letter behind it.

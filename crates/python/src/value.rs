@@ -194,7 +194,7 @@ impl Numbers {
                 write_number(text, value);
                 self.push(value);
             }
-            Number::Moving(curve) if form.curves => {
+            Number::Moving(curve) if form.takes_curve(self.count) => {
                 let _ = write!(text, "{curve}");
                 self.push(curve.keys()[0].value);
                 self.moves = true;
@@ -337,7 +337,7 @@ pub(crate) fn check_alone(method: &str, form: &Form, names: &[&str], values: &[f
 
 fn wrong_kind(value: &Bound<'_, PyAny>, field: &Field, form: &Form, place: Place<'_>) -> PyErr {
     let expected = match field.names.len() {
-        1 if form.curves => "a number or a curve".to_owned(),
+        1 if form.curves && form.options.is_empty() => "a number or a curve".to_owned(),
         1 => "a number".to_owned(),
         3 if is_color(field) => "three numbers, a number, or a colour such as \"#c04020\"".to_owned(),
         count => format!("{count} numbers"),

@@ -15,7 +15,7 @@ CLAUSES = dict(_rayfold.clauses())
 
 def usage(doc):
     """The names of the numbers in the syntax that a docstring shows."""
-    syntax = re.search(r"In a script: `(.*?)( or \w+)?`", doc)[1].replace(" or flat]", "]")
+    syntax = re.search(r"In a script: `(.*?)( or \w+)?`", doc)[1].replace(" or flat]", "]").replace(" or centre or right]", "]")
     return syntax.replace("[", "").replace("]", "").split()
 
 
@@ -76,7 +76,8 @@ def test_every_command_is_reached_with_all_its_parameters(name, tmp_path, monkey
         except ValueError as error:
             refused.append(str(error))
             continue
-        errors = [d for d in scene.check() if d.severity == "error"]
+        # The file is a model, and no font.
+        errors = [d for d in scene.check() if d.severity == "error" and "no font" not in d.message]
         if not errors:
             break
         refused.extend(map(str, errors))

@@ -10,7 +10,8 @@ use crate::form::{Form, Names, Numbers, Scripted, Subject};
 use crate::model::{
     Background, Camera, Clause, Depth, DirectionalLight, Faults, Fog, FrameNumbers, Indirect, InvalidValue,
     Lamp, Lens, Light, Look, MATERIAL, MESH, Material, ORTHOCAMERA, Object, Pinhole, Placement, Samples,
-    Screen, Shutter, SkyColors, SkyTurn, Tone, USE, mesh_surface, shapes, with_shapes,
+    Screen, Shutter, SkyColors, SkyTurn, TEXT, Tone, USE, letter_plate, letter_surface, mesh_surface, shapes,
+    with_shapes,
 };
 
 /// The effect of a command.
@@ -47,6 +48,8 @@ pub(crate) enum Effect {
     Object(Reader<Object>),
     /// Draws a model of a file.
     Mesh,
+    /// Draws letters.
+    Text,
     Light(Reader<Light>),
     /// Removes objects and lights.
     Clear,
@@ -131,6 +134,7 @@ with_shapes! { commands! {
     }
     after {
         Mesh: MESH, Effect::Mesh, "The triangles of a model in a file.";
+        Text: TEXT, Effect::Text, "Letters cut out of a plate.";
         Material: MATERIAL, Effect::Material, "A surface material with a name.";
         Group: group("Group"), Effect::Group, "Names the objects up to its `End`.";
         End: Form::new("End", &[]), Effect::End, "Ends a group.";
@@ -256,6 +260,7 @@ impl Command {
             // Without numbers it has the surface of its file.
             Effect::Mesh if numbers.is_word() => None,
             Effect::Mesh => mesh_surface(numbers).err(),
+            Effect::Text => letter_faults(numbers),
             Effect::Material | Effect::Group | Effect::End | Effect::Clear | Effect::Trace => None,
         }
     }
@@ -285,6 +290,17 @@ fn names_file(word: &str) -> bool {
         ["png", "jpg", "jpeg", "webp", "hdr", "exr"].iter().any(|known| known.eq_ignore_ascii_case(end))
     };
     word.starts_with('"') || word.rsplit_once('.').is_some_and(|(_, end)| is_picture(end))
+}
+
+/// Returns the errors in the numbers of a text.
+fn letter_faults(numbers: &mut Numbers<'_>) -> Option<Faults> {
+    let plate = letter_plate(&mut numbers.clone()).err();
+    // Without further numbers it has the colour .8.
+    let surface = if numbers.count() > 2 { letter_surface(numbers).err() } else { None };
+    match (plate, surface) {
+        (Some(plate), Some(surface)) => Some(Faults(plate.0.into_iter().chain(surface.0).collect())),
+        (plate, surface) => plate.or(surface),
+    }
 }
 
 #[cfg(test)]

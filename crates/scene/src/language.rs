@@ -42,8 +42,8 @@ pub struct CommandEntry {
     pub usage: String,
     /// A one-line summary.
     pub about: &'static str,
-    /// The name before the numbers: its role (`defines`, `refers` or `quotes`) and its kind (`material`, `group` or
-    /// `file`).
+    /// The name before the numbers: its role (`defines`, `refers` or `quotes`) and its kind (`material`, `group`,
+    /// `file` or `words`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<SubjectEntry>,
     /// The numbers, parameter by parameter.
@@ -69,7 +69,7 @@ pub struct CommandEntry {
 pub struct SubjectEntry {
     /// The role, `defines`, `refers` or `quotes`: a word in quotes.
     pub role: &'static str,
-    /// The kind, `material`, `group` or `file`.
+    /// The kind, `material`, `group`, `file` or `words`.
     pub of: &'static str,
 }
 
@@ -109,6 +109,9 @@ pub struct ParameterEntry {
     /// The default of an omitted parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
+    /// Whether the parameter is never a curve, in a command whose other parameters may be.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub fixed: bool,
 }
 
 /// A word with which a curve may start.
@@ -140,13 +143,14 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
         Subject::Defines(names) => SubjectEntry { role: "defines", of: names.noun() },
         Subject::Refers(names) => SubjectEntry { role: "refers", of: names.noun() },
         Subject::Quotes(Quotes::File) => SubjectEntry { role: "quotes", of: "file" },
+        Subject::Quotes(Quotes::Words) => SubjectEntry { role: "quotes", of: "words" },
     });
     CommandEntry {
         name: form.name,
         usage: form.to_string(),
         about,
         subject,
-        parameters: form.fields.iter().map(|field| parameter(form, field)).collect(),
+        parameters: (0..form.fields.len()).map(|i| parameter(form, i)).collect(),
         together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
@@ -155,10 +159,12 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     }
 }
 
-fn parameter(form: &Form, field: &'static Field) -> ParameterEntry {
+fn parameter(form: &'static Form, place: usize) -> ParameterEntry {
+    let field: &'static Field = &form.fields[place];
+    let first = form.span(place).start;
     let presence = match field.presence {
         // Ambient and diffuse stand or are omitted together.
-        Presence::Required if form.takes(0) => "optional",
+        Presence::Required if form.is_of_optional_surface(first) => "optional",
         Presence::Required => "required",
         Presence::Optional(_) => "optional",
         Presence::FromTheEnd(_) => "from the end",
@@ -189,6 +195,7 @@ fn parameter(form: &Form, field: &'static Field) -> ParameterEntry {
             _ => &[],
         },
         presence,
-        default: field.presence.default().or(form.takes(0).then_some("that of the file")),
+        default: field.presence.default().or_else(|| form.surface_default(field)),
+        fixed: form.curves && !form.takes_curve(first),
     }
 }

@@ -40,8 +40,8 @@ pub use form::{
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
 pub use model::shapes::{
-    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Mesh, Motion, Object, Placement, Plane, Sphere, Torus,
-    Triangle,
+    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Mesh, Motion, Object, Placement, Plane, Source, Sphere,
+    Torus, Triangle,
 };
 pub use model::{
     Axes, Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, Image,
@@ -50,7 +50,7 @@ pub use model::{
 };
 pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;
-pub use parse::{Parsed, is_name, parse, parse_curve, parse_with_files};
+pub use parse::{Parsed, is_name, parse, parse_curve, parse_with_files, unquoted_word};
 pub use rayfold_assets as assets;
 pub use script::{Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};

@@ -30,6 +30,7 @@ fn sample(command: Command) -> &'static str {
         Command::Torus => "Torus 3e300 5e-324 3 4 5 6 7 8 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Capsule => "Capsule 1 2 3 4 5 6 7 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Mesh => "Mesh \"corner.obj\" .1 .2 .3 .4 .5 .6 .7 .8 .9",
+        Command::Text => "Text \"a\" 1 .2 .1 .2 .3 .4 .5 .6 .7 .8 .9",
         Command::Material => "Material red diffuse 1 0 0",
         Command::Group => "Group ball",
         Command::End => "End",
@@ -173,7 +174,8 @@ fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
             let is_taken = count >= least
                 && (count == 0
                     // Ambient and diffuse stand or are omitted together.
-                    || (!form.takes(0) || form.required() <= count) && form.fields.iter().any(|field| {
+                    || form.is_bare(count)
+                    || form.required() <= count && form.fields.iter().any(|field| {
                         let start = end;
                         end += field.names.len();
                         count == end
@@ -183,9 +185,11 @@ fn optional_parameters_may_be_left_out_whole_or_number_by_number() {
             let expect: &[Code] = if is_taken { &[] } else { &[Code::TooFewParameters] };
             assert_eq!(faults, expect, "{count} numbers of {}", command.name());
         }
-        // The surface of a mesh is omitted as a whole.
-        let is_required = |field: &&Field| field.presence == Presence::Required && !form.takes(0);
-        let required: usize = form.fields.iter().filter(is_required).map(|field| field.names.len()).sum();
+        // The surface of a mesh or a text is omitted as a whole.
+        let is_required = |(i, (_, field)): &(usize, (_, &Field))| {
+            field.presence == Presence::Required && !form.is_of_optional_surface(*i)
+        };
+        let required = form.numbers().enumerate().filter(is_required).count();
         assert_eq!(least, required, "{}", command.name());
     }
 }

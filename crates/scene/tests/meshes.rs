@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use rayfold_scene::assets::{Library, MemoryFiles, Smoothing};
-use rayfold_scene::{Limits, Object, Parsed, parse, parse_with_files};
+use rayfold_scene::{Limits, Object, Parsed, Source, parse, parse_with_files};
 
 const CORNER: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n";
 const COLORED: &[u8] = b"mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\n";
@@ -45,7 +45,7 @@ fn a_mesh_has_a_file_and_options() {
         let script = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics));
         let scene = script.frame(0).unwrap();
         let Object::Mesh(mesh) = &scene.objects[0] else { panic!("{line}") };
-        assert_eq!((mesh.file(), mesh.smoothing()), ("corner.obj", smoothing), "{line}");
+        assert_eq!(*mesh.source(), Source::File { name: "corner.obj".into(), smoothing }, "{line}");
         assert_eq!(mesh.has_material(), line.contains("red"));
         assert_eq!(parsed.files, ["corner.obj"]);
     }
@@ -82,7 +82,9 @@ fn numbers_curves_and_colours_are_a_surface_as_of_other_objects() {
     }
     let smooth = parsed("Mesh \"corner.obj\" 0 0 0  1 0 0  smooth 30").script.unwrap().frame(0).unwrap();
     let Object::Mesh(mesh) = &smooth.objects[0] else { panic!("{smooth}") };
-    assert_eq!((mesh.smoothing(), mesh.material().diffuse().x), (Smoothing::Within(30.0), 1.0));
+    let smoothing = Smoothing::Within(30.0);
+    assert_eq!(*mesh.source(), Source::File { name: "corner.obj".into(), smoothing });
+    assert_eq!(mesh.material().diffuse().x, 1.0);
     check(
         "Mesh \"corner.obj\" 1 2 3\nMesh \"corner.obj\" 0 0 0 1 1 99\nMesh \"corner.obj\" #ff8000 smooth 2\nMesh \"corner.obj\" x y",
         &[

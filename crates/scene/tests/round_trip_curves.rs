@@ -118,7 +118,7 @@ fn numbers(form: &Form, draft: &Draft) -> String {
         match (number, field.values) {
             (Number::Constant(x), Values::OneOf(words)) => text += words[fit(*x) as usize],
             (Number::Animated { .. }, Values::OneOf(words)) => text += words[0],
-            (Number::Animated { words, keys }, _) if form.curves => {
+            (Number::Animated { words, keys }, _) if form.takes_curve(i) => {
                 let keys: Vec<_> = keys.iter().map(|(frame, x)| format!("{frame}:{:e}", fit(*x))).collect();
                 text += &format!("({words}{})", keys.join(" "));
             }
@@ -129,18 +129,23 @@ fn numbers(form: &Form, draft: &Draft) -> String {
     text
 }
 
-/// Returns the file that a command names, if it names one.
+/// Returns the word in quotes of a command, if it has one.
 fn file(command: Command) -> &'static str {
     match command {
         Command::Mesh => " \"corner.obj\"",
         Command::SkyPicture => " \"sky.png\"",
+        Command::Text => r#" "i \"1\"\n\\""#,
         _ => "",
     }
 }
 
-/// Returns the words behind the surface of a mesh.
+/// Returns the words behind the surface of a mesh or a text.
 fn options(command: Command, draft: &Draft) -> &'static str {
-    if command == Command::Mesh { ["", " flat", " smooth 40.5"][draft.left_out % 3] } else { "" }
+    match command {
+        Command::Mesh => ["", " flat", " smooth 40.5"][draft.left_out % 3],
+        Command::Text => ["", " centre", " right"][draft.left_out % 3],
+        _ => "",
+    }
 }
 
 /// Makes a script of these lines. Lines that are not allowed in their place are left out.

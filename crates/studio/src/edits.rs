@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use rayfold_scene::{
-    Command, Field, Kind, Object, Parameter, Presence, Values as Range, color_levels, parse_curve,
+    Command, Field, Kind, Object, Parameter, Presence, Quotes, Subject, Values as Range, color_levels,
+    parse_curve, quoted_word,
 };
 
 use crate::document::Splice;
@@ -25,6 +26,9 @@ const COLORS: [[f64; 3]; 6] = [
 
 /// The colour of a new plane, on which those of objects stand out.
 const FLOOR: [f64; 3] = [0.72, 0.7, 0.67];
+
+/// The words of a new text.
+const WORDS: &str = "Text";
 
 /// The number of places that are tried for a new object.
 const PLACES: i32 = 200;
@@ -52,6 +56,9 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     let color = if command == Command::Plane { FLOOR } else { COLORS[count % COLORS.len()] };
     let (mut place, mut length) = (0u8, 0);
     let mut text = command.name().to_owned();
+    if command.form().subject == Some(Subject::Quotes(Quotes::Words)) {
+        text = format!("{text} {}", quoted_word(WORDS));
+    }
     for field in all() {
         let values: Vec<f64> = match field.kind {
             Kind::Position => {

@@ -21,7 +21,7 @@ pub struct Words {
     pub subject: Option<Range<usize>>,
     /// The parameters. A curve in brackets is one, and a colour such as `#ff8000` three with the same span.
     pub parameters: Vec<Range<usize>>,
-    /// The words behind the surface of a mesh, such as `smooth 40`.
+    /// The words behind the surface of a mesh or a text, such as `smooth 40`.
     pub options: Option<Range<usize>>,
     /// The comment, from its sign to the end of the text.
     pub comment: Option<Range<usize>>,
@@ -122,14 +122,10 @@ impl Line {
         let subject = if has_subject { words.next() } else { None };
         let comment = comment.map(|at| at..body.len());
         let mut parameters: Vec<_> = words.collect();
-        let is_option = |word: &Range<usize>| {
-            let word = self.word(word);
-            word.eq_ignore_ascii_case("smooth") || word.eq_ignore_ascii_case("flat")
-        };
+        let form = self.command().map(Command::form);
+        let is_option = |word: &Range<usize>| form.is_some_and(|form| form.is_option(self.word(word)));
         let mut options = None;
-        if self.command() == Some(Command::Mesh)
-            && let Some(first) = parameters.iter().position(is_option)
-        {
+        if let Some(first) = parameters.iter().position(is_option) {
             options = parameters.last().map(|last| parameters[first].start..last.end);
             parameters.truncate(first);
         }
@@ -339,6 +335,18 @@ mod tests {
             assert_eq!(lines.iter().flat_map(|l| l.bytes()).copied().collect::<Vec<_>>(), text.as_bytes());
         }
         assert_eq!(Line::split(b"\xff\xfe\n")[0].bytes(), b"\xff\xfe\n");
+    }
+
+    #[test]
+    fn a_text_keeps_its_words_and_its_options() {
+        let text = line("Text \"a #1, (b) \\\"c\\\" left\" 1 .2 red centre font \"x y.ttf\"  # sign");
+        let words = text.words().unwrap();
+        assert_eq!(text.subject(), Some("\"a #1, (b) \\\"c\\\" left\""));
+        let parameters: Vec<_> = words.parameters.iter().map(|word| text.word(word)).collect();
+        assert_eq!(parameters, ["1", ".2", "red"]);
+        assert_eq!(text.name().as_deref(), Some("sign"));
+        let other = text.with_subject("\"d\"").unwrap().with_words(&[(1, "0".into())]).unwrap();
+        assert_eq!(other.text(), "Text \"d\" 1 0 red centre font \"x y.ttf\"  # sign");
     }
 
     #[test]

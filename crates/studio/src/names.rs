@@ -1,6 +1,6 @@
 //! Names: of materials and groups, which lines refer to, and of objects, which are the comments at the ends of lines.
 
-use rayfold_scene::{Clause, Command};
+use rayfold_scene::{Clause, Command, Quotes, Subject, quoted_word};
 
 use crate::document::Splice;
 use crate::edits::set;
@@ -33,6 +33,15 @@ pub(crate) fn rename(lines: &[Line], at: usize, name: &str) -> Result<Vec<Splice
         Some(set(at, to?))
     });
     Ok(renamed.collect())
+}
+
+/// Sets the words of a text. A line without words stays as it is.
+pub(crate) fn set_words(lines: &[Line], at: usize, text: &str) -> Option<Splice> {
+    let line = lines.get(at)?;
+    let has_words = line.command()?.form().subject == Some(Subject::Quotes(Quotes::Words));
+    // What a text field may hold and a script may not.
+    let text: String = text.chars().filter(|c| !c.is_control() || *c == '\n').collect();
+    has_words.then(|| Some(set(at, line.with_subject(&quoted_word(&text))?)))?
 }
 
 /// Returns a line that refers to a group, or begins it, with its new name.
@@ -80,6 +89,16 @@ mod tests {
             document.apply(splice, None);
         }
         Ok(String::from_utf8(document.bytes()).unwrap())
+    }
+
+    #[test]
+    fn the_words_of_a_text_are_set() {
+        let lines = Line::split(b"Text \"a\" 1 .2 right # sign\nSphere 1  0 0 0  1 1 1  0 0 0\n");
+        let after = |at, text: &str| Some(set_words(&lines, at, text)?.inserted[0].text());
+        let set = after(0, "b \"c\"\n\t\\ #");
+        assert_eq!(set.as_deref(), Some(r##"Text "b \"c\"\n\\ #" 1 .2 right # sign"##));
+        assert_eq!(after(1, "b"), None);
+        assert_eq!(after(7, "b"), None);
     }
 
     #[test]

@@ -84,6 +84,8 @@ pub(crate) enum ClientMessage {
     Paint { at: [f64; 2], material: String, preset: bool },
     /// Add a clause to a material, or remove it.
     Clause { line: usize, clause: String },
+    /// Set the words of a text.
+    Words { line: usize, text: String },
     /// Set a word of a line, which is one of the table's words or a name.
     Word { line: usize, number: usize, word: String },
     /// Make the script's camera one of another kind, with the same view.
@@ -467,6 +469,8 @@ pub(crate) struct Inspected {
     pub(crate) material: Option<String>,
     /// The name before the numbers.
     pub(crate) subject: String,
+    /// The words of a text, without quotes.
+    pub(crate) text: Option<String>,
     /// The parameters of a material, which depend on its clauses.
     pub(crate) fields: Vec<FieldTable>,
 }

@@ -298,6 +298,11 @@ impl Session {
                 }
                 Change::Still
             }
+            ClientMessage::Words { line, text } => {
+                let splice = names::set_words(self.file_lines(project), line, &text);
+                self.edit(project, splice.into_iter().collect(), None, tell);
+                Change::Still
+            }
             ClientMessage::Hide { lines } => {
                 let splices = edits::hide(self.file_lines(project), &lines);
                 self.edit(project, splices, None, tell);

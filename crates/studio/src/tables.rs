@@ -72,6 +72,8 @@ pub(crate) struct FieldTable {
     pub(crate) optional: bool,
     /// The position of its first number among those of the command.
     pub(crate) first: usize,
+    /// Whether it is never a curve, in a command whose other parameters may be.
+    pub(crate) fixed: bool,
 }
 
 /// Returns all commands, in the order of the documentation.
@@ -81,7 +83,12 @@ pub(crate) fn commands() -> Vec<CommandTable> {
         .map(|&command| CommandTable {
             name: title(command),
             role: role(command),
-            fields: fields(command).map(|(first, field)| FieldTable::new(first, field)).collect(),
+            fields: fields(command)
+                .map(|(first, field)| FieldTable {
+                    fixed: command.form().curves && !command.form().takes_curve(first),
+                    ..FieldTable::new(first, field)
+                })
+                .collect(),
         })
         .collect()
 }
@@ -158,6 +165,7 @@ impl FieldTable {
             },
             optional: field.presence != Presence::Required,
             first,
+            fixed: false,
         }
     }
 
@@ -176,6 +184,7 @@ impl FieldTable {
             words: names,
             optional: false,
             first,
+            fixed: false,
         }
     }
 }

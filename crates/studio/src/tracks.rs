@@ -201,6 +201,7 @@ pub(crate) fn toggled(line: &Line, numbers: &[usize], frame: f64) -> Option<Line
     let mut numbers = numbers.to_vec();
     numbers.sort_unstable();
     numbers.dedup();
+    numbers.retain(|at| command == Command::Material || command.form().takes_curve(*at));
     let curves_there = |at: usize| curve(line, &words, at);
     if numbers.is_empty() || !(command.form().curves || command == Command::Material) {
         return None;

@@ -90,8 +90,8 @@ pub(crate) fn curve(line: &Line, words: &Words, at: usize) -> Option<Curve> {
 /// Returns the default of an omitted number.
 fn default(command: Command, at: usize) -> Option<f64> {
     let (_, field) = field_of(command, at)?;
-    // What has no colour in a model's file.
-    if command == Command::Mesh && field.presence == Presence::Required {
+    // What has no colour in a model's file, and letters.
+    if command.form().is_of_optional_surface(at) && field.presence == Presence::Required {
         return Some(if field.parameter == Parameter::Ambient { 0.08 } else { 0.72 });
     }
     field.presence.default()?.parse().ok()
@@ -124,7 +124,7 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
         end = end.max(first + field.names.len());
     }
     // A surface of numbers in place of that of the file is written whole.
-    if count == 0 && command.form().takes(0) && command.form().surface().is_some() {
+    if command.form().is_bare(count) && count < end {
         end = end.max(command.form().required());
     }
     let mut changes = Vec::new();
@@ -137,7 +137,7 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
                     if old != value {
                         // A colour such as `#ff8000` holds no curves.
                         let keying = if line.is_level(&words, at) { Keying::ALWAYS } else { keying };
-                        changes.push((at, begun(command, old, value, keying)));
+                        changes.push((at, begun(command, at, value, old, keying)));
                     }
                 } else {
                     let curve = curve(line, &words, at)?;
@@ -148,18 +148,18 @@ pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> 
             }
             None => {
                 let old = default(command, at).unwrap_or(0.0);
-                changes.push((at, begun(command, old, value.unwrap_or(old), keying)));
+                changes.push((at, begun(command, at, value.unwrap_or(old), old, keying)));
             }
         }
     }
     line.with_words(&changes)
 }
 
-/// Returns the text of a constant number with another value.
-fn begun(command: Command, old: f64, to: f64, keying: Keying) -> String {
+/// Returns the text of constant number `at` with another value.
+fn begun(command: Command, at: usize, to: f64, old: f64, keying: Keying) -> String {
     let key = |frame, value| Key { frame, value };
     let is_kept = old == to || !keying.auto || keying.whole || keying.time == keying.first;
-    if is_kept || !command.form().curves {
+    if is_kept || !command.form().takes_curve(at) {
         return written(to);
     }
     let keys = vec![key(keying.first, old), key(keying.time, to)];
@@ -190,6 +190,21 @@ mod tests {
 
     fn after(text: &str, first: usize, to: &[f64], keying: Keying) -> String {
         changed(&Line::new(text), first, to, keying).unwrap().text()
+    }
+
+    #[test]
+    fn letters_have_a_surface_behind_numbers_that_are_no_curves() {
+        let text = "Text \"a b\" 1 .2 centre # sign";
+        let values = Values::of(&Line::new(text), 1.0).unwrap();
+        assert_eq!(
+            (values.number(0), values.number(2), values.number(7)),
+            (Some(1.0), Some(0.08), Some(0.72))
+        );
+        assert_eq!(after(text, 0, &[2.0], AUTO), "Text \"a b\" 2 .2 centre # sign");
+        let numbers = "Text \"a b\" 1 .2 0.08 0.08 0.08 0.5 0.72 0.72 centre # sign";
+        assert_eq!(after(text, 5, &[0.5], Keying::ALWAYS), numbers);
+        let keyed = "Text \"a b\" 1 .2 0.08 0.08 0.08 (smooth 1:0.5 25:0.7) 0.72 0.72 centre # sign";
+        assert_eq!(after(numbers, 5, &[0.7], AUTO), keyed);
     }
 
     #[test]

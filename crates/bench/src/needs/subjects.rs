@@ -54,7 +54,7 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 23] = [
+const OF_VERSION_2: [(&str, &str); 24] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -98,6 +98,12 @@ Use brick  1.5 1 -2  40 50 60
     (
         "a mesh with normals",
         "Mesh \"model.obj\"
+Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
+        "letters",
+        "Text \"A&\" 2 .5 .1 .1 .1  .6 .2 .2 centre
 Sphere 1   1 0 -2  .1 .1 .1  .2 .6 .2
 ",
     ),

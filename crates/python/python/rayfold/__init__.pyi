@@ -91,6 +91,7 @@ class Material:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -124,11 +125,13 @@ class Scene:
         look: Any = ...,
         lens: Any = ...,
         background: Any = ...,
+        sky: Any = ...,
         fog: Any = ...,
         samples: Any = ...,
         shutter: Any = ...,
         tone: Any = ...,
         depth: Any = ...,
+        indirect: Any = ...,
         ilight: Any = ...,
         plight: Any = ...,
         frames: Any = ...,
@@ -244,6 +247,41 @@ class Scene:
 
         `background("none")` in place of all arguments.
         """
+    def sky(
+        self,
+        color: Color,
+        top: Color | None = None,
+    ) -> None:
+        """The light around the scene.
+
+        In a script: `Sky r g b [R G B]`.
+
+        Parameters
+        ----------
+        color : Color
+            the sky (`r g b`): colour in display values, at least 0.
+        top : Color, optional
+            the sky above (`R G B`): colour in display values, at least 0; by default the first colour.
+        """
+    def sky_picture(
+        self,
+        file: str,
+        strength: Number | None = None,
+        turn: Number | None = None,
+    ) -> None:
+        """A picture as the light around the scene.
+
+        In a script: `Sky "FILE" [strength [turn]]`.
+
+        Parameters
+        ----------
+        file : str
+            the name of a file in the script's folder; of a scene that has none, in the current folder.
+        strength : Number, optional
+            the sky's strength (`strength`): number, at least 0; by default 1.
+        turn : Number, optional
+            the sky's turn (`turn`): angle in degrees; by default 0.
+        """
     def fog(
         self,
         color: Color | Literal["none"],
@@ -345,6 +383,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -361,7 +400,7 @@ class Scene:
             the centre (`cx cy cz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def triangle(
@@ -380,6 +419,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -398,7 +438,7 @@ class Scene:
             the vertex (`wx wy wz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def box(
@@ -416,6 +456,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -432,7 +473,7 @@ class Scene:
             the corner (`vx vy vz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def plane(
@@ -450,6 +491,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -466,7 +508,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def disc(
@@ -485,6 +527,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -503,7 +546,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def cylinder(
@@ -522,6 +565,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -540,7 +584,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -562,6 +606,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -582,7 +627,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `ax ay az` and `bx by bz` differ.
@@ -604,6 +649,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -624,7 +670,7 @@ class Scene:
             the normal (`nx ny nz`): direction, not all 0.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
 
         In the names of the script, `R` is greater than `r`.
@@ -645,6 +691,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -663,7 +710,7 @@ class Scene:
             the axis's end (`bx by bz`): position in world units.
         material : Material | str, optional
             the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def mesh(
@@ -682,6 +729,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -700,7 +748,51 @@ class Scene:
             faces that meet at less than this angle in degrees, 0 to 180, look smooth.
         flat : bool, optional
             whether the normals of the file are left out.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
+            the clauses of a material, as those of `Material`.
+        """
+    def text(
+        self,
+        text: str,
+        size: FixedNumber,
+        depth: FixedNumber,
+        material: Material | str | None = None,
+        align: Literal["left", "centre", "right"] | None = None,
+        font: str | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
+    ) -> None:
+        """Letters cut out of a plate.
+
+        In a script: `Text "TEXT" SIZE DEPTH [M] [left or centre or right] [font "FILE"]`.
+
+        Parameters
+        ----------
+        text : str
+            the words; a line feed begins a line.
+        size : FixedNumber
+            the size of the letters (`SIZE`): length in world units, greater than 0.
+        depth : FixedNumber
+            the depth of the letters (`DEPTH`): length in world units, at least 0.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By default .8 grey.
+        align : Literal["left", "centre", "right"], optional
+            the end of the lines that is at x = 0: they begin there, have their middles there or end there; by default "left".
+        font : str, optional
+            the name of a TrueType or OpenType file, as that of a model; by default Noto Sans Bold, which comes with rayfold.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def material(
@@ -716,6 +808,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -728,7 +821,7 @@ class Scene:
         ----------
         name : str
             the name of the new material.
-        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, own, glow, rough
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
     def group(

@@ -8,6 +8,7 @@ use super::Scripted;
 use crate::model::Material;
 
 /// A reader of the numbers of a line, parameter by parameter. Omitted numbers are 0.
+#[derive(Clone)]
 pub(crate) struct Numbers<'a> {
     rest: &'a [f64],
     /// The count of remaining numbers that the script contains.
@@ -26,6 +27,11 @@ impl<'a> Numbers<'a> {
     /// Returns whether the form's word stands in place of all numbers.
     pub(crate) fn is_word(&self) -> bool {
         self.written == 0
+    }
+
+    /// Returns the count of numbers of the script that were not read yet.
+    pub(crate) fn count(&self) -> usize {
+        self.written
     }
 
     pub(crate) fn number(&mut self) -> f64 {

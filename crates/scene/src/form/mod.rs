@@ -43,8 +43,12 @@ pub struct Form {
     most: usize,
     /// The first number that the name of a material may replace, together with all that follow.
     surface: Option<usize>,
-    /// Whether all numbers may be omitted together.
+    /// Whether the numbers of the surface may be omitted together.
     may_be_bare: bool,
+    /// The words that may stand behind the numbers, each with what belongs to it.
+    pub options: &'static [&'static str],
+    /// The count of numbers at the start that are never curves.
+    fixed: usize,
     /// The usage, where it is not derived from the parameters.
     usage: Option<&'static str>,
 }
@@ -65,6 +69,8 @@ pub enum Subject {
 pub enum Quotes {
     /// The plain name of a file in the script's own folder.
     File,
+    /// Words that are drawn.
+    Words,
 }
 
 /// A kind of named items. Each kind has its own names.
@@ -239,6 +245,8 @@ impl Form {
             most,
             surface,
             may_be_bare: false,
+            options: &[],
+            fixed: 0,
             usage: None,
         }
     }
@@ -248,9 +256,18 @@ impl Form {
         Self { usage: Some(usage), ..self }
     }
 
-    /// Makes the numbers those of a surface, which may be omitted together.
+    /// Allows to omit the numbers of the surface together.
     pub(crate) const fn with_optional_surface(self) -> Self {
-        Self { surface: Some(0), may_be_bare: true, ..self }
+        let surface = match self.surface {
+            Some(first) => first,
+            None => 0,
+        };
+        Self { surface: Some(surface), may_be_bare: true, ..self }
+    }
+
+    /// Adds words that may stand behind the numbers.
+    pub(crate) const fn with_options(self, options: &'static [&'static str]) -> Self {
+        Self { options, ..self }
     }
 
     /// Adds a name before the numbers.
@@ -283,6 +300,43 @@ impl Form {
         Self { curves: false, ..self }
     }
 
+    /// Forbids curves in the first numbers.
+    pub(crate) const fn fixed_first(self, fixed: usize) -> Self {
+        Self { fixed, ..self }
+    }
+
+    /// Returns whether number `i` may be a curve.
+    pub const fn takes_curve(&self, i: usize) -> bool {
+        self.curves && i >= self.fixed
+    }
+
+    /// Returns whether a word is one of those that may stand behind the numbers.
+    pub fn is_option(&self, word: &str) -> bool {
+        self.options.iter().any(|option| option.eq_ignore_ascii_case(word))
+    }
+
+    /// Returns whether this count of numbers leaves out those of the surface, which may be omitted together.
+    pub fn is_bare(&self, count: usize) -> bool {
+        self.may_be_bare && self.surface == Some(count)
+    }
+
+    /// Returns whether number `i` is one of a surface that may be omitted.
+    pub fn is_of_optional_surface(&self, i: usize) -> bool {
+        self.may_be_bare && self.surface.is_some_and(|first| i >= first)
+    }
+
+    /// Returns the default of a parameter of a surface that may be omitted: where nothing else is known, .9 of the colour .8 is
+    /// diffuse, and .1 ambient.
+    pub fn surface_default(&self, field: &Field) -> Option<&'static str> {
+        match (self.subject, field.parameter) {
+            _ if !self.may_be_bare => None,
+            (Some(Subject::Quotes(Quotes::File)), _) => Some("that of the file"),
+            (_, Parameter::Ambient) => Some("0.08"),
+            (_, Parameter::Diffuse) => Some("0.72"),
+            _ => None,
+        }
+    }
+
     /// Returns whether an object with these numbers is hidden, because its radii are 0.
     pub fn hides(&self, numbers: &[f64]) -> bool {
         !self.radii.is_empty() && self.radii.iter().all(|&i| numbers.get(i) == Some(&0.0))
@@ -297,17 +351,21 @@ impl Form {
 
     /// Returns the least and the largest count of numbers.
     pub const fn arity(&self) -> (usize, usize) {
-        (if self.may_be_bare { 0 } else { self.required }, self.most)
+        let least = match self.surface {
+            Some(surface) if self.may_be_bare => surface,
+            _ => self.required,
+        };
+        (least, self.most)
     }
 
-    /// Returns the count of numbers of the parameters that are required if there is any number.
+    /// Returns the count of numbers of the parameters that are required if there is any number of the surface.
     pub const fn required(&self) -> usize {
         self.required
     }
 
     /// Returns whether this count of numbers is allowed.
     pub fn takes(&self, count: usize) -> bool {
-        if self.may_be_bare && count == 0 {
+        if self.is_bare(count) {
             return true;
         }
         if self.required == self.most {

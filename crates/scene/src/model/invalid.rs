@@ -233,6 +233,10 @@ pub enum Parameter {
     FirstFrame,
     /// The number of the last frame.
     LastFrame,
+    /// The em of letters.
+    LetterSize,
+    /// The thickness of letters.
+    LetterDepth,
     /// The number of frames that an animation waits for.
     FrameCount,
     /// The number of frames per second.
@@ -303,6 +307,8 @@ impl fmt::Display for Parameter {
             Self::Tone => "the tone",
             Self::FirstFrame => "the first frame a",
             Self::LastFrame => "the last frame b",
+            Self::LetterSize => "the size of the letters",
+            Self::LetterDepth => "the depth of the letters",
             Self::FrameCount => "`frames`",
             Self::FrameRate => "`fps`",
             Self::FrameOfDuration => "a frame of `durations`",

@@ -38,7 +38,7 @@ pub use material::{Coefficients, Finish, Glass, Material, Pattern, Rough, Shine,
 pub use picture_file::PictureFile;
 pub use sampling::{Depth, Lens, Samples, Shutter, Tone};
 pub use screen::Screen;
-pub use shapes::{Instance, Mesh, Object, Placement};
+pub use shapes::{Instance, Mesh, Object, Placement, Source};
 pub use sky::{Sky, SkyColors, SkyTurn};
 pub use vector::unit;
 
@@ -47,7 +47,9 @@ pub(crate) use clause::{Clauses, MATERIAL};
 pub(crate) use image::{AXES, MAPS};
 pub(crate) use invalid::{Faults, Lint};
 pub(crate) use sampling::FrameNumbers;
-pub(crate) use shapes::{FLAT, MESH, SMOOTH, USE, mesh_surface, with_shapes};
+pub(crate) use shapes::{
+    FLAT, FONT, MESH, TEXT, USE, align_from_word, letter_plate, letter_surface, mesh_surface, with_shapes,
+};
 pub(crate) use vector::PARALLEL;
 
 use crate::shared_slice::SharedSlice;

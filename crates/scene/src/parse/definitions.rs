@@ -194,6 +194,7 @@ impl<'a> Parser<'a> {
             | Effect::End
             | Effect::Object(_)
             | Effect::Mesh
+            | Effect::Text
             | Effect::Light(_)
             | Effect::Clear
             | Effect::Trace => {}

@@ -95,7 +95,7 @@ impl<'a> Parser<'a> {
     pub(super) fn check_uv(&mut self, s: &Statement<'a, '_>, needs_uv: bool, mesh: Option<&Mesh>) {
         if needs_uv && !mesh.is_some_and(|mesh| mesh.model().has_uvs()) {
             let span = s.surface.clone().unwrap_or_else(|| s.words.command.clone());
-            self.report.error(s.line, span, || wording::no_uv(s.command, mesh.map(Mesh::file)));
+            self.report.error(s.line, span, || wording::no_uv(s.command, mesh.and_then(Mesh::file)));
         }
     }
 }

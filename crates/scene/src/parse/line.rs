@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::str::Utf8Error;
 
-use super::text::{Words, is_mesh_option, is_name};
+use super::text::{Words, is_name, unquoted};
 use super::{Parser, curve, number, wording};
 use crate::command::{Command, Effect, MAX_NUMBERS};
 use crate::form::{Quotes, Subject, Values, color_levels};
@@ -29,7 +29,7 @@ pub(super) struct Statement<'a, 'w> {
     pub(super) surface: Option<Range<usize>>,
     /// Whether the word of the command's form stands in place of all numbers.
     pub(super) is_word: bool,
-    /// The words behind the surface of a mesh.
+    /// The words behind the surface of a mesh or a text.
     pub(super) options: Vec<Range<usize>>,
 }
 
@@ -161,14 +161,17 @@ impl<'a> Parser<'a> {
                 options,
             });
         }
-        let options = match command.effect() {
-            Effect::Mesh => words.split_off(|word| is_mesh_option(&text[word])),
-            _ => Vec::new(),
+        let form = command.form();
+        let options = match form.options {
+            [] => Vec::new(),
+            _ => words.split_off(|word| form.is_option(&text[word])),
         };
-        if matches!(command.effect(), Effect::Mesh)
-            && let Some(word) = words.parameters().iter().skip(1).find(|word| is_name(&text[(*word).clone()]))
+        let behind_surface = form.surface().map_or(0, |first| first + 1);
+        if !form.options.is_empty()
+            && let Some(word) =
+                words.parameters().iter().skip(behind_surface).find(|word| is_name(&text[(*word).clone()]))
         {
-            self.report.error(line, word.clone(), || wording::unknown_mesh_option(&text[word.clone()]));
+            self.report.error(line, word.clone(), || wording::unknown_option(command, &text[word.clone()]));
             self.faulty_line(line, text, command, subject, words);
             return None;
         }
@@ -197,7 +200,7 @@ impl<'a> Parser<'a> {
     ) -> Option<Range<usize>> {
         let names = match subject {
             Subject::Defines(names) | Subject::Refers(names) => names,
-            Subject::Quotes(Quotes::File) => return self.quotes(line, text, command, words),
+            Subject::Quotes(quotes) => return self.quotes(line, text, command, quotes, words),
         };
         let Some(name) = words.take_first() else {
             self.report.error(line, words.end(), || wording::no_name(command, names));
@@ -216,14 +219,20 @@ impl<'a> Parser<'a> {
         line: Line<'a>,
         text: &str,
         command: Command,
+        quotes: Quotes,
         words: &mut Words,
     ) -> Option<Range<usize>> {
         let Some(word) = words.take_first() else {
-            self.report.error(line, words.end(), || wording::no_file(command, None));
+            self.report.error(line, words.end(), || wording::no_quotes(command, quotes, None));
             return None;
         };
         if !text[word.clone()].starts_with('"') {
-            self.report.error(line, word.clone(), || wording::no_file(command, Some(&text[word])));
+            let found = &text[word.clone()];
+            self.report.error(line, word, || wording::no_quotes(command, quotes, Some(found)));
+            return None;
+        }
+        if let Err(fault) = unquoted(&text[word.clone()]) {
+            self.report.error(line, word, || wording::malformed_quote(fault));
             return None;
         }
         Some(word)
@@ -316,7 +325,7 @@ impl<'a> Parser<'a> {
             let Err(fault) = result else { continue };
             if word.starts_with('(') {
                 match curve::parse(text, span.clone()) {
-                    _ if !form.curves => {
+                    _ if !form.takes_curve(i) => {
                         good = false;
                         self.report.error(line, span.clone(), || wording::unwanted_curve(command, name));
                     }

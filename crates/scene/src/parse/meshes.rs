@@ -11,9 +11,9 @@ use super::line::Statement;
 use super::text::unquoted;
 use super::visibility::Origin;
 use super::{Parser, number, wording};
-use crate::form::Names as Kinds;
+use crate::form::{Names as Kinds, Numbers};
 use crate::limits::Limits;
-use crate::model::{FLAT, Material, Mesh, Object, mesh_surface};
+use crate::model::{FLAT, Faults, Material, Mesh, Object, Source, mesh_surface};
 use crate::row::Row;
 use crate::script::Drawn;
 
@@ -68,7 +68,7 @@ impl Models {
 }
 
 /// The surface of a mesh, as its line gives it.
-enum Surface {
+pub(super) enum Surface {
     OfFile,
     /// A named material; `None` if it has curves.
     Named(usize, Option<Material>),
@@ -86,23 +86,40 @@ impl<'a> Parser<'a> {
         let Some(subject) = s.subject.clone() else { return };
         let smoothing = self.smoothing(s);
         let name = self.file(s, subject.clone());
-        let surface = self.mesh_surface(s);
+        let surface = self.mesh_surface(s, mesh_surface);
         let (Some(smoothing), Some(name), Some((surface, looks))) = (smoothing, name, surface) else {
             return;
         };
         let Some(model) = self.model(s, &subject, &name, smoothing) else { return };
-        let mesh = Mesh::new(&name, smoothing, model, None);
+        let mesh = Mesh::new(Source::File { name: name.into(), smoothing }, model, None);
+        self.draw_mesh(s, mesh, surface, looks);
+    }
+
+    /// Draws triangles with a surface.
+    pub(super) fn draw_mesh(
+        &mut self,
+        s: &Statement<'a, '_>,
+        mesh: Mesh,
+        surface: Surface,
+        looks: Option<Looks>,
+    ) {
         self.doubt_object(s, looks.unwrap_or_else(|| looks_of(mesh.material())));
         self.check_uv(s, looks.is_some_and(|looks| looks.needs_uv), Some(&mesh));
-        if looks.is_some_and(|looks| looks.refracts) {
-            self.doubt_glass_mesh(s, &mesh, &subject);
+        if looks.is_some_and(|looks| looks.refracts)
+            && let Some(subject) = &s.subject
+        {
+            self.doubt_glass_mesh(s, &mesh, subject);
         }
         self.add_mesh(s, mesh, surface);
     }
 
     /// Returns the surface and its looks; `None` as its looks if they are those of the file. If there is a fault, returns `None`
     /// and reports it.
-    fn mesh_surface(&mut self, s: &Statement<'a, '_>) -> Option<(Surface, Option<Looks>)> {
+    pub(super) fn mesh_surface(
+        &mut self,
+        s: &Statement<'a, '_>,
+        reader: fn(&mut Numbers<'_>) -> Result<Material, Faults>,
+    ) -> Option<(Surface, Option<Looks>)> {
         if let Some(span) = s.surface.clone() {
             let number = self.refer(Kinds::Materials, s.line, span)?;
             let info = self.materials.get(number).value.as_ref()?;
@@ -112,11 +129,12 @@ impl<'a> Parser<'a> {
             }
             return Some((Surface::Named(number, still), Some(looks)));
         }
-        if s.count() == 0 {
+        let form = s.command.form();
+        if form.is_bare(s.count()) {
             return Some((Surface::OfFile, None));
         }
         let is_moving = s.row.as_ref().is_some_and(|row| !row.is_constant());
-        let material = if is_moving { None } else { Some(self.read(s, None, mesh_surface)?) };
+        let material = if is_moving { None } else { Some(self.read(s, None, reader)?) };
         match (&s.row, material) {
             (None, Some(material)) => {
                 let looks = looks_of(&material);
@@ -129,7 +147,9 @@ impl<'a> Parser<'a> {
                     let moving = self.keep_moving(s.line, spans, Origin::Command(s.command), &row);
                     self.see_moving(moving);
                 }
-                let looks = looks_in(s.command.form(), &row);
+                let looks = looks_in(form, &row);
+                let first = form.surface().unwrap_or_default();
+                let row = Row::new(row.numbers().iter().skip(first).cloned().collect());
                 Some((Surface::Row(row), Some(looks)))
             }
         }
@@ -205,18 +225,30 @@ impl<'a> Parser<'a> {
 
     /// Returns the name of a file in quotes. If there is a fault, returns `None` and reports it.
     pub(super) fn file(&mut self, s: &Statement<'a, '_>, span: Range<usize>) -> Option<String> {
-        let name = match unquoted(&s.text[span.clone()]) {
-            Ok(name) => name,
-            Err(fault) => {
-                self.report.error(s.line, span, || wording::malformed_quote(fault));
-                return None;
-            }
-        };
+        let name = self.quoted(s, span.clone())?;
         if let Err(fault) = file_name(&name) {
             self.report.error(s.line, span, || wording::no_file_name(fault));
             return None;
         }
         self.name_file(s, &span, &name, None).then_some(name)
+    }
+
+    /// Returns the text of a word in quotes. If there is a fault, returns `None` and reports it.
+    pub(super) fn quoted(&mut self, s: &Statement<'a, '_>, span: Range<usize>) -> Option<String> {
+        match unquoted(&s.text[span.clone()]) {
+            Ok(text) => Some(text),
+            Err(fault) => {
+                self.report.error(s.line, span, || wording::malformed_quote(fault));
+                None
+            }
+        }
+    }
+
+    /// Notes that the file of a name is missing, so that what waits for it knows.
+    pub(super) fn note_absent(&mut self, error: &AssetError) {
+        if let AssetError::Absent { name, .. } = error {
+            self.named.files.entry(name.clone()).or_default();
+        }
     }
 
     /// Notes a file that is named. `path` is that in a model which refers to it. Returns whether it is in order.
@@ -262,9 +294,7 @@ impl<'a> Parser<'a> {
         let model = match self.library.model(name, smoothing) {
             Ok(model) => model,
             Err(error) => {
-                if let AssetError::Absent { name, .. } = &error {
-                    self.named.files.entry(name.clone()).or_default();
-                }
+                self.note_absent(&error);
                 self.report.error(s.line, span.clone(), || wording::unusable_file(&error));
                 return None;
             }
@@ -284,7 +314,11 @@ impl<'a> Parser<'a> {
     fn doubt_glass_mesh(&mut self, s: &Statement<'a, '_>, mesh: &Mesh, span: &Range<usize>) {
         let closure = mesh.model().closure();
         if *closure != Closure::Closed {
-            self.report.warning(s.line, span.clone(), || wording::open_glass(mesh.file(), closure));
+            let what = match mesh.source() {
+                Source::File { name, .. } => format!("`{name}`"),
+                Source::Text(_) => "the text without depth".to_string(),
+            };
+            self.report.warning(s.line, span.clone(), || wording::open_glass(&what, closure));
         }
     }
 }

@@ -13,6 +13,7 @@ mod definitions;
 mod doubts;
 mod foreign;
 mod images;
+mod lettering;
 mod line;
 mod meshes;
 mod names;
@@ -41,8 +42,8 @@ use line::Statement;
 use meshes::Named;
 use names::Names;
 use picture::Picture;
-pub use text::is_name;
 use text::{Words, lines};
+pub use text::{is_name, unquoted_word};
 use visibility::{Animated, Exposure, Origin};
 
 /// The result of parsing a text.
@@ -249,6 +250,7 @@ impl<'a> Parser<'a> {
             | Effect::Use
             | Effect::Object(_)
             | Effect::Mesh
+            | Effect::Text
             | Effect::Light(_)
             | Effect::Clear => {}
         }
@@ -257,7 +259,7 @@ impl<'a> Parser<'a> {
     fn run(&mut self, s: &Statement<'a, '_>) {
         let effect = s.command.effect();
         if self.group.is_some()
-            && !matches!(effect, Effect::Object(_) | Effect::Mesh | Effect::Use | Effect::End)
+            && !matches!(effect, Effect::Object(_) | Effect::Mesh | Effect::Text | Effect::Use | Effect::End)
         {
             self.leave_group_at(s);
         }
@@ -289,6 +291,7 @@ impl<'a> Parser<'a> {
             Effect::Use => self.draw_group(s),
             Effect::Object(read) => self.object(s, read),
             Effect::Mesh => self.mesh(s),
+            Effect::Text => self.lettering(s),
             Effect::Light(read) => self.light(s, read),
             Effect::Clear => self.clear(),
             Effect::Trace => self.trace(s),

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use crate::command::MAX_NUMBERS;
 use crate::form::{Form, color_levels};
-use crate::model::{FLAT, SMOOTH};
 use crate::report::{BYTE_ORDER_MARK, Line};
 
 /// Returns the lines of a text without their ends and without the byte-order mark. The last one is empty if the text
@@ -131,6 +130,16 @@ pub(super) fn unquoted(word: &str) -> Result<String, QuoteFault> {
             Some(c) => text.push(c),
         }
     }
+}
+
+/// Returns the text of a word in quotes, or `None` if it is malformed.
+///
+/// ```
+/// assert_eq!(rayfold_scene::unquoted_word(r#""one\ntwo""#).as_deref(), Some("one\ntwo"));
+/// assert_eq!(rayfold_scene::unquoted_word("one"), None);
+/// ```
+pub fn unquoted_word(word: &str) -> Option<String> {
+    unquoted(word).ok()
 }
 
 /// Returns the next parameter: a word, or a curve from its opening bracket to the closing one. If that is missing,
@@ -312,11 +321,6 @@ impl Words {
     pub(super) fn rest(&self, first: usize) -> Range<usize> {
         self.parameters().get(first).map_or(self.end, |word| word.start)..self.end
     }
-}
-
-/// Returns whether a word begins the options of a mesh, which stand behind its surface.
-pub(super) fn is_mesh_option(word: &str) -> bool {
-    word.eq_ignore_ascii_case(SMOOTH) || word.eq_ignore_ascii_case(FLAT)
 }
 
 /// Returns whether a word can be the name of a material or a group.

@@ -3,12 +3,12 @@
 use super::curve::CurveFault;
 use super::number::{self, NumberFault};
 use super::text::{QuoteFault, Words};
-use rayfold_assets::{AssetError, Closure, NameFault};
+use rayfold_assets::{AssetError, Closure, LetterError, NameFault};
 
 use crate::command::Command;
 use crate::curve::{CYCLE, Mode, Moment};
 use crate::diagnostic::Code;
-use crate::form::{Field, Form, Kind, Names, Unit, Values};
+use crate::form::{Field, Form, Kind, Names, Quotes, Unit, Values};
 use crate::model::{Clause, InvalidValue, Lint, Parameter, Screen};
 use crate::report::Fault;
 use crate::shown::{grouped, nearest, quoted};
@@ -308,8 +308,11 @@ pub(super) fn curve(fault: CurveFault, parameter: &str) -> Fault {
 
 /// Describes a curve where none is allowed.
 pub(super) fn unwanted_curve(command: Command, parameter: &str) -> Fault {
-    Fault::new(Code::UnwantedCurve, format!("`{command}` takes no curves"))
-        .expected(format!("expected `{parameter}`, a number"))
+    let message = match command.form().curves {
+        true => format!("{parameter} of `{command}` cannot be a curve"),
+        false => format!("`{command}` takes no curves"),
+    };
+    Fault::new(Code::UnwantedCurve, message).expected(format!("expected `{parameter}`, a number"))
 }
 
 /// Describes a value of a curve that `field` does not allow. The curve is visible `from` one time `to` another.
@@ -661,14 +664,18 @@ pub(super) fn color_at(comment: &str) -> Option<[f64; 3]> {
     }
 }
 
-/// Describes a missing name of a file, or `word` in its place.
-pub(super) fn no_file(command: Command, word: Option<&str>) -> Fault {
+/// Describes a missing word in quotes, or `word` in its place.
+pub(super) fn no_quotes(command: Command, quotes: Quotes, word: Option<&str>) -> Fault {
+    let (lacks, expected) = match quotes {
+        Quotes::File => ("names no file", "expected the name of a file in quotes, as in `\"teapot.obj\"`"),
+        Quotes::Words => ("has no words", "expected words in quotes, as in `\"Hello\"`"),
+    };
     let message = match word {
-        None => format!("`{command}` names no file"),
+        None => format!("`{command}` {lacks}"),
         Some(word) => format!("{} is not in quotes", quoted(word)),
     };
     Fault::new(Code::MalformedQuote, message)
-        .expected("expected the name of a file in quotes, as in `\"teapot.obj\"`")
+        .expected(expected)
         .help(format!("a line is `{}`", command.form()))
 }
 
@@ -711,7 +718,8 @@ pub(super) fn model_doubt(file: &str, warning: &str) -> Fault {
     Fault::new(Code::UnusedPart, format!("`{file}`: {warning}"))
 }
 
-pub(super) fn open_glass(file: &str, closure: &Closure) -> Fault {
+/// Describes glass of triangles that close no body. `what` is the text of the word in quotes.
+pub(super) fn open_glass(what: &str, closure: &Closure) -> Fault {
     let why = match closure {
         Closure::Open([a, b]) => {
             format!("is open at the edge from {} {} {} to {} {} {}", a.x, a.y, a.z, b.x, b.y, b.z)
@@ -719,7 +727,7 @@ pub(super) fn open_glass(file: &str, closure: &Closure) -> Fault {
         Closure::InsideOut => "is inside out: its faces are seen clockwise from outside".to_string(),
         Closure::NoVolume | Closure::Closed => "has no volume".to_string(),
     };
-    Fault::new(Code::GlassPanes, format!("`{file}` {why}, so its glass is panes that do not refract"))
+    Fault::new(Code::GlassPanes, format!("{what} {why}, so its glass is panes that do not refract"))
         .help("a closed model, whose faces are seen counterclockwise from outside, refracts")
 }
 
@@ -777,15 +785,54 @@ pub(super) fn bad_smooth_angle(word: &str) -> Fault {
         .expected("expected a number from 0 to 180, not a curve")
 }
 
-pub(super) fn unknown_mesh_option(word: &str) -> Fault {
-    Fault::new(
-        Code::TooManyParameters,
-        format!("{} is neither a material nor `smooth` or `flat`", quoted(word)),
-    )
-    .help("a line is `Mesh \"FILE\" [M] [smooth a or flat]`; a `Use` moves a model")
+/// Describes a word behind the surface that is none of those of the command.
+pub(super) fn unknown_option(command: Command, word: &str) -> Fault {
+    let options: Vec<_> = command.form().options.iter().map(|option| format!("`{option}`")).collect();
+    let (last, others) = options.split_last().map_or(("", &[][..]), |(last, others)| (last, others));
+    let message = format!("{} is neither a material nor {} or {last}", quoted(word), others.join(", "));
+    Fault::new(Code::TooManyParameters, message)
+        .help(format!("a line is `{}`; a `Use` moves what it draws", command.form()))
 }
 
 pub(super) fn too_many_mesh_options() -> Fault {
     Fault::new(Code::TooManyParameters, "there is more behind the normals of the mesh")
         .help("a line is `Mesh \"FILE\" [M] [smooth a or flat]`")
+}
+
+pub(super) fn unusable_letters(error: &LetterError) -> Fault {
+    let fault = Fault::new(Code::UnusableFile, error.to_string());
+    match error.help() {
+        Some(help) => fault.help(help),
+        None => fault,
+    }
+}
+
+pub(super) fn blank_text() -> Fault {
+    Fault::new(Code::Unused, "nothing is drawn: the text has no letter with an outline")
+}
+
+/// Describes a word behind `font` that names no file, or its absence.
+pub(super) fn no_font(word: Option<&str>) -> Fault {
+    let message = match word {
+        None => "`font` names no file".to_string(),
+        Some(word) => format!("{} is not in quotes", quoted(word)),
+    };
+    Fault::new(Code::MalformedQuote, message)
+        .expected("expected the name of a font's file in quotes, as in `font \"Lora.ttf\"`")
+}
+
+pub(super) fn text_option_again(word: &str) -> Fault {
+    Fault::new(Code::TooManyParameters, format!("{} is one word too many", quoted(word)))
+        .expected("expected one of `left`, `centre` and `right`, and one font")
+}
+
+pub(super) fn unknown_text_option(word: &str) -> Fault {
+    let fault = Fault::new(
+        Code::TooManyParameters,
+        format!("{} is none of `left`, `centre`, `right` and `font`", quoted(word)),
+    );
+    if word.eq_ignore_ascii_case("center") {
+        return fault.help("write `centre`");
+    }
+    fault.help("the size, the depth and the material stand before these words")
 }

@@ -78,6 +78,8 @@ mirror! {
         words: &'static [&'static str],
         presence: &'static str,
         default: Option<&'static str>,
+        #[ts(as = "Option<_>")]
+        fixed: bool,
     }
     CurveMode of ModeEntry {
         name: &'static str,

@@ -83,6 +83,7 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
         lines().prop_map(|lines| ClientMessage::Duplicate { lines }),
         (at(), any::<bool>()).prop_map(|(line, down)| ClientMessage::Reorder { line, down }),
         (at(), name()).prop_map(|(line, name)| ClientMessage::Rename { line, name }),
+        (at(), name()).prop_map(|(line, text)| ClientMessage::Words { line, text }),
         lines().prop_map(|lines| ClientMessage::Hide { lines }),
         lines().prop_map(|lines| ClientMessage::Ground { lines }),
         lines().prop_map(|lines| ClientMessage::Drop { lines }),
@@ -94,7 +95,7 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
             .prop_map(|(lines, preset)| ClientMessage::Preset { lines, preset: preset.into() }),
         (lines(), [number(), number(), number()]).prop_map(|(lines, by)| ClientMessage::Nudge { lines, by }),
         (
-            prop::sample::select(vec!["Sphere", "Ilight", "Plane", "Trace", "?"]),
+            prop::sample::select(vec!["Sphere", "Ilight", "Plane", "Text", "Trace", "?"]),
             prop::option::of([0.0..48.0, 0.0..27.0])
         )
             .prop_map(|(command, at)| ClientMessage::Add { command: command.into(), at }),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rayfold_scene::{Command, Mode};
+use rayfold_scene::{Command, Mode, Quotes, Subject, unquoted_word};
 
 use super::held_keys::HeldKeys;
 use super::hold::Held;
@@ -214,6 +214,10 @@ impl Session {
             can_key: form.curves,
             material: surface.map(|at| line.word(&words.parameters[at]).to_owned()),
             subject: line.subject().unwrap_or_default().to_owned(),
+            text: line
+                .subject()
+                .filter(|_| form.subject == Some(Subject::Quotes(Quotes::Words)))
+                .and_then(unquoted_word),
             fields: if values.command == Command::Material {
                 clause_fields(line, &materials::plain_names(self.file_lines(project), at))
             } else {

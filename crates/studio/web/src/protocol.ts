@@ -10,7 +10,7 @@ upright: boolean,
 /** Align with other objects, else move in steps of a grid. */
 snap: boolean, 
 /** Move curves as a whole, in all frames. */
-whole: boolean, } | { "ask": "release" } | { "ask": "navigate", how: Navigation, x: number, y: number, } | { "ask": "look", at: ViewPreset, } | { "ask": "keep-camera" } | { "ask": "set", line: number, first: number, values: ReadonlyArray<number>, gesture: number | null, } | { "ask": "edit", file: number, version: number, changes: ReadonlyArray<TextChange>, } | { "ask": "remove", lines: ReadonlyArray<number>, } | { "ask": "duplicate", lines: ReadonlyArray<number>, } | { "ask": "reorder", line: number, down: boolean, } | { "ask": "rename", line: number, name: string, } | { "ask": "hide", lines: ReadonlyArray<number>, } | { "ask": "drop", lines: ReadonlyArray<number>, } | { "ask": "ground", lines: ReadonlyArray<number>, } | { "ask": "lock", lines: ReadonlyArray<number>, } | { "ask": "paste", text: string, } | { "ask": "align", lines: ReadonlyArray<number>, axis: number, how: Alignment, } | { "ask": "box", from: readonly [number, number], to: readonly [number, number], extend: boolean, } | { "ask": "group", lines: ReadonlyArray<number>, } | { "ask": "ungroup", line: number, } | { "ask": "surface", lines: ReadonlyArray<number>, material: string, } | { "ask": "preset", lines: ReadonlyArray<number>, preset: string, } | { "ask": "paint", at: readonly [number, number], material: string, preset: boolean, } | { "ask": "clause", line: number, clause: string, } | { "ask": "word", line: number, number: number, word: string, } | { "ask": "camera", command: string, } | { "ask": "time", wish: TimelineEdit, } | { "ask": "nudge", lines: ReadonlyArray<number>, by: readonly [number, number, number], } | { "ask": "add", command: string, at: readonly [number, number] | null, } | { "ask": "undo" } | { "ask": "redo" } | { "ask": "resolve", "keep-mine": boolean, } | { "ask": "load", from: Source, new: string | null, } | { "ask": "render", format: MovieFormat, } | { "ask": "cancel" };
+whole: boolean, } | { "ask": "release" } | { "ask": "navigate", how: Navigation, x: number, y: number, } | { "ask": "look", at: ViewPreset, } | { "ask": "keep-camera" } | { "ask": "set", line: number, first: number, values: ReadonlyArray<number>, gesture: number | null, } | { "ask": "edit", file: number, version: number, changes: ReadonlyArray<TextChange>, } | { "ask": "remove", lines: ReadonlyArray<number>, } | { "ask": "duplicate", lines: ReadonlyArray<number>, } | { "ask": "reorder", line: number, down: boolean, } | { "ask": "rename", line: number, name: string, } | { "ask": "hide", lines: ReadonlyArray<number>, } | { "ask": "drop", lines: ReadonlyArray<number>, } | { "ask": "ground", lines: ReadonlyArray<number>, } | { "ask": "lock", lines: ReadonlyArray<number>, } | { "ask": "paste", text: string, } | { "ask": "align", lines: ReadonlyArray<number>, axis: number, how: Alignment, } | { "ask": "box", from: readonly [number, number], to: readonly [number, number], extend: boolean, } | { "ask": "group", lines: ReadonlyArray<number>, } | { "ask": "ungroup", line: number, } | { "ask": "surface", lines: ReadonlyArray<number>, material: string, } | { "ask": "preset", lines: ReadonlyArray<number>, preset: string, } | { "ask": "paint", at: readonly [number, number], material: string, preset: boolean, } | { "ask": "clause", line: number, clause: string, } | { "ask": "words", line: number, text: string, } | { "ask": "word", line: number, number: number, word: string, } | { "ask": "camera", command: string, } | { "ask": "time", wish: TimelineEdit, } | { "ask": "nudge", lines: ReadonlyArray<number>, by: readonly [number, number, number], } | { "ask": "add", command: string, at: readonly [number, number] | null, } | { "ask": "undo" } | { "ask": "redo" } | { "ask": "resolve", "keep-mine": boolean, } | { "ask": "load", from: Source, new: string | null, } | { "ask": "render", format: MovieFormat, } | { "ask": "cancel" };
 
 /** The source of a whole text. */
 export type Source = { "what": "empty" } | { "what": "example", name: string, } | { "what": "text", text: string, } | { "what": "shown" };
@@ -204,6 +204,8 @@ canKey: boolean,
 material: string | null, 
 /** The name before the numbers. */
 subject: string, 
+/** The words of a text, without quotes. */
+text: string | null, 
 /** The parameters of a material, which depend on its clauses. */
 fields: ReadonlyArray<FieldTable>, };
 
@@ -343,7 +345,9 @@ words?: ReadonlyArray<string>,
 /** Whether the parameter is optional. */
 optional: boolean, 
 /** The position of its first number among those of the command. */
-first: number, };
+first: number, 
+/** Whether it is never a curve, in a command whose other parameters may be. */
+fixed: boolean, };
 
 /** A number that changes. */
 export type Track = { 
@@ -375,7 +379,7 @@ export type LanguageEntry = { name: string, usage: string, about: string, subjec
 
 export type LanguageSubject = { role: string, of: string, };
 
-export type LanguageParameter = { names: ReadonlyArray<string>, meaning: string, kind: string, unit: string, range: string, minimum?: number, above_minimum?: boolean, maximum?: number, below_maximum?: boolean, whole?: boolean, words?: ReadonlyArray<string>, presence: string, default?: string, };
+export type LanguageParameter = { names: ReadonlyArray<string>, meaning: string, kind: string, unit: string, range: string, minimum?: number, above_minimum?: boolean, maximum?: number, below_maximum?: boolean, whole?: boolean, words?: ReadonlyArray<string>, presence: string, default?: string, fixed?: boolean, };
 
 export type CurveMode = { name: string, about: string, };
 

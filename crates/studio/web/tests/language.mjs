@@ -57,7 +57,7 @@ test("every parameter of every command is reached on the page", async (t) => {
     await page.keyboard.press("Escape");
     let within = inspector;
     if (subject?.role === "quotes") {
-      // A mesh is made of a model beside the script.
+      // A mesh is made of a model beside the script, a text of letters.
       await page.locator(".tile", { has: page.getByText(name, { exact: true }) }).click();
     } else if (subject) {
       // What refers to a name is made with it: here a group, from an object.

@@ -176,11 +176,13 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
         let library = Library::new(MemoryFiles::from([("m.obj", MODEL.to_vec())]));
         for (mesh, tone) in
             ["", " red", " chrome", " glassy", " own", " glassy flat", " red smooth 180", " red smooth 60"]
+                .map(|mesh| format!("Mesh \"m.obj\"{mesh}"))
                 .into_iter()
-                .flat_map(|mesh| ["", "Tone srgb\n"].map(|tone| (mesh, tone)))
+                .chain(["", " red", " glassy"].map(|surface| format!("Text \"D\" 1.6 .4{surface} centre")))
+                .flat_map(|mesh| ["", "Tone srgb\n"].map(|tone| (mesh.clone(), tone)))
         {
             for used in [false, true] {
-                let line = format!("Mesh \"m.obj\"{mesh}\n");
+                let line = format!("{mesh}\n");
                 let line = match used {
                     true => format!("Group g\n{line}End\nUse g .1 .2 -.3 10 20 30 .8\n"),
                     false => line,

@@ -1,14 +1,14 @@
-//! Meshes: the triangles of a model in a file.
+//! Meshes: the triangles of a model in a file, and of letters.
 
 use std::fmt;
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayfold_assets::{Model, Smoothing};
+use rayfold_assets::{Align, Lettering, Model, Smoothing};
 
 use super::Motion;
-use crate::form::{Form, Line, Numbers, Quotes, Subject, quoted_word, write_number};
-use crate::model::invalid::{Faults, InvalidValue, Parameter};
+use crate::form::{Field, Form, Kind, Line, Numbers, Quotes, Subject, Values, quoted_word, write_number};
+use crate::model::invalid::{Faults, InvalidValue, Parameter, not_negative, positive};
 use crate::model::material::{Coefficients, Finish, Material};
 use crate::model::surface;
 
@@ -16,48 +16,110 @@ use crate::model::surface;
 pub(crate) const MESH: Form = Form::new("Mesh", &[surface::AMBIENT, surface::DIFFUSE, surface::MIRROR])
     .with_subject(Subject::Quotes(Quotes::File))
     .with_optional_surface()
+    .with_options(&[SMOOTH, FLAT])
     .with_usage("Mesh \"FILE\" [M] [smooth a or flat]");
 
 /// The words before and in place of the angle.
 pub(crate) const SMOOTH: &str = "smooth";
 pub(crate) const FLAT: &str = "flat";
 
+const SIZE: Field = Field::new(Parameter::LetterSize, &["SIZE"], Kind::Length, Values::Positive);
+const DEPTH: Field = Field::new(Parameter::LetterDepth, &["DEPTH"], Kind::Length, Values::NotNegative);
+
+/// The command that draws letters.
+pub(crate) const TEXT: Form =
+    Form::new("Text", &[SIZE, DEPTH, surface::AMBIENT, surface::DIFFUSE, surface::MIRROR])
+        .with_subject(Subject::Quotes(Quotes::Words))
+        .with_optional_surface()
+        .with_options(&["left", "centre", "right", FONT])
+        .fixed_first(2)
+        .with_usage("Text \"TEXT\" SIZE DEPTH [M] [left or centre or right] [font \"FILE\"]");
+
+/// The word before the file of a font.
+pub(crate) const FONT: &str = "font";
+
+/// Returns the place of lines that a word gives.
+pub(crate) fn align_from_word(word: &str) -> Option<Align> {
+    let all = [Align::Left, Align::Center, Align::Right];
+    all.into_iter().find(|align| align_word(*align).eq_ignore_ascii_case(word))
+}
+
+fn align_word(align: Align) -> &'static str {
+    match align {
+        Align::Left => "left",
+        Align::Center => "centre",
+        Align::Right => "right",
+    }
+}
+
+/// Reads the size and the depth of letters.
+pub(crate) fn letter_plate(numbers: &mut Numbers<'_>) -> Result<(f64, f64), Faults> {
+    let size = positive(Parameter::LetterSize, numbers.number());
+    let depth = not_negative(Parameter::LetterDepth, numbers.number());
+    match (size, depth) {
+        (Ok(size), Ok(depth)) => Ok((size, depth)),
+        (size, depth) => Err(Faults(size.err().into_iter().chain(depth.err()).collect())),
+    }
+}
+
+/// Reads the numbers behind those of [`letter_plate`].
+pub(crate) fn letter_surface(numbers: &mut Numbers<'_>) -> Result<Material, Faults> {
+    numbers.pair();
+    mesh_surface(numbers)
+}
+
 /// Reads the numbers behind the name of the file.
 pub(crate) fn mesh_surface(numbers: &mut Numbers<'_>) -> Result<Material, Faults> {
     Ok(Material::read(numbers)?)
 }
 
+/// The origin of triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// The model in a file.
+    File {
+        /// The name of the file.
+        name: Arc<str>,
+        /// The normals with which the triangles are shaded.
+        smoothing: Smoothing,
+    },
+    /// Letters cut out of a plate.
+    Text(Arc<Lettering>),
+}
+
 /// The triangles of a model, as one object.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    file: Arc<str>,
-    smoothing: Smoothing,
+    source: Source,
     model: Arc<Model>,
     material: Material,
     has_material: bool,
 }
 
 impl Mesh {
-    /// Makes a mesh. Without a material it has the colours of its file.
-    pub fn new(file: &str, smoothing: Smoothing, model: Arc<Model>, material: Option<Material>) -> Self {
+    /// Makes a mesh. Without a material it has the colours of its file; letters have the colour .8.
+    pub fn new(source: Source, model: Arc<Model>, material: Option<Material>) -> Self {
         let has_material = material.is_some();
         let material = material.unwrap_or_else(of_file);
-        Self { file: file.into(), smoothing, model, material, has_material }
+        Self { source, model, material, has_material }
     }
 
-    /// Returns the name of the file.
-    pub fn file(&self) -> &str {
-        &self.file
+    /// Returns the origin of the triangles.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Returns the name of the file of a model; `None` for letters.
+    pub fn file(&self) -> Option<&str> {
+        match &self.source {
+            Source::File { name, .. } => Some(name),
+            Source::Text(_) => None,
+        }
     }
 
     /// Returns the triangles.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
-    }
-
-    /// Returns the normals with which the triangles are shaded.
-    pub fn smoothing(&self) -> Smoothing {
-        self.smoothing
     }
 
     /// Returns the material of the surface. Where it has the colours of the file, its own are factors of them.
@@ -106,16 +168,33 @@ impl Mesh {
         f: &mut fmt::Formatter<'b>,
         surface: impl FnOnce(&mut fmt::Formatter<'b>) -> fmt::Result,
     ) -> fmt::Result {
-        f.write_str(MESH.name)?;
-        f.write_str(" ")?;
-        f.write_str(&quoted_word(&self.file))?;
-        surface(f)?;
-        match self.smoothing {
-            Smoothing::OfFile => {}
-            Smoothing::Flat => write!(f, " {FLAT}")?,
-            Smoothing::Within(degrees) => {
-                write!(f, " {SMOOTH} ")?;
-                write_number(f, degrees)?;
+        match &self.source {
+            Source::File { name, smoothing } => {
+                write!(f, "{} {}", MESH.name, quoted_word(name))?;
+                surface(f)?;
+                match smoothing {
+                    Smoothing::OfFile => {}
+                    Smoothing::Flat => write!(f, " {FLAT}")?,
+                    Smoothing::Within(degrees) => {
+                        write!(f, " {SMOOTH} ")?;
+                        write_number(f, *degrees)?;
+                    }
+                }
+            }
+            Source::Text(lettering) => {
+                let Lettering { text, size, depth, align, font } = &**lettering;
+                write!(f, "{} {}", TEXT.name, quoted_word(text))?;
+                for number in [*size, *depth] {
+                    f.write_str(" ")?;
+                    write_number(f, number)?;
+                }
+                surface(f)?;
+                if *align != Align::Left {
+                    write!(f, " {}", align_word(*align))?;
+                }
+                if let Some(font) = font {
+                    write!(f, " {FONT} {}", quoted_word(font))?;
+                }
             }
         }
         f.write_str("\n")
@@ -125,8 +204,7 @@ impl Mesh {
 /// Two meshes are equal if they are of the same model in memory.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
-        self.file == other.file
-            && self.smoothing == other.smoothing
+        self.source == other.source
             && self.material == other.material
             && self.has_material == other.has_material
             && Arc::ptr_eq(&self.model, &other.model)

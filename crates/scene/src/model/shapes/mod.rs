@@ -21,8 +21,8 @@ use glam::DVec3;
 
 pub(crate) use instance::USE;
 pub use instance::{Instance, Placement};
-pub use mesh::Mesh;
-pub(crate) use mesh::{FLAT, MESH, SMOOTH, mesh_surface};
+pub(crate) use mesh::{FLAT, FONT, MESH, TEXT, align_from_word, letter_plate, letter_surface, mesh_surface};
+pub use mesh::{Mesh, Source};
 
 use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
@@ -75,7 +75,7 @@ macro_rules! objects {
             $(#[doc = $summary] $Shape($Shape),)*
             /// An object of a group, as it is drawn.
             Instance(Instance),
-            /// The triangles of a model.
+            /// The triangles of a model, or of letters.
             Mesh(Mesh),
         }
 

@@ -47,7 +47,7 @@ export function Inspector(): JSX.Element {
       {table && (
         <h3 class="subject">
           <Icon of={iconOf(table.name, table.role)} />
-          <b>{visible(line?.name ?? inspected?.subject ?? table.name) || table.name}</b>
+          <b>{visible(line?.name ?? inspected?.text ?? inspected?.subject ?? table.name) || table.name}</b>
           <span class="note">{table.name}</span>
         </h3>
       )}
@@ -91,10 +91,30 @@ export function Inspector(): JSX.Element {
           </select>
         </p>
       )}
+      {inspected && inspected.text !== null && <TextRow key={`${inspected.line}:${inspected.text}`} text={inspected.text} line={inspected.line} />}
       {inspected && fields.map((field) => <FieldRow key={`${inspected.line}:${field.first}`} field={field} inspected={inspected} />)}
       {inspected?.material && <MaterialRow name={inspected.material} line={inspected.line} />}
       {count === 0 ? <SceneSettings /> : !inspected && <p class="note">The selection has no numbers to set; see the script.</p>}
     </Panel>
+  );
+}
+
+/** The words of a text. They change when the field is left, or with Control and Enter. */
+function TextRow({ text, line }: { readonly text: string; readonly line: number }): JSX.Element {
+  return (
+    <p class="field">
+      <span class="label">words</span>
+      <textarea
+        aria-label="words"
+        rows={Math.min(8, text.split("\n").length)}
+        defaultValue={text}
+        onChange={(event) => ask({ ask: "words", line, text: event.currentTarget.value })}
+        onKeyDown={(event) => {
+          event.stopPropagation();
+          if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) event.currentTarget.blur();
+        }}
+      />
+    </p>
   );
 }
 
@@ -285,7 +305,7 @@ function FieldRow({ field, inspected }: FieldProps): JSX.Element {
           </button>
         </>
       )}
-      {field.names.length > 1 && <KeyButton inspected={inspected} numbers={field.names.map((_, i) => field.first + i)} label={word} />}
+      {field.names.length > 1 && !field.fixed && <KeyButton inspected={inspected} numbers={field.names.map((_, i) => field.first + i)} label={word} />}
       {isOpen && (
         <div class="numbers">
           {field.names.map((name, i) => (
@@ -450,7 +470,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
       )}
       <NumberField label={label} value={value === undefined ? undefined : round(value)} set={(asked) => set(inspected.line, at, [asked], null)} />
       {field.names.length === 1 && unitOf(field.unit) && <span class="unit">{unitOf(field.unit)}</span>}
-      <KeyButton inspected={inspected} numbers={[at]} label={label} />
+      {!field.fixed && <KeyButton inspected={inspected} numbers={[at]} label={label} />}
     </p>
   );
 }

@@ -22,6 +22,8 @@ const WORDS: Readonly<Record<string, string>> = {
   "radius Rb": "radius at the end",
   "thickness r": "thickness",
   "view-up": "up",
+  "size of the letters": "size",
+  "depth of the letters": "depth",
   "window's distance s": "window distance",
   "window's corner": "window corner",
   "number of samples": "samples",

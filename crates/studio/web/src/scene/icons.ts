@@ -1,7 +1,8 @@
 // The icons of commands.
 
 import {
-  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Pill, Settings2, Shapes, Square, Sun, Torus, Triangle, Video,
+  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Pill, Settings2, Shapes, Square, Sun, Torus, Triangle, Type,
+  Video,
 } from "lucide";
 
 import type { Role } from "../protocol";
@@ -16,6 +17,7 @@ const COMMANDS: Readonly<Record<string, IconNode>> = {
   Cone,
   Torus,
   Capsule: Pill,
+  Text: Type,
   Ilight: Sun,
   Plight: Lightbulb,
 };

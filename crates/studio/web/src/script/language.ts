@@ -50,8 +50,9 @@ function takesColor(entry: LanguageEntry | null, given: number, behindColor: boo
   let first = 0;
   for (const parameter of entry?.parameters ?? []) {
     const isColor = parameter.names.length === 3 && (parameter.kind === "colour" || parameter.kind === "coefficients");
-    // Behind the file of a mesh a colour may stand.
-    const mayStand = parameter.presence === "required" || (given === 0 && entry?.subject?.role === "quotes");
+    // A colour may stand in place of the surface of a mesh or a text.
+    const isSurface = entry?.subject?.role === "quotes" && parameter.names[0] === entry.material_instead_from;
+    const mayStand = parameter.presence === "required" || isSurface;
     if (first === given && isColor && (behindColor || mayStand)) return true;
     first += parameter.names.length;
   }
