@@ -129,6 +129,27 @@ fn attempt_picture(bytes: &[u8]) {
     }
 }
 
+fn exr(compression: Compression, tiles: Option<usize>) -> Vec<u8> {
+    let blocks =
+        tiles.map_or(exr::image::Blocks::ScanLines, |of| exr::image::Blocks::Tiles(exr::math::Vec2(of, of)));
+    let encoding = Encoding { compression, blocks, ..Encoding::UNCOMPRESSED };
+    let channels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
+        (exr::prelude::f16::from_f32(at.0 as f32), at.1 as f32, 0.5f32)
+    });
+    let image = Image::from_layer(Layer::new((9, 7), LayerAttributes::named("a"), encoding, channels));
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut bytes).unwrap();
+    bytes.into_inner()
+}
+
+/// The reader of these panics on malformed data.
+#[test]
+fn the_compression_b44_is_refused_by_its_name() {
+    let library = Library::new(MemoryFiles::from([("x", exr(Compression::B44, None))]));
+    let error = library.picture("x", Purpose::Sky).unwrap_err().to_string();
+    assert!(error.contains("its compression is B44: save it with"), "{error}");
+}
+
 /// A picture in each format.
 static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let colors =
@@ -152,18 +173,9 @@ static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         (Compression::ZIP16, None),
         (Compression::PIZ, Some(4)),
         (Compression::PXR24, None),
-        (Compression::B44, Some(5)),
+        (Compression::ZIP1, Some(5)),
     ] {
-        let blocks = tiles
-            .map_or(exr::image::Blocks::ScanLines, |of| exr::image::Blocks::Tiles(exr::math::Vec2(of, of)));
-        let encoding = Encoding { compression, blocks, ..Encoding::UNCOMPRESSED };
-        let channels = SpecificChannels::rgb(|at: exr::math::Vec2<usize>| {
-            (exr::prelude::f16::from_f32(at.0 as f32), at.1 as f32, 0.5f32)
-        });
-        let image = Image::from_layer(Layer::new((9, 7), LayerAttributes::named("a"), encoding, channels));
-        let mut bytes = Cursor::new(Vec::new());
-        image.write().non_parallel().to_buffered(&mut bytes).unwrap();
-        all.push(bytes.into_inner());
+        all.push(exr(compression, tiles));
     }
     let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n".to_vec();
     for _ in 0..2 {

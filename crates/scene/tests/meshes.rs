@@ -184,7 +184,7 @@ fn a_caller_without_files_says_who_reads_them() {
     let parsed = parse("a.txt", b"Screen 4 3\nMesh \"corner.obj\"\nTrace", &Limits::default());
     assert!(parsed.script.is_none());
     let message = &parsed.diagnostics[0].message;
-    assert!(message.contains("`rayfold render` and `rayfold studio` alone"), "{message}");
+    assert!(message.contains("files are not read here"), "{message}");
     assert_eq!(parsed.files, ["corner.obj"]);
 }
 

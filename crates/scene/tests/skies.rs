@@ -133,7 +133,7 @@ fn what_is_wrong_is_said() {
     let parsed = parsed("Screen 4 3\nSky \"c.png\"\nTrace\n");
     assert_eq!(parsed.files, ["c.png"]);
     let unread = rayfold_scene::parse("a.txt", b"Screen 4 3\nSky \"a.png\"\nTrace\n", &Limits::default());
-    assert!(unread.diagnostics[0].message.contains("`rayfold render`"), "{:?}", unread.diagnostics);
+    assert!(unread.diagnostics[0].message.contains("files are not read here"), "{:?}", unread.diagnostics);
 }
 
 #[test]

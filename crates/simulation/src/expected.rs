@@ -81,9 +81,7 @@ impl Expected {
         let expects = self.settings.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
         if self.frames.is_empty() {
             Status::Empty
-        } else if (self.frames.len() as u64) < expects {
-            Status::Waiting
-        } else if waits && self.frames.iter().any(|shot| shot.waits) {
+        } else if (self.frames.len() as u64) < expects || waits && self.frames.iter().any(|shot| shot.waits) {
             Status::Waiting
         } else if self.settings.is_none() || self.frames.iter().any(|shot| shot.picture.is_none()) {
             Status::Failed

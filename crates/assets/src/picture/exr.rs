@@ -49,6 +49,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
         return Err(Fault::new("its R, G and B have fewer values than pixels"));
     }
     match header.compression {
+        // The reader panics on malformed data of these two.
+        Compression::B44 => return Err(unread("B44")),
+        Compression::B44A => return Err(unread("B44A")),
         Compression::DWAA(_) => return Err(unread("DWAA")),
         Compression::DWAB(_) => return Err(unread("DWAB")),
         _ => {}
