@@ -57,7 +57,7 @@ async fn a_script_waits_for_its_file_and_says_so() {
     assert_eq!(world.status(), (Status::Waiting, 1, 0, 1));
     let FrameState::Waiting(fault) = &world.manifest().frames[0].state else { panic!() };
     assert_eq!(fault.reason.as_ref().unwrap().message, "1.txt waits for earth");
-    assert_eq!(world.keys("assemblies/"), [String::new(); 0]);
+    assert!(world.keys("assemblies/").is_empty());
 
     world.later(Duration::from_secs(1)).await;
     world.put(EARTH, "blue");
@@ -95,7 +95,7 @@ async fn a_changed_file_has_only_the_scripts_drawn_again_that_name_it() {
     world.put(EARTH, "blue");
     let parts = world.keys("parts/");
     world.render(EARTH).await;
-    assert_eq!(world.woken(&parts).await, [String::new(); 0]);
+    assert!(world.woken(&parts).await.is_empty());
     assert_eq!((world.status(), world.manifest().head.generation), ((Status::Done, 2, 0, 0), before));
 }
 
