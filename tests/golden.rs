@@ -11,7 +11,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::{GenericImage as _, Rgb, RgbImage};
-use rayfold_scene::{Limits, Samples, Scene, Screen, parse};
+use rayfold_scene::assets::{Library, MemoryFiles};
+use rayfold_scene::{Limits, Samples, Scene, Screen, parse_with_files};
 use rayfold_tracer::{RenderOptions, reference, render};
 
 /// The tolerance in levels: a result at the border between two levels may round either way.
@@ -70,6 +71,16 @@ fn lamp() {
 }
 
 #[test]
+fn logo() {
+    check_curves("logo", &[1, 26]);
+}
+
+#[test]
+fn grove() {
+    check_curves("grove", &[1, 12]);
+}
+
+#[test]
 fn every_scene_is_shown_and_has_golden_frames() {
     let readme = fs::read_to_string(root().join("scenes/README.md")).unwrap();
     let mut count = 0;
@@ -86,7 +97,7 @@ fn every_scene_is_shown_and_has_golden_frames() {
         let size = fs::metadata(&picture).unwrap_or_else(|e| panic!("{}: {e}", picture.display())).len();
         assert!(size < 1_000_000, "{} has {size} bytes", picture.display());
     }
-    assert_eq!(count, 10);
+    assert_eq!(count, 12);
 }
 
 /// Checks some frames of a folder with a script per frame.
@@ -128,7 +139,9 @@ fn by_reference(scene: &Scene) -> RgbImage {
 /// Loads frame `k`, counted from 0, of a script, at the size of golden frames.
 fn load(script: &str, k: usize) -> Scene {
     let text = fs::read(root().join(script)).unwrap_or_else(|e| panic!("{script}: {e}"));
-    let parsed = parse(script, &text, &Limits::default());
+    let rabbit = fs::read(root().join("scenes/grove/rabbit.ply")).unwrap();
+    let files = Library::new(MemoryFiles::from([("rabbit.ply", rabbit)]));
+    let parsed = parse_with_files(script, &text, &Limits::default(), &files);
     let parsed_script = parsed.script.unwrap_or_else(|| panic!("{script}: {:?}", parsed.diagnostics));
     let mut scene = parsed_script.frame(k).unwrap();
     scene.screen = Screen::new(SIDE, SIDE).unwrap();

@@ -340,6 +340,10 @@ fn touching_one_object_of_each_example_changes_its_line_alone() {
     {
         let project = Project::open(&entry).unwrap();
         let text = String::from_utf8(project.files[0].document.bytes()).unwrap();
+        if text.contains("\nMesh ") {
+            // Its model is in its folder.
+            continue;
+        }
         let mut desk = Desk::new(&text);
         let objects = desk.session.shown(&desk.project).source_map.objects.clone();
         for line in objects.into_iter().take(12) {
