@@ -98,16 +98,3 @@ fn pictures_are_read_copied_and_missed_as_models_are() {
     folder.write("film/sky.hdr", &LIGHT[..20]);
     assert!(said(1).contains("`sky.hdr`: its header has no end"), "{}", said(1));
 }
-
-#[test]
-fn submit_says_that_a_bucket_reads_no_files_yet() {
-    let folder = Folder::with("film/1.txt", SCRIPT);
-    folder.write("film/corner.obj", CORNER);
-    folder.write("film/colours.mtl", COLORS);
-    let output = folder.rayfold("submit film --bucket b").assert().code(1).get_output().stderr.clone();
-    let said = String::from_utf8(output).unwrap();
-    assert!(
-        said.contains("the scripts name files, such as `colours.mtl`, which are not read in a bucket yet"),
-        "{said}"
-    );
-}

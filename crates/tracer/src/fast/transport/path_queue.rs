@@ -2,11 +2,10 @@
 //!
 //! Rays wait by the number of hits before them, and by how they went on from the last. They are traced a batch at a time, from
 //! the longest paths of which there are enough for a batch. So no queue holds more than some batches, however many rays there
-//! are. What a ray adds to a pixel is summed as that of [`RayQueues`] is.
+//! are. What a ray adds to a pixel is summed as that of the other queues is.
 
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
-use crate::fast::transport::ray_queue::RayQueues;
 use crate::sampling::paths::Way;
 
 /// The number of rays in a full batch.
@@ -98,20 +97,6 @@ impl<E: Real> PathQueues<E> {
             self.turns[k] = ray.turns;
         }
         true
-    }
-}
-
-impl<E: Real> RayQueues<'_, E> {
-    /// Fills the batch with rays of paths. Returns false if there are none, or if the drawing was cancelled.
-    pub(crate) fn take_paths(&mut self, queue: &mut RayBatch<E>) -> bool {
-        !self.is_cancelled() && self.paths.take(queue, &mut self.marks)
-    }
-
-    /// Returns the share of its pixel that stays clear if a ray of the batch reaches nothing after so many hits, in scenes
-    /// without background; at most 0 if it counts for nothing then.
-    #[inline(always)]
-    pub(crate) fn clear_share(&self, ray: usize, hits: u32) -> f64 {
-        if hits == 0 { 1.0 } else { self.marks.0[ray].widen() }
     }
 }
 

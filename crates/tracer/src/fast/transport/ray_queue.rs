@@ -264,6 +264,20 @@ impl<'a, E: Real> RayQueues<'a, E> {
     }
 }
 
+impl<E: Real> RayQueues<'_, E> {
+    /// Fills the batch with rays of paths. Returns false if there are none, or if the drawing was cancelled.
+    pub(crate) fn take_paths(&mut self, queue: &mut RayBatch<E>) -> bool {
+        !self.is_cancelled() && self.paths.take(queue, &mut self.marks)
+    }
+
+    /// Returns the share of its pixel that stays clear if a ray of the batch reaches nothing after so many hits, in scenes
+    /// without background; at most 0 if it counts for nothing then.
+    #[inline(always)]
+    pub(crate) fn clear_share(&self, ray: usize, hits: u32) -> f64 {
+        if hits == 0 { 1.0 } else { self.marks.0[ray].widen() }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};
