@@ -13,7 +13,12 @@ use crate::shown::{grouped, nearest, quoted};
 
 mod files;
 
-pub(super) use files::*;
+pub(super) use files::{
+    bad_smooth_angle, blank_text, malformed_quote, model_doubt, no_file_name, no_font, no_image_file,
+    no_image_width, no_map, no_quotes, no_smooth_angle, no_uv, open_glass, own_without_file, sky_in_fog,
+    text_option_again, too_many_mesh_options, two_paths, unknown_option, unknown_text_option, unusable_file,
+    unusable_letters,
+};
 
 /// The help text about `Trace`.
 const TRACE_HELP: &str = "`Trace` renders a frame of everything that stands before it";
