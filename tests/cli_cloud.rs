@@ -165,7 +165,7 @@ async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
         cloud.rayfold("submit a --name film", 0);
         cloud.rayfold("submit b --name film/two", 0);
         let said = cloud.says("submit b/f.txt", 0);
-        assert!(said.contains("/scripts/f/: 1 script uploaded"), "{said}");
+        assert!(said.contains("/scripts/f/: 1 file uploaded"), "{said}");
         cloud.rayfold("remove f --delete", 0);
         let said = cloud.says("remove film --delete", 0);
         assert!(said.starts_with("film: ") && said.contains("removed"), "{said}");
@@ -203,7 +203,7 @@ async fn what_is_ignored_misnamed_and_misplaced_is_what_the_status_says() {
         }
         let said = cloud.says("submit film", 0);
         let warning = "warning: film/3.TXT: not read: expected the ending .txt in small letters";
-        assert!(said.contains(warning) && said.contains("1 script uploaded"), "{said}");
+        assert!(said.contains(warning) && said.contains("1 file uploaded"), "{said}");
         for key in ["scripts/film/._1.txt", "scripts/film/3.TXT", "scripts/1.txt", "Scripts/film/1.txt"] {
             cloud.stage.put(key, scene(9.0)).await;
         }

@@ -84,7 +84,7 @@ async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
             // The sizes are equal, so only the object itself shows whether it has changed.
             uploader.write("film/f2.txt", &scene(7.0));
             let said = uploader.can("submit film -o second.gif");
-            assert!(said.contains("1 script uploaded"), "{said}");
+            assert!(said.contains("1 file uploaded"), "{said}");
             uploader.can("status");
             uploader.can("status film");
             uploader.can("fetch film -o again.gif");

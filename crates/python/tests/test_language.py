@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+import pathlib
 import re
 
 import pytest
@@ -76,8 +77,8 @@ def test_every_command_is_reached_with_all_its_parameters(name, tmp_path, monkey
         except ValueError as error:
             refused.append(str(error))
             continue
-        # The file is a model, and no font.
-        errors = [d for d in scene.check() if d.severity == "error" and "no font" not in d.message]
+        # The file is a model, and neither a font nor a picture.
+        errors = [d for d in scene.check() if d.severity == "error" and not re.search("no (font|picture)", d.message)]
         if not errors:
             break
         refused.extend(map(str, errors))
@@ -92,7 +93,16 @@ def test_every_command_is_reached_with_all_its_parameters(name, tmp_path, monkey
 
 
 @pytest.mark.parametrize("name", CLAUSES)
-def test_every_clause_is_reached(name):
+def test_every_clause_is_reached(name, tmp_path, monkeypatch):
+    if name == "image":
+        monkeypatch.chdir(tmp_path)
+        pixel = pathlib.Path(__file__).parents[2] / "scene/tests/pixel.png"
+        (tmp_path / "pixel.png").write_bytes(pixel.read_bytes())
+        scene = rf.Scene(8, 6)
+        scene.sphere(1, (0, 0, -5), image=("pixel.png", "ball"))
+        assert [d for d in scene.check() if d.severity == "error"] == []
+        assert ' image "pixel.png" ball' in str(scene)
+        return
     entries = CLAUSES[name]
     refused = []
     for step, first in [(1, 1), (-1, 40), (0.01, 0.1)]:

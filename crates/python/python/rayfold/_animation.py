@@ -116,10 +116,10 @@ class Animation:
         files = {}
         for folder, names in (named for _, _, named in scripts):
             for name in names:
-                path = os.path.join(folder, name)
+                file = os.path.join(folder, name)
                 # What a model refers to may be absent.
-                if os.path.exists(path) and not os.path.samefile(path, files.setdefault(name, path)):
-                    raise ValueError(f"submit(): {files[name]} and {path} would be one file of the animation: rename one")
+                if os.path.exists(file) and not os.path.samefile(file, files.setdefault(name, file)):
+                    raise ValueError(f"submit(): {files[name]} and {file} would be one file of the animation: rename one")
         with _Progress(progress) as bar:
             report = bar.at if progress else None
             return _rayfold.submit(address, texts, list(files.items()), settings, path, delete, wait, report)
