@@ -133,7 +133,10 @@ fn by_paths(scene: &Scene, (column, row): (u32, u32), paths: u32) -> Block {
     let (width, height) = (f64::from(SIZE.0 / BLOCKS.0), f64::from(SIZE.1 / BLOCKS.1));
     let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
     for _ in 0..paths {
-        let (u, v) = (dice.borrow_mut().f64(), dice.borrow_mut().f64());
+        let (u, v) = {
+            let mut dice = dice.borrow_mut();
+            (dice.f64(), dice.f64())
+        };
         let x = (f64::from(column) + u) * width - 0.5;
         // Rows count from the bottom.
         let y = f64::from(SIZE.1) - 0.5 - (f64::from(row) + v) * height;

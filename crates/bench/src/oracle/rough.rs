@@ -51,7 +51,10 @@ fn mirrored(view: DVec3, normal: DVec3) -> DVec3 {
 pub(super) fn random_facet(alpha: f64, view: DVec3, normal: DVec3, dice: &RefCell<Rng>) -> Facet {
     let (x, y) = normal.any_orthonormal_pair();
     let local = DVec3::new(view.dot(x), view.dot(y), view.dot(normal));
-    let numbers = (dice.borrow_mut().f64(), dice.borrow_mut().f64());
+    let numbers = {
+        let mut dice = dice.borrow_mut();
+        (dice.f64(), dice.f64())
+    };
     let Facet { normal: n, weight } = facet(alpha, local, numbers);
     Facet { normal: (n.x * x + n.y * y + n.z * normal).normalize(), weight }
 }
