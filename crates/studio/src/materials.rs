@@ -399,8 +399,10 @@ mod tests {
                 continue;
             };
             let parsed = parse(&on);
-            // A ball has no colours of a file.
-            let is_meant = |d: &rayfold_scene::Diagnostic| d.code == rayfold_scene::Code::NoEffect;
+            // A ball has no colours of a file, and there is one ray per pixel.
+            let is_meant = |d: &rayfold_scene::Diagnostic| {
+                matches!(d.code, rayfold_scene::Code::NoEffect | rayfold_scene::Code::NeedsSamples)
+            };
             assert!(parsed.diagnostics.iter().all(is_meant), "{on}\n{:?}", parsed.diagnostics);
             let at = on.lines().position(|line| line.contains(clause.name())).unwrap();
             let off = toggled(&on, at, clause).unwrap();
