@@ -188,14 +188,14 @@ fn the_packets_draw_letters_like_the_reference() {
 
 #[test]
 fn a_letter_that_is_a_box_is_drawn_as_one() {
-    // The letter I of the font is a rectangle.
-    let letter = scene("Text \"I\" 2.4 .5 centre");
+    // The letter l of the font is a rectangle.
+    let letter = scene("Text \"l\" 2.4 .5 centre");
     let [low, high] = letter.objects.iter().find(|o| matches!(o, Object::Mesh(_))).unwrap().bounds().unwrap();
     let [low, high] = [low, high].map(|p| format!("{} {} {}", p.x, p.y, p.z));
     for (material, most) in [("red", 0.01), ("chrome", 0.01), ("glassy", 0.02), ("checks", 0.01)] {
         let used =
             |inner: &str| drawn(&scene(&format!("Group g\n{inner}\nEnd\nUse g .3 -.7 .4 10 25 15 .8")));
-        let text = used(&format!("Text \"I\" 2.4 .5 {material} centre"));
+        let text = used(&format!("Text \"l\" 2.4 .5 {material} centre"));
         let cuboid = used(&format!("Box {low} {high} {material}"));
         let off = difference(&text, &cuboid);
         assert!(off < most, "{material}: {off} levels");
