@@ -99,7 +99,7 @@ run "objects" {
         ]) : trimprefix(resource, "arn:aws:s3:::demo-123456789012-eu-central-1/")
       ]))
       } == {
-      render   = "assemblies/* frames/*.band frames/*.begun-* frames/*.cut-* frames/*.error.json frames/*.png frames/*.split-* manifests/* parts/*"
+      render   = "assemblies/* frames/*.band frames/*.begun-* frames/*.cut-* frames/*.error.json frames/*.files-* frames/*.png frames/*.split-* frames/*.taken frames/*.waits.json manifests/* parts/*"
       assemble = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@sweep.json manifests/* retries/*"
       record   = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@sweep.json manifests/* retries/*"
     }
