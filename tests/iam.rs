@@ -20,7 +20,7 @@ use stage::stores::on_every_store_with_roles;
 const BUCKET: &str = "films";
 
 /// One key of each kind, and some keys outside the pipeline.
-const KEYS: [&str; 26] = [
+const KEYS: [&str; 29] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
