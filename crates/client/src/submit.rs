@@ -129,7 +129,7 @@ impl Submission {
     pub fn with_files(mut self, files: impl IntoIterator<Item = (String, File)>) -> Result<Self> {
         for (name, file) in files {
             let key = format!("{}{name}", self.animation.scripts());
-            if !is_file(&key) {
+            if !Uploaded::is_file(&key) {
                 let problem = "scripts name no such file";
                 return Err(rayfold_pipeline::Error::Key { key, problem }.into());
             }
@@ -202,7 +202,8 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         if total > 0 {
             report(Sending::Uploading { done: 0, total });
         }
-        let (first, last): (Vec<String>, Vec<String>) = changed.into_iter().partition(|key| is_file(key));
+        let (first, last): (Vec<String>, Vec<String>) =
+            changed.into_iter().partition(|key| Uploaded::is_file(key));
         let mut sent = 0;
         for keys in [first, last] {
             let show = |done| report(Sending::Uploading { done: sent + done, total });
@@ -283,10 +284,6 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
         Ok(())
     }
-}
-
-fn is_file(key: &str) -> bool {
-    matches!(Uploaded::of(key, 1), Uploaded::File(..))
 }
 
 #[cfg(test)]

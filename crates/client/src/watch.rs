@@ -216,16 +216,16 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
     /// Returns the versions of the animation's scripts, with their files, and settings, by key.
     async fn versions(&self, animation: &Animation) -> Result<BTreeMap<String, ETag>> {
         let scripts = self.list(ListRequest::level(animation.scripts())).await?.objects;
-        let has_files =
-            scripts.iter().any(|object| matches!(Uploaded::of(&object.key, object.size), Uploaded::File(..)));
+        let has_files = scripts.iter().any(|object| Uploaded::is_file(&object.key));
         let receipts = match has_files {
             true => self.list(ListRequest::level(animation.frames())).await?.objects,
             false => Vec::new(),
         };
-        let versions = script_versions(animation, &scripts, &receipts);
+        let settings = scripts.iter().find(|object| object.key == animation.settings());
+        let settings = settings.map(|object| (object.key.clone(), object.etag.clone()));
+        let versions = script_versions(animation, scripts, receipts);
         let versions = versions.into_iter().map(|(name, version)| (animation.script(&name), version));
-        let settings = scripts.into_iter().filter(|object| object.key == animation.settings());
-        Ok(versions.chain(settings.map(|object| (object.key, object.etag))).collect())
+        Ok(versions.chain(settings).collect())
     }
 
     /// Waits until the submission has become a GIF, or the manifest says why it will not. Reports
@@ -299,8 +299,7 @@ fn is_of_scripts(manifest: &Manifest, animation: &Animation, versions: &BTreeMap
     let mut seen: BTreeMap<String, ETag> =
         frames.map(|frame| (animation.script(&frame.script), without_files(&frame.version))).collect();
     seen.extend(manifest.head.settings.version.iter().map(|version| (animation.settings(), version.clone())));
-    let is_file = |key: &str| matches!(Uploaded::of(key, 1), Uploaded::File(..));
-    seen.iter().eq(versions.iter().filter(|(key, _)| !is_file(key)))
+    seen.iter().eq(versions.iter().filter(|(key, _)| !Uploaded::is_file(key)))
 }
 
 /// Returns whether the manifest is about exactly these versions of exactly these scripts and settings.

@@ -19,8 +19,20 @@ pub(crate) struct GivenLibrary {
 #[derive(Default)]
 struct Given {
     files: Files,
+    /// Files of earlier drawings, by their names. They stand in for files that are not given yet, so that models that were
+    /// made of them are not dropped before it is known whether the files have changed.
+    earlier: BTreeMap<String, File>,
     /// The names that were asked for and not given.
     missing: BTreeSet<String>,
+}
+
+impl Given {
+    fn get(&self, name: &str) -> Option<&File> {
+        match self.files.get(name) {
+            Some(file) => file.as_ref(),
+            None => self.earlier.get(name),
+        }
+    }
 }
 
 impl GivenLibrary {
@@ -45,11 +57,10 @@ impl assets::Files for Shared {
 
     fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
         let mut given = lock(&self.0);
-        let Some(file) = given.files.get(name).cloned() else {
+        if !given.files.contains_key(name) {
             given.missing.insert(name.to_owned());
-            return Ok(None);
-        };
-        Ok(file.map(|File { version, body }| {
+        }
+        Ok(given.get(name).map(|File { version, body }| {
             let mut tag = DefaultHasher::new();
             version.as_str().hash(&mut tag);
             FileInfo { bytes: body.len() as u64, tag: tag.finish() }
@@ -57,12 +68,12 @@ impl assets::Files for Shared {
     }
 
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {
-        let file = lock(&self.0).files.get(name).cloned().flatten();
+        let file = lock(&self.0).get(name).cloned();
         file.map(|file| file.body.to_vec()).ok_or_else(|| "it is gone".to_owned())
     }
 }
 
-/// What a process keeps from one drawing to the next.
+/// The files and models that a process keeps from one drawing to the next.
 #[derive(Clone, Default)]
 pub(crate) struct Kept(Arc<Mutex<State>>);
 
@@ -83,10 +94,21 @@ impl std::fmt::Debug for Kept {
 impl Kept {
     /// Passes a library over these files to `then`.
     pub(crate) fn with<T>(&self, files: Files, then: impl FnOnce(&GivenLibrary) -> T) -> T {
+        self.over(Given { files, ..Given::default() }, then)
+    }
+
+    /// Passes a library over these files, and over those of earlier drawings beside them, to `then`.
+    pub(crate) fn with_earlier<T>(&self, files: Files, then: impl FnOnce(&GivenLibrary) -> T) -> T {
+        let name = |key: &str| key.rsplit('/').next().unwrap_or_default().to_owned();
+        let earlier = lock(&self.0).files.iter().map(|(key, file)| (name(key), file.clone())).collect();
+        self.over(Given { files, earlier, ..Given::default() }, then)
+    }
+
+    fn over<T>(&self, given: Given, then: impl FnOnce(&GivenLibrary) -> T) -> T {
         let library = lock(&self.0).library.take().unwrap_or_else(GivenLibrary::new);
-        lock(&library.given).files = files;
+        *lock(&library.given) = given;
         let result = then(&library);
-        lock(&library.given).files = Files::default();
+        *lock(&library.given) = Given::default();
         lock(&self.0).library = Some(library);
         result
     }
@@ -107,4 +129,45 @@ impl Kept {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_pipeline::store::ETag;
+    use rayfold_scene::assets::Smoothing;
+
+    use super::*;
+
+    const CORNER: &str = "mtllib c.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    fn file(text: &str) -> Option<File> {
+        Some(File { version: ETag::new(text), body: text.to_owned().into() })
+    }
+
+    /// As for a frame: first the names that are missing, then the drawing.
+    fn model(kept: &Kept, model: &str) -> Arc<assets::Model> {
+        let files = [("c.obj".to_owned(), file(model)), ("c.mtl".to_owned(), None)];
+        let files: Files = Arc::new(files.into_iter().collect());
+        let asked = kept.with_earlier(Files::default(), |given| {
+            let _ = given.library.model("c.obj", Smoothing::OfFile);
+            given.take_missing()
+        });
+        assert!(asked.contains(&"c.obj".to_owned()), "{asked:?}");
+        kept.keep("scripts/film/c.obj", files["c.obj"].as_ref().unwrap());
+        kept.with(files, |given| {
+            let model = given.library.model("c.obj", Smoothing::OfFile).unwrap();
+            assert!(given.take_missing().is_empty());
+            model
+        })
+    }
+
+    #[test]
+    fn a_model_is_decoded_once_until_its_file_changes() {
+        let kept = Kept::default();
+        let first = model(&kept, CORNER);
+        assert!(Arc::ptr_eq(&first, &model(&kept, CORNER)));
+        let moved = CORNER.replace("v 1 0 0", "v 2 0 0");
+        let second = model(&kept, &moved);
+        assert!(!Arc::ptr_eq(&first, &second) && second.corners(0)[1].x == 2.0);
+    }
 }

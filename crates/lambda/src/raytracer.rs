@@ -80,7 +80,7 @@ impl Renderer for RayTracer {
         }
         let (kept, limits, file) = (self.kept.clone(), self.limits, format!("{name}.txt"));
         run(name, move || {
-            Ok(kept.with(files, |given| {
+            Ok(kept.with_earlier(files, |given| {
                 rayfold_scene::parse_with_files(&file, &script, &limits, &given.library);
                 given.take_missing()
             }))

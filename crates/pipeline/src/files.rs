@@ -1,7 +1,7 @@
 //! The files that scripts name, as the protocol sees them.
 //!
 //! A script that names files is drawn from itself and from those files. Its *version* is therefore its entity tag with the
-//! hash of a [`FileSet`] behind it: which files, and which content each of them has, or that it is absent. The receipts
+//! hash of a *set* of files behind it: each file with the content that it has, or that it is absent. The receipts
 //! `files-…` of a version spell the set out, so that a listing alone shows which version of a script is current: the one
 //! whose set agrees with the files in the listing. If none agrees, the version is the entity tag alone, and no result
 //! belongs to it: the frame is pending.
@@ -19,12 +19,10 @@ use std::sync::Arc;
 use bytes::Bytes;
 
 use crate::invocation::{Invocation, Mutation};
-use crate::keys::{
-    Animation, Entry, FileList, Key, NameHash, Receipt, ScriptName, Tag, Uploaded, VersionHash,
-};
+use crate::keys::{Animation, Entry, FileList, Key, NameHash, Receipt, ScriptName, Tag, VersionHash};
 use crate::reconcile::{FileFound, ReceiptFound, Scripts};
 use crate::render::{File, Files, Renderer};
-use crate::store::{ETag, Listed, Store};
+use crate::store::{ETag, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
 /// The files that a receipt names: with more its key would be too long for some stores.
@@ -152,39 +150,6 @@ fn is_drawn(
         }
     }
     is_taken && !is_cut
-}
-
-/// Returns the version of each script of an animation, from listings of its scripts and of its receipts.
-pub fn script_versions(
-    animation: &Animation,
-    scripts: &[Listed],
-    receipts: &[Listed],
-) -> BTreeMap<ScriptName, ETag> {
-    let mut files = BTreeMap::new();
-    for listed in scripts {
-        if let Uploaded::File(of, name) = Uploaded::of(&listed.key, listed.size)
-            && of == *animation
-        {
-            let (version, modified) = (VersionHash::of(&listed.etag), listed.modified);
-            files.insert(NameHash::of(&name), FileFound { version, modified });
-        }
-    }
-    let found = |listed: &Listed| match listed.key.parse() {
-        Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {
-            Some(ReceiptFound { receipt, etag: listed.etag.clone(), modified: listed.modified })
-        }
-        _ => None,
-    };
-    let receipts: Vec<ReceiptFound> = receipts.iter().filter_map(found).collect();
-    let sets = FileSets::of(&receipts);
-    let version = |listed: &Listed| match listed.key.parse() {
-        Ok(Key::Script { animation: of, name }) if of == *animation => {
-            let version = sets.current(&name, &listed.etag, &files).unwrap_or(&listed.etag).clone();
-            Some((name, version))
-        }
-        _ => None,
-    };
-    scripts.iter().filter_map(version).collect()
 }
 
 impl Scripts {
@@ -364,7 +329,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         for script in &scripts.found {
             let expected = match sets.current(&script.name, &script.version, &scripts.files) {
                 Some(version) if is_drawn(&receipts, &script.name, version, changed) => None,
-                // Whoever put the set has found other files after that.
+                // The writer of the set has found other files after that.
                 Some(version) => Some(version.clone()),
                 None => sets.expected(&script.name, &script.version, &file, &scripts.files),
             };

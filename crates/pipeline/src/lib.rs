@@ -35,11 +35,11 @@ pub use assemble::assemble;
 pub use clock::{Clock, Randomness, SystemClock, Timestamp};
 pub use error::{Cause, Error, Result, found};
 pub use failure::record_failure;
-pub use files::script_versions;
 pub use fold::fold;
 #[cfg(any(test, feature = "simulation"))]
 pub use invocation::ReplayState;
 pub use invocation::{Invocation, Mutation, Policy};
+pub use observe::script_versions;
 pub use reconcile::reconcile;
 pub use render::{BandJoiner, Drawing, File, Files, Renderer, Source, render_frame};
 pub use retry::retry;

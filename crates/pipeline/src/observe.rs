@@ -158,30 +158,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         marks: &[ScriptName],
     ) -> Result<(Scripts, Option<ETag>)> {
         let bounds = marks.iter().map(|name| animation.script(name)).collect();
-        let (mut scripts, mut rejected, mut warnings) = (Scripts::default(), Vec::new(), Vec::new());
-        let mut settings = None;
-        for listed in self.list_level(animation.scripts(), bounds).await? {
-            match Uploaded::of(&listed.key, listed.size) {
-                Uploaded::Script(_, name) => {
-                    scripts.found.push(ScriptFound { name, version: listed.etag, modified: listed.modified });
-                }
-                Uploaded::Settings(_) => settings = Some(listed.etag),
-                Uploaded::Rejected(_, problem) => {
-                    rejected.push(Rejected { key: listed.key, problem: problem.to_owned() });
-                }
-                Uploaded::NearMiss(_, problem) => {
-                    warnings.push(Rejected { key: listed.key, problem: problem.to_owned() });
-                }
-                Uploaded::File(_, name) => {
-                    let (version, modified) = (VersionHash::of(&listed.etag), listed.modified);
-                    scripts.files.insert(NameHash::of(&name), FileFound { version, modified });
-                }
-                Uploaded::Misplaced(_) | Uploaded::Nothing => {}
-            }
-        }
-        scripts.rejected = bounded(rejected, animation.scripts(), "that no script can have");
-        scripts.warnings = bounded(warnings, animation.scripts(), "of files that are not read");
-        Ok((scripts, settings))
+        Ok(scripts_of(animation, self.list_level(animation.scripts(), bounds).await?))
     }
 
     async fn list_receipts(&self, animation: &Animation, marks: &[ScriptName]) -> Result<Receipts> {
@@ -365,6 +342,47 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         Ok(true)
     }
+}
+
+/// Returns the scripts that a listing of the animation's folder shows, and the version of its settings.
+fn scripts_of(animation: &Animation, listed: Vec<Listed>) -> (Scripts, Option<ETag>) {
+    let (mut scripts, mut rejected, mut warnings) = (Scripts::default(), Vec::new(), Vec::new());
+    let mut settings = None;
+    for listed in listed {
+        match Uploaded::of(&listed.key, listed.size) {
+            Uploaded::Script(_, name) => {
+                scripts.found.push(ScriptFound { name, version: listed.etag, modified: listed.modified });
+            }
+            Uploaded::Settings(_) => settings = Some(listed.etag),
+            Uploaded::Rejected(_, problem) => {
+                rejected.push(Rejected { key: listed.key, problem: problem.to_owned() });
+            }
+            Uploaded::NearMiss(_, problem) => {
+                warnings.push(Rejected { key: listed.key, problem: problem.to_owned() });
+            }
+            Uploaded::File(_, name) => {
+                let (version, modified) = (VersionHash::of(&listed.etag), listed.modified);
+                scripts.files.insert(NameHash::of(&name), FileFound { version, modified });
+            }
+            Uploaded::Misplaced(_) | Uploaded::Nothing => {}
+        }
+    }
+    scripts.rejected = bounded(rejected, animation.scripts(), "that no script can have");
+    scripts.warnings = bounded(warnings, animation.scripts(), "of files that are not read");
+    (scripts, settings)
+}
+
+/// Returns the version of each script of an animation, from listings of its scripts and of its receipts.
+pub fn script_versions(
+    animation: &Animation,
+    scripts: Vec<Listed>,
+    receipts: Vec<Listed>,
+) -> BTreeMap<ScriptName, ETag> {
+    let (mut scripts, _) = scripts_of(animation, scripts);
+    let receipts: Vec<ReceiptFound> =
+        receipts.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
+    scripts.resolve(&receipts);
+    scripts.found.into_iter().map(|script| (script.name, script.version)).collect()
 }
 
 /// The first ones, and of the others how many there are.

@@ -67,7 +67,7 @@ fn indirect_light_with_one_ray_per_pixel_and_beside_light_from_nowhere() {
           | ^^^^^^ expected `ambient` 0 0 0"#]],
     );
     check(ball("Indirect 0\nSamples 16\n", ""), expect![[""]]);
-    // The ball's is told once, and nothing is dark beside what goes round.
+    // The ball's warning comes once, and nothing is dark beside what goes round.
     check(
         "Screen 4 3\nIndirect 2\nSamples 16\nBackground 1 1 1\nMaterial m ambient .1 0 0 diffuse 1 1 1\nGroup g\nSphere 1 0 0 0 m\nEnd\n\
          Use g\nTrace\nUse g\nTrace",

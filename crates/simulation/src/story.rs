@@ -368,7 +368,7 @@ impl Watch {
         if actor != Actor::User && key.starts_with("scripts/") {
             return Err(format!("{actor:?} wrote {key}"));
         }
-        if actor == Actor::User && matches!(Uploaded::of(key, 1), Uploaded::File(..)) {
+        if actor == Actor::User && Uploaded::is_file(key) {
             return Ok(());
         }
         let Ok(parsed) = key.parse::<Key>() else {

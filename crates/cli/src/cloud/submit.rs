@@ -29,7 +29,7 @@ use crate::wording::number;
 /// frame's has its script's version, too.
 const LONGEST_NAME: usize = 200;
 
-/// The same for scripts that name files, whose versions are longer.
+/// The most bytes of the name of a script that names files: its version is longer.
 const LONGEST_NAME_WITH_FILES: usize = 110;
 
 /// Render a folder of scripts, or one script, in the cloud and download the animation

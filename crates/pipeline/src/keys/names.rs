@@ -64,6 +64,11 @@ impl Uploaded {
         }
     }
 
+    /// Whether a key is that of a file that scripts may name.
+    pub fn is_file(key: &str) -> bool {
+        matches!(Self::of(key, 1), Self::File(..))
+    }
+
     /// The animation to which it makes a difference.
     pub fn animation(self) -> Option<Animation> {
         match self {

@@ -277,7 +277,7 @@ impl Shader<'_> {
     }
 }
 
-/// How rays go on from a hit.
+/// The rays that go on from a hit.
 struct Onward {
     /// The factor of the mirrored ray.
     factor: DVec3,

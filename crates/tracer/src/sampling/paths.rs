@@ -1,6 +1,6 @@
 //! Paths of light: where rays go from a surface, and which of them are followed.
 //!
-//! Where light goes round, a hit can send on several rays, and no ray is left out because its factor is small. A ray whose
+//! If light goes round, a hit can send on several rays, and no ray is left out because its factor is small. A ray whose
 //! factor is small is followed with a chance in proportion, and counts for more then. So the expectation is exact, and a
 //! sample has a bounded number of rays.
 

@@ -226,10 +226,32 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
     soft: Option<SoftLight<E>>,
     scratch: &mut Scratch<E>,
 ) {
+    follow_queued::<S, E, N>(simd, scene, (soft, None), scratch);
+}
+
+/// Traces the rays of paths until none is left, in scenes in which light goes round.
+#[inline(never)]
+fn follow_paths<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    (soft, numbers): (Option<SoftLight<E>>, PathNumbers),
+    scratch: &mut Scratch<E>,
+) {
+    follow_queued::<S, E, N>(simd, scene, (soft, Some(numbers)), scratch);
+}
+
+/// Traces the queued rays, those of paths if there are numbers for them, until none is left.
+#[inline(always)]
+fn follow_queued<S: Simd, E: Real, N: Kernel<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    (soft, paths): (Option<SoftLight<E>>, Option<PathNumbers>),
+    scratch: &mut Scratch<E>,
+) {
     let Scratch { queue, hits, waiting, pixels, cover, occluders, .. } = scratch;
     let tree = BUILT.tree && scene.tree.is_some();
     core::mem::swap(&mut hits.color, pixels);
-    while waiting.take(queue) {
+    while if paths.is_some() { waiting.take_paths(queue) } else { waiting.take(queue) } {
         hits.packets.clear();
         queue.fill_up(Lanes::<S, E>::LEN);
         let (near, bodies) = met_by::<S, E>(simd, scene, queue);
@@ -245,51 +267,6 @@ fn follow_through_glass<S: Simd, E: Real, N: Kernel<E>>(
             count,
             next: None,
             waiting: &mut *waiting,
-            soft,
-            is_first: false,
-            paths: None,
-        };
-        shade_more::<S, E, N, false>(simd, scene, met, hits, occluders);
-        if scene.is_clear() {
-            let_through(waiting, queue, hits, Lanes::<S, E>::LEN);
-        }
-        waiting.add(queue, hits);
-    }
-    waiting.sum_up(pixels);
-    if scene.is_clear() {
-        waiting.uncover(cover, PIXELS);
-    }
-    core::mem::swap(&mut hits.color, pixels);
-}
-
-/// Traces the rays of paths until none is left, in scenes in which light goes round.
-#[inline(never)]
-fn follow_paths<S: Simd, E: Real, N: Kernel<E>>(
-    simd: S,
-    scene: &Prepared<E>,
-    (soft, numbers): (Option<SoftLight<E>>, PathNumbers),
-    scratch: &mut Scratch<E>,
-) {
-    let Scratch { queue, hits, waiting, pixels, cover, occluders, .. } = scratch;
-    let tree = BUILT.tree && scene.tree.is_some();
-    core::mem::swap(&mut hits.color, pixels);
-    while waiting.take_paths(queue) {
-        hits.packets.clear();
-        queue.fill_up(Lanes::<S, E>::LEN);
-        let (near, bodies) = met_by::<S, E>(simd, scene, queue);
-        let (kinds, background, count) = (near.kinds, scene.background, queue.count);
-        fitted!(N, kinds, tree, C T D => {
-            trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
-        });
-        let (waiting_rays, paths) = (&mut *waiting, Some(numbers));
-        let met = HitBatch {
-            kinds,
-            bodies,
-            background,
-            queue,
-            count,
-            next: None,
-            waiting: waiting_rays,
             soft,
             is_first: false,
             paths,

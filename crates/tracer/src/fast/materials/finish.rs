@@ -1,4 +1,4 @@
-//! What few surfaces have beyond coefficients: highlights, patterns of other coefficients, pictures, and glow.
+//! Finishes beyond the coefficients that all surfaces have: highlights, patterns of other coefficients, pictures, and glow.
 //!
 //! Both are worked out lane by lane, with the functions of the plain tracer: they are powers and lattices of few pixels,
 //! which must be the same bytes everywhere. Patterns are read off the numbers of the script, so that a hit is taken back
@@ -33,7 +33,7 @@ pub(crate) struct Finishes {
 pub(crate) struct Gloss<'a> {
     finishes: &'a Finishes,
     sum: [DVec3; 16],
-    /// The same of rough mirrors, times the weights of the rays.
+    /// The highlights on rough mirrors, times the weights of the rays.
     of_mirrors: [DVec3; 16],
     /// Whether any light adds something.
     pub(crate) is_seen: bool,

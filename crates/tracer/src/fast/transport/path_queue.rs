@@ -11,7 +11,7 @@ use crate::sampling::paths::Way;
 /// The number of rays in a full batch.
 const FULL: usize = PIXELS;
 
-/// How often a path has gone on.
+/// The numbers of times that a path has gone on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Turns {
     /// By mirrors and glass.
@@ -46,7 +46,7 @@ pub(crate) struct PathRay<E> {
 pub(crate) struct PathQueues<E> {
     /// By hits before, and by [`Way`].
     waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
-    /// Those of the rays of the current batch.
+    /// The turns of the rays of the current batch.
     turns: [Turns; ROOM],
 }
 

@@ -13,7 +13,7 @@ const SECOND: u32 = 4;
 /// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
-/// The same where light goes round: many dimensions, and little that is smooth.
+/// The slope for scenes in which light goes round: many dimensions, and little that is smooth.
 const SLOPE_OF_PATHS: f64 = -0.5;
 
 /// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary

@@ -12,9 +12,9 @@ pub(super) const ONE: f64 = 65535.0;
 /// What a pixel has got so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
-    /// Where samples are not clamped, these have a sign.
+    /// These have a sign where samples are not clamped.
     sum: [u64; CHANNELS],
-    /// Where samples are not clamped, the bits of an `f64`: squares of bright samples are beyond whole numbers, and a
+    /// Without clamping, the bits of an `f64`: squares of bright samples are beyond whole numbers, and a
     /// pixel's samples always come in the same order.
     squares: [u64; CHANNELS],
     count: u32,
