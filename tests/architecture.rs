@@ -17,7 +17,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-scene", &["rayfold-assets"]),
     ("rayfold-files", &["rayfold-scene"]),
     ("rayfold-gif", &[]),
-    ("rayfold-movie", &["rayfold-gif"]),
+    ("rayfold-movie", &["rayfold-gif", "rayfold-scene"]),
     ("rayfold-bucket", &[]),
     ("rayfold-tracer", &["rayfold-scene"]),
     ("rayfold-pipeline", &["rayfold-scene"]),

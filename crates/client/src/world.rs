@@ -12,14 +12,14 @@ use bytes::{Bytes, BytesMut};
 use rayfold_pipeline::keys::{Animation, Band, Key, ScriptName};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::store::{
-    ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions, Store,
-    UnfinishedUpload,
+    ETag, ListPage, ListRequest, Listing, MemoryStore, MemoryUpload, Object, ObjectInfo, Patch, PutOptions,
+    Store, UnfinishedUpload,
 };
 use rayfold_pipeline::{
     Animator, BandJoiner, Clock, Drawing, Encoding, Files, Invocation, Policy, Randomness, Renderer, Result,
     Source, Timestamp, Unfit, assemble, render_frame,
 };
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::client::Client;
 
@@ -283,11 +283,11 @@ struct Joined(BytesMut);
 impl Animator for Joiner {
     type Encoding = Joined;
 
-    fn begin(&self, _: &AnimationSettings) -> Result<Joined, Reason> {
+    fn begin(&self, _: &AnimationSettings, _: Container, _: bool) -> Result<Joined, Reason> {
         Ok(Joined(BytesMut::new()))
     }
 
-    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+    async fn resume(&self, _: &AnimationSettings, _: Container, state: Bytes) -> Result<Joined, Reason> {
         Ok(Joined(state.into()))
     }
 }
@@ -298,8 +298,8 @@ impl Encoding for Joined {
         Ok(Bytes::new())
     }
 
-    async fn finish(self) -> Result<Bytes, Reason> {
-        Ok(self.0.freeze())
+    async fn finish(self) -> Result<(Bytes, Option<Patch>), Reason> {
+        Ok((self.0.freeze(), None))
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {

@@ -76,6 +76,24 @@ impl Thinning {
         }
     }
 
+    /// Returns the frames that are held back: at most two, the first and the newest of the current fiftieth of a second.
+    pub fn held(&self) -> impl Iterator<Item = &DynamicImage> {
+        self.held.iter().flat_map(|held| std::iter::once(&held.first).chain(&held.last))
+    }
+
+    /// Continues after `pushed` frames, with the frames that were [held](Self::held) then. Returns `None` if it cannot
+    /// have held so many.
+    #[must_use]
+    pub fn after(self, pushed: u64, held: Vec<DynamicImage>) -> Option<Self> {
+        let most = if self.thins { pushed.min(2) } else { 0 };
+        if held.len() as u64 > most {
+            return None;
+        }
+        let mut held = held.into_iter();
+        let held = held.next().map(|first| Held { first, last: held.next() });
+        Some(Self { pushed, held, ..self })
+    }
+
     /// Returns the last frame, unless it was returned before.
     pub fn finish(&mut self) -> Option<DynamicImage> {
         self.held.take().map(|held| held.last.unwrap_or(held.first))

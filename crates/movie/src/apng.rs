@@ -6,8 +6,9 @@ use image::DynamicImage;
 use png::{BitDepth, ColorType, Compression, EncodingError};
 use rayfold_gif::{Plays, Thinning};
 
-use crate::Movie;
 use crate::rate::fraction;
+use crate::state::{Counts, DAMAGED, State};
+use crate::{Error, Movie};
 
 /// Parts of a second in which a frame's time is counted where a whole number of frames does not fill it: milliseconds, or
 /// hundredths where those have no room in the format's 16 bits.
@@ -17,14 +18,20 @@ const PARTS: [u16; 2] = [1_000, 100];
 /// milliseconds. With more, frames are left out as in a GIF.
 pub const MAX_FPS: f64 = 90.0;
 
+/// The first bytes of a PNG.
+const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
 /// Frames on their way.
 pub(crate) struct Apng<W: Write> {
-    file: png::Writer<W>,
+    out: W,
     movie: Movie,
     thinning: Thinning,
     /// How many frames there will be in the file, and how many there are.
     frames: u64,
     written: u64,
+    pushed: u64,
+    /// The number of the next chunk that has one: a description of a frame, or the data of any frame but the first.
+    next: u32,
     last: Option<DynamicImage>,
 }
 
@@ -32,20 +39,46 @@ impl<W: Write> Apng<W> {
     /// # Errors
     /// The writer's, and when the animation is beyond what the format can hold.
     pub(crate) fn new(out: W, movie: Movie) -> io::Result<Self> {
+        let mut apng = Self::after(out, movie, Thinning::new(movie.fps, MAX_FPS))?;
+        let count = u32::try_from(apng.frames).map_err(io::Error::other)?;
         let (width, height) = movie.size;
-        let mut file = png::Encoder::new(out, width, height);
-        file.set_color(if movie.alpha { ColorType::Rgba } else { ColorType::Rgb });
-        file.set_depth(BitDepth::Eight);
-        file.set_compression(Compression::Balanced);
-        let thinning = Thinning::new(movie.fps, MAX_FPS);
+        apng.out.write_all(SIGNATURE)?;
+        let kind = if movie.alpha { ColorType::Rgba } else { ColorType::Rgb };
+        let form = [8, kind as u8, 0, 0, 0];
+        apng.chunk(*b"IHDR", &[&width.to_be_bytes()[..], &height.to_be_bytes(), &form].concat())?;
+        apng.chunk(*b"acTL", &[count.to_be_bytes(), plays(movie.plays).to_be_bytes()].concat())?;
+        Ok(apng)
+    }
+
+    fn after(out: W, movie: Movie, thinning: Thinning) -> io::Result<Self> {
         let known = movie.frames.ok_or_else(|| {
             io::Error::other("an .apng begins with the number of its frames, which a video does not say: make a .gif of it")
         })?;
         let frames = thinning.left_of(known);
-        let count = u32::try_from(frames).map_err(io::Error::other)?;
-        file.set_animated(count, plays(movie.plays)).map_err(into_io)?;
-        let file = file.write_header().map_err(into_io)?;
-        Ok(Self { file, movie, thinning, frames, written: 0, last: None })
+        Ok(Self { out, movie, thinning, frames, written: 0, pushed: 0, next: 0, last: None })
+    }
+
+    /// Returns the state after the frames so far.
+    pub(crate) fn suspend(self) -> State {
+        let Self { thinning, written, pushed, next, last, .. } = self;
+        let held = thinning.held().cloned().collect();
+        let counts = Counts { pushed, written, counted: next.into(), chunk: None };
+        State { counts, last, held, picture: Vec::new() }
+    }
+
+    /// Continues a file.
+    ///
+    /// # Errors
+    /// A state that there cannot be.
+    pub(crate) fn resume(out: W, movie: Movie, state: State) -> Result<Self, Error> {
+        let State { counts: Counts { pushed, written, counted, .. }, last, held, picture } = state;
+        let thinning = Thinning::new(movie.fps, MAX_FPS).after(pushed, held).ok_or(DAMAGED)?;
+        let apng = Self::after(out, movie, thinning)?;
+        let next = u32::try_from(counted).map_err(|_| DAMAGED)?;
+        if last.is_some() != (written > 0) || written > pushed.min(apng.frames) || !picture.is_empty() {
+            return Err(DAMAGED);
+        }
+        Ok(Self { written, pushed, next, last, ..apng })
     }
 
     /// Takes the next frame, which is as large as the others, and how many seconds it is shown if not as long as they.
@@ -58,40 +91,99 @@ impl<W: Write> Apng<W> {
                 format!("where frames have times of their own, at most {MAX_FPS} a second are possible");
             return Err(io::Error::other(message));
         }
+        self.pushed += 1;
         self.thinning.push(frame).map_or(Ok(()), |frame| self.write(frame, seconds))
     }
 
     fn write(&mut self, frame: DynamicImage, seconds: Option<f64>) -> io::Result<()> {
         let (number, whole) = (self.written, (0, 0, frame.width(), frame.height()));
         self.written += 1;
+        if self.written > self.frames {
+            return Err(io::Error::other(format!(
+                "there are more frames than the {} announced",
+                self.frames
+            )));
+        }
         let (left, top, width, height) = self.last.as_ref().map_or(whole, |last| changed(last, &frame));
         let (time, parts) = match self.movie.last_delay_cs {
             Some(hundredths) if self.written == self.frames => (hundredths, 100),
             _ => seconds.map_or_else(|| delay(self.thinning.fps(), number), in_parts),
         };
-        self.file.set_frame_delay(time, parts).map_err(into_io)?;
-        if self.last.is_some() {
-            self.file.reset_frame_position().map_err(into_io)?;
-            self.file.set_frame_dimension(width, height).map_err(into_io)?;
-            self.file.set_frame_position(left, top).map_err(into_io)?;
-        }
+        let numbers = [self.number()?, width, height, left, top].map(u32::to_be_bytes).concat();
+        let times = [time, parts].map(u16::to_be_bytes).concat();
+        // The frame stays when the next one comes, and replaces what is below it.
+        self.chunk(*b"fcTL", &[&numbers[..], &times, &[0, 0]].concat())?;
         let part = frame.crop_imm(left, top, width, height);
-        self.file.write_image_data(part.as_bytes()).map_err(into_io)?;
+        for data in compressed(&part)? {
+            match number {
+                0 => self.chunk(*b"IDAT", &data)?,
+                _ => {
+                    let number = self.number()?.to_be_bytes();
+                    self.chunk(*b"fdAT", &[&number[..], &data].concat())?;
+                }
+            }
+        }
         self.last = Some(frame);
         Ok(())
+    }
+
+    fn number(&mut self) -> io::Result<u32> {
+        let number = self.next;
+        self.next =
+            number.checked_add(1).ok_or_else(|| io::Error::other("an APNG has no room for more frames"))?;
+        Ok(number)
+    }
+
+    /// Writes a chunk: its length, its kind, its data and their checksum.
+    fn chunk(&mut self, kind: [u8; 4], data: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(data.len()).map_err(io::Error::other)?;
+        let mut checksum = crc32fast::Hasher::new();
+        checksum.update(&kind);
+        checksum.update(data);
+        self.out.write_all(&length.to_be_bytes())?;
+        self.out.write_all(&kind)?;
+        self.out.write_all(data)?;
+        self.out.write_all(&checksum.finalize().to_be_bytes())
     }
 
     /// Returns how many frames were left out.
     ///
     /// # Errors
-    /// The writer's.
+    /// The writer's, and when there are fewer frames than were announced.
     pub(crate) fn finish(mut self) -> io::Result<u64> {
         if let Some(last) = self.thinning.finish() {
             self.write(last, None)?;
         }
-        self.file.finish().map_err(into_io)?;
+        if self.written < self.frames {
+            let message = format!("there are {} frames, not the {} announced", self.written, self.frames);
+            return Err(io::Error::other(message));
+        }
+        self.chunk(*b"IEND", &[])?;
+        self.out.flush()?;
         Ok(self.movie.frames.unwrap_or_default() - self.frames)
     }
+}
+
+/// Compresses the pixels of a picture as a PNG does. Returns the data of its `IDAT` chunks.
+fn compressed(picture: &DynamicImage) -> io::Result<Vec<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    let mut file = png::Encoder::new(&mut bytes, picture.width(), picture.height());
+    file.set_color(if picture.color().has_alpha() { ColorType::Rgba } else { ColorType::Rgb });
+    file.set_depth(BitDepth::Eight);
+    file.set_compression(Compression::Balanced);
+    let mut file = file.write_header().map_err(into_io)?;
+    file.write_image_data(picture.as_bytes()).map_err(into_io)?;
+    file.finish().map_err(into_io)?;
+    let (mut data, mut rest) = (Vec::new(), &bytes[SIGNATURE.len()..]);
+    while let Some((head, after)) = rest.split_first_chunk::<8>() {
+        let [a, b, c, d, kind @ ..] = *head;
+        let length = u32::from_be_bytes([a, b, c, d]) as usize;
+        if kind == *b"IDAT" {
+            data.push(after[..length].to_vec());
+        }
+        rest = &after[length + 4..];
+    }
+    Ok(data)
 }
 
 /// As the format counts: how often it is shown, 0 for ever.

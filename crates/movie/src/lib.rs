@@ -6,74 +6,23 @@
 
 mod apng;
 mod rate;
+mod state;
 mod webp;
 mod y4m;
 
 use std::io::{self, Write};
-use std::str::FromStr;
 
 use image::{DynamicImage, RgbImage};
 pub use rayfold_gif::Plays;
 use rayfold_gif::{Encoder, Settings};
+pub use rayfold_scene::{Container, UnknownContainer};
 
 use apng::Apng;
 pub use apng::MAX_FPS;
+use state::State;
 pub use webp::Length;
 use webp::WebP;
 use y4m::Y4m;
-
-/// The file format of an animation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Container {
-    /// At most 256 colours a frame. Pixels are drawn or clear.
-    Gif,
-    /// Lossless; the number of frames must be known before the first.
-    Apng,
-    /// Lossless.
-    Webp,
-    /// Raw frames for video encoders.
-    Y4m,
-}
-
-impl Container {
-    /// All containers.
-    pub const ALL: [Self; 4] = [Self::Gif, Self::Apng, Self::Webp, Self::Y4m];
-
-    /// Returns the ending of its files, without a dot. [`FromStr`] is the inverse.
-    #[must_use]
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::Gif => "gif",
-            Self::Apng => "apng",
-            Self::Webp => "webp",
-            Self::Y4m => "y4m",
-        }
-    }
-
-    /// Returns the media type of its files.
-    #[must_use]
-    pub fn media_type(self) -> &'static str {
-        match self {
-            Self::Gif => "image/gif",
-            Self::Apng => "image/apng",
-            Self::Webp => "image/webp",
-            Self::Y4m => "video/x-yuv4mpeg2",
-        }
-    }
-}
-
-/// The error for a word that names no container.
-#[derive(Debug, thiserror::Error)]
-#[error("no container of animations: expected gif, apng, webp or y4m")]
-pub struct UnknownContainer;
-
-impl FromStr for Container {
-    type Err = UnknownContainer;
-
-    fn from_str(word: &str) -> Result<Self, UnknownContainer> {
-        Self::ALL.into_iter().find(|container| container.ending() == word).ok_or(UnknownContainer)
-    }
-}
 
 /// The properties of an animation that are known before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,6 +53,9 @@ pub enum Error {
     /// The GIF encoder's error, other than the writer's.
     #[error(transparent)]
     Gif(rayfold_gif::Error),
+    /// The state of an unfinished file cannot be read.
+    #[error("the state of the unfinished file cannot be used: {0}")]
+    State(&'static str),
 }
 
 impl From<rayfold_gif::Error> for Error {
@@ -156,6 +108,43 @@ impl<W: Write> Encoding<W> {
             Container::Apng => Kind::Apng(Box::new(Apng::new(out, movie)?)),
             Container::Webp => Kind::Webp(Box::new(WebP::new(out, movie)?)),
             Container::Y4m => Kind::Y4m(Y4m::new(out, size, fps)?),
+        };
+        Ok(Self { kind, alpha })
+    }
+
+    /// Returns the state of the unfinished file. [`resume`](Self::resume) continues from it, also in another process. Keep
+    /// everything that the writer has received.
+    ///
+    /// # Errors
+    /// Fails if writing has failed before.
+    pub fn suspend(self) -> Result<Vec<u8>, Error> {
+        match self.kind {
+            Kind::Gif(encoder) => Ok(encoder.suspend()?),
+            Kind::Apng(encoder) => Ok(encoder.suspend().encode()),
+            Kind::Webp(encoder) => Ok(encoder.suspend().encode()),
+            Kind::Y4m(_) => Ok(State::default().encode()),
+        }
+    }
+
+    /// Continues a file that was [suspended](Self::suspend), with the container and the properties that it began with. The
+    /// bytes that it writes follow those written before.
+    ///
+    /// # Errors
+    /// Fails if the state is damaged, or of another version of the encoder: encode the animation from its beginning.
+    pub fn resume(out: W, container: Container, movie: Movie, state: &[u8]) -> Result<Self, Error> {
+        let alpha = movie.alpha;
+        let kind = match container {
+            Container::Gif => Kind::Gif(Box::new(Encoder::resume(out, state)?)),
+            Container::Apng => {
+                Kind::Apng(Box::new(Apng::resume(out, movie, State::decode(state, movie.size)?)?))
+            }
+            Container::Webp => {
+                Kind::Webp(Box::new(WebP::resume(out, movie, State::decode(state, movie.size)?)?))
+            }
+            Container::Y4m => {
+                State::decode(state, movie.size)?;
+                Kind::Y4m(Y4m::resume(out))
+            }
         };
         Ok(Self { kind, alpha })
     }
@@ -240,14 +229,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_container_is_named_by_its_ending() {
-        for container in Container::ALL {
-            assert_eq!(container.ending().parse::<Container>().unwrap(), container);
-        }
-        assert!("mp4".parse::<Container>().is_err());
-    }
-
-    #[test]
     fn every_container_is_whole_in_memory() {
         let frames = (0..3).map(|k| (RgbImage::from_pixel(6, 4, image::Rgb([40 * k, 9, 200])), None));
         let movie = Movie {
@@ -276,6 +257,62 @@ mod tests {
             if container == Container::Webp {
                 let length = u32::from_le_bytes(bytes[4..8].try_into().unwrap());
                 assert_eq!(length as usize + 8, bytes.len());
+            }
+        }
+    }
+
+    /// Whatever the frame after which the file is left: also when frames are dropped, and with alpha.
+    #[test]
+    fn a_file_in_two_pieces_is_the_file_in_one() {
+        let frames: Vec<DynamicImage> = (0..7)
+            .map(|k| {
+                let (mut frame, at) = (image::RgbaImage::new(6, 4), k % 6);
+                frame.put_pixel(at, k % 4, image::Rgba([40 * k as u8, 9, 200, 255 - 30 * k as u8]));
+                frame.into()
+            })
+            .collect();
+        let seconds = |number: usize, fps: f64| (fps < 50.0 && number == 2).then_some(0.5);
+        for (container, fps, alpha) in Container::ALL
+            .into_iter()
+            .flat_map(|container| [10.0, 100.0].map(|fps| (container, fps)))
+            .flat_map(|(container, fps)| [false, true].map(|alpha| (container, fps, alpha)))
+        {
+            let plays = Plays::Endless;
+            let movie = Movie {
+                size: (6, 4),
+                frames: Some(7),
+                fps,
+                plays,
+                last_delay_cs: Some(90),
+                exact: false,
+                alpha,
+            };
+            let mut whole = Vec::new();
+            let mut encoding = Encoding::begin(&mut whole, container, movie).unwrap();
+            for (number, frame) in frames.iter().enumerate() {
+                encoding.push(frame.clone(), seconds(number, fps)).unwrap();
+            }
+            let finished = encoding.finish().unwrap();
+            for left_after in 0..=7 {
+                let mut bytes = Vec::new();
+                let mut encoding = Encoding::begin(&mut bytes, container, movie).unwrap();
+                for (number, frame) in frames.iter().enumerate().take(left_after) {
+                    encoding.push(frame.clone(), seconds(number, fps)).unwrap();
+                }
+                let state = encoding.suspend().unwrap();
+                let mut encoding = Encoding::resume(&mut bytes, container, movie, &state).unwrap();
+                for (number, frame) in frames.iter().enumerate().skip(left_after) {
+                    encoding.push(frame.clone(), seconds(number, fps)).unwrap();
+                }
+                assert_eq!(encoding.finish().unwrap(), finished, "{container:?} {fps} {left_after}");
+                assert!(
+                    bytes == whole,
+                    "{container:?} at {fps} frames a second, alpha {alpha}, left after {left_after}"
+                );
+                for end in 0..state.len() {
+                    let cut = Encoding::resume(io::sink(), container, movie, &state[..end]);
+                    assert!(cut.is_err(), "{container:?}: {end} of {} bytes", state.len());
+                }
             }
         }
     }

@@ -9,8 +9,9 @@ use image::DynamicImage;
 use image_webp::{ColorType, WebPEncoder};
 use rayfold_gif::{Plays, Thinning};
 
-use crate::Movie;
 use crate::apng::{MAX_FPS, changed};
+use crate::state::{Counts, DAMAGED, State};
+use crate::{Error, Movie};
 
 /// The largest side of a picture in pixels.
 const LONGEST_SIDE: u32 = 16_384;
@@ -70,6 +71,38 @@ impl<W: Write> WebP<W> {
         };
         webp.write(&times.to_le_bytes())?;
         Ok(webp)
+    }
+
+    /// Returns the state after the frames so far.
+    pub(crate) fn suspend(self) -> State {
+        let Self { thinning, pushed, written, bytes, last, .. } = self;
+        let held = thinning.held().cloned().collect();
+        let (last, chunk) = last.unzip();
+        let place = |chunk: &Chunk| [chunk.place.0, chunk.place.1, chunk.size.0, chunk.size.1, chunk.ms];
+        let counts = Counts { pushed, written, counted: bytes, chunk: chunk.as_ref().map(place) };
+        State { counts, last, held, picture: chunk.map(|chunk| chunk.picture).unwrap_or_default() }
+    }
+
+    /// Continues a file.
+    ///
+    /// # Errors
+    /// A state that there cannot be.
+    pub(crate) fn resume(out: W, movie: Movie, state: State) -> Result<Self, Error> {
+        let State { counts: Counts { pushed, written, counted, chunk }, last, held, picture } = state;
+        let thinning = Thinning::new(movie.fps, MAX_FPS).after(pushed, held).ok_or(DAMAGED)?;
+        let chunk = chunk.map(|[left, top, width, height, ms]| Chunk {
+            place: (left, top),
+            size: (width, height),
+            ms,
+            picture,
+        });
+        if last.is_some() != chunk.is_some()
+            || written > pushed
+            || chunk.as_ref().is_some_and(|chunk| chunk.picture.is_empty())
+        {
+            return Err(DAMAGED);
+        }
+        Ok(Self { out, movie, thinning, pushed, written, bytes: counted, last: last.zip(chunk) })
     }
 
     /// Takes the next frame, of the same size as the others, and its duration in seconds if that differs from theirs.

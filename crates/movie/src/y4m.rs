@@ -36,6 +36,11 @@ impl<W: Write> Y4m<W> {
         Ok(Self { out, planes: Vec::new() })
     }
 
+    /// Continues a file after its header or a frame.
+    pub(crate) fn resume(out: W) -> Self {
+        Self { out, planes: Vec::new() }
+    }
+
     /// Writes the next frame, which is as large as the others.
     ///
     /// # Errors

@@ -1,23 +1,35 @@
-//! The traits of a GIF encoder, which the program that runs the assembler implements. The module knows no bucket.
+//! The traits of an encoder of animations, which the program that runs the assembler implements. The module knows no
+//! bucket.
 
 use std::future::Future;
 
 use bytes::Bytes;
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::manifest::Reason;
+use crate::store::Patch;
 
-/// Makes encoders. The assemble function brings a GIF encoder, the simulation a smaller one.
+/// Makes encoders. The assemble function brings those of all containers, the simulation a smaller one.
 pub trait Animator: Send + Sync {
     /// An animation being encoded.
     type Encoding: Encoding;
 
-    /// Starts an animation; the reason when it cannot be.
-    fn begin(&self, settings: &AnimationSettings) -> Result<Self::Encoding, Reason>;
+    /// Starts an animation, whose frames may have alpha if `alpha` says so; the reason when it cannot be.
+    fn begin(
+        &self,
+        settings: &AnimationSettings,
+        output: Container,
+        alpha: bool,
+    ) -> Result<Self::Encoding, Reason>;
 
     /// Goes on with an animation that was [suspended](Encoding::suspend), with the bytes that it would have had; the reason
     /// when that cannot be: the state is damaged, or of another version of the encoder.
-    fn resume(&self, state: Bytes) -> impl Future<Output = Result<Self::Encoding, Reason>> + Send;
+    fn resume(
+        &self,
+        settings: &AnimationSettings,
+        output: Container,
+        state: Bytes,
+    ) -> impl Future<Output = Result<Self::Encoding, Reason>> + Send;
 }
 
 /// An animation being encoded: frames in, pieces of the file out.
@@ -29,12 +41,12 @@ pub trait Encoding: Send {
     /// The problem of this frame, or of all frames together.
     fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
 
-    /// Gives the rest of the file.
+    /// Gives the rest of the file, and what is known of its start only at its end.
     ///
     /// # Errors
     ///
     /// The reason why these frames make no animation; it would be the same next time.
-    fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
+    fn finish(self) -> impl Future<Output = Result<(Bytes, Option<Patch>), Reason>> + Send;
 
     /// Stops between two frames: gives a state that another process can go on with.
     ///
@@ -51,4 +63,6 @@ pub enum Unfit {
     Corrupt(Reason),
     /// The frame does not go with the others; it would be the same next time.
     Unlike(Reason),
+    /// The frame has alpha, and the file was begun without.
+    Alpha,
 }

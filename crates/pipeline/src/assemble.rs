@@ -1,17 +1,19 @@
 //! The assembler makes the bucket agree with itself, whichever claim woke it.
 //!
-//! Each round reads the manifest and the GIF's version and generation, and lists, in this order. Then it does what is
-//! due: it commits the manifest where it differs (without a claim: the assembler is here already), builds the GIF of
-//! a set that is done and settled, removes the GIF of a set that can have none. The assembler ends only on a round
-//! that wrote nothing, so that no GIF from an older listing stays, and no set that became whole while it worked is
-//! left. An assembler that waits or builds holds the animation's lease; another assembler that finds it taken leaves
+//! Each round reads the manifest and the versions and generations of the [files](crate::outputs), and lists, in this order.
+//! Then it does what is due: it commits the manifest where it differs (without a claim: the assembler is here already),
+//! builds a file of a set that is done and settled, removes a file of a set that can have none. The assembler ends only
+//! on a round that wrote nothing, so that no file from an older listing stays, and no set that became whole while it
+//! worked is left. An assembler that waits or builds holds the animation's lease; another assembler that finds it taken leaves
 //! all to its holder.
 //!
-//! If a GIF does not fit the time of one invocation, the next invocation continues it (`build`).
+//! If a file does not fit the time of one invocation, the next invocation continues it (`build`).
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
-use rayfold_scene::AnimationSettings;
+use bytes::Bytes;
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::animator::Animator;
 use crate::build::Built;
@@ -20,7 +22,8 @@ use crate::keys::{Animation, Generation, Key, Receipt, Tag};
 use crate::lease::HeldLease;
 use crate::manifest::{Frame, Head, Manifest, Reason, Status};
 use crate::observe::Observation;
-use crate::store::{ETag, ObjectInfo, Store};
+use crate::outputs::{Due, Outputs, needed};
+use crate::store::{ObjectInfo, Store};
 use crate::wake_count::WakeCount;
 use crate::{Clock, Error, Result, Timestamp};
 
@@ -37,15 +40,15 @@ pub struct Assembled {
     pub generation: Generation,
     /// Rounds, the last of which wrote nothing.
     pub rounds: u32,
-    /// The number of GIFs that were written.
+    /// The number of files that were written.
     pub built: u32,
-    /// Frames of the last GIF that was written.
+    /// Frames of the last file that was written.
     pub frames: u64,
-    /// Frames of a GIF that was left unfinished to the next invocation.
+    /// Frames of a file that was left unfinished to the next invocation.
     pub left_after: Option<u64>,
     /// Waiting for uploads to settle.
     pub waited: Duration,
-    /// The time spent on building GIFs.
+    /// The time spent on building files.
     pub building: Duration,
 }
 
@@ -64,34 +67,6 @@ pub async fn assemble<S: Store, C: Clock, A: Animator>(
         Key::Claim { animation, .. } => invocation.assemble(animator, &animation).await,
         _ => Err(Error::key(key, "this key is no claim")),
     }
-}
-
-/// The action that is due for the GIF of a set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Due {
-    /// It is as it should be, or more is to come.
-    Nothing,
-    /// It is to be built.
-    Gif,
-    /// It is to go.
-    NoGif,
-}
-
-/// Returns the action that is due for the GIF of the set that the manifest's head stands for.
-pub(crate) fn due(head: &Head, gif: Option<&ObjectInfo>) -> Due {
-    match head.status {
-        Status::Done if !is_current(head, gif) => Due::Gif,
-        Status::Empty | Status::Failed | Status::Refused if gif.is_some() => Due::NoGif,
-        Status::Done | Status::Empty | Status::Failed | Status::Refused => Due::Nothing,
-        // While more is to come the last GIF stays.
-        Status::Waiting | Status::Rendering => Due::Nothing,
-    }
-}
-
-/// Returns the version of this set's GIF, if the manifest does not record it yet.
-pub(crate) fn new_gif(head: &Head, gif: Option<&ObjectInfo>) -> Option<ETag> {
-    let is_new = head.status == Status::Done && head.gif_version().is_none() && is_current(head, gif);
-    gif.filter(|_| is_new).map(|gif| gif.etag.clone())
 }
 
 /// The end of a round.
@@ -137,6 +112,8 @@ struct Tally {
     building: Duration,
     /// The animation's lease, while this invocation holds it.
     lease: Option<HeldLease>,
+    /// Files that were looked at in an earlier round.
+    looked_at: BTreeSet<Container>,
 }
 
 impl Quiet {
@@ -156,8 +133,8 @@ impl Tally {
     fn new(began: Timestamp) -> Self {
         let (waited, building) = (Duration::ZERO, Duration::ZERO);
         let quiet = Quiet::default();
-        let (left_after, lease) = (None, None);
-        Tally { began, quiet, rounds: 0, built: 0, frames: 0, left_after, waited, building, lease }
+        let (left_after, lease, looked_at) = (None, None, BTreeSet::new());
+        Tally { began, quiet, rounds: 0, built: 0, frames: 0, left_after, waited, building, lease, looked_at }
     }
 
     fn of(self, head: &Head) -> Assembled {
@@ -179,15 +156,33 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let mut tally = Tally::new(self.clock.now());
         loop {
             tally.rounds += 1;
-            self.forget_history_before(&(&tally.quiet, tally.lease));
+            self.forget_history_before(&(&tally.quiet, tally.lease, &tally.looked_at));
             let known = self.manifest(animation).await?;
-            let gif = self.head(&animation.gif()).await?;
-            let seen = gif.as_ref().map(|gif| gif.etag.clone());
+            let mut files = Outputs::default();
+            let wanted = needed(known.as_ref(), None)
+                .into_iter()
+                .chain(std::mem::take(&mut tally.looked_at))
+                .collect();
+            self.look_at_outputs(animation, &wanted, &mut files).await?;
+            tally.looked_at = wanted;
             let observation = self.observe(animation, known.as_ref()).await?;
             let observed = &observation.manifest;
-            self.forget_history_before(&(&tally.quiet, tally.lease, &known, &gif, &observation));
+            self.forget_history_before(&(
+                &tally.quiet,
+                tally.lease,
+                &tally.looked_at,
+                &known,
+                &files,
+                &observation,
+            ));
+            let needed = needed(None, Some(&observation));
+            if !files.covers(&needed) {
+                // What replaces a file is to be made of a listing after the file was looked at.
+                tally.looked_at.extend(needed);
+                continue;
+            }
             if known.is_none() && observation.is_of_nothing() {
-                if self.clear(animation, gif.is_some(), &observation, &mut tally).await? {
+                if self.clear(animation, &files, &observation, &mut tally).await? {
                     continue;
                 }
                 return Ok(tally.of(&observed.head));
@@ -199,19 +194,17 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     None => continue,
                 },
             };
-            let known = match new_gif(&known.manifest.head, gif.as_ref()) {
-                Some(version) => match self.record_gif(&known, version).await? {
-                    Some(known) => known,
-                    None => continue,
-                },
-                None => known,
-            };
+            let new = files.unrecorded(&known.manifest.head);
+            let Some(known) = self.record_files(&known, new).await? else { continue };
             let leaves_early = self.breaks(Mutation::AssemblerLeavesEarly) && !observed.head.is_terminal();
-            let next = match due(&known.manifest.head, gif.as_ref()) {
+            let next = match files.due(&known.manifest.head) {
                 Due::Nothing if agrees || leaves_early => Next::End,
                 Due::Nothing => Next::Round,
-                Due::NoGif => self.delete(&animation.gif()).await.map(|()| Next::Round)?,
-                Due::Gif => self.make_gif(animator, &observation, &known, gif, &mut tally).await?,
+                Due::NoFile(output) => self.delete(&animation.output(output)).await.map(|()| Next::Round)?,
+                Due::File(output) => {
+                    let file = (output, files.get(output));
+                    self.make(animator, &observation, &known, file, &mut tally).await?
+                }
             };
             if next == Next::End && tally.lease.is_none() && observation.has_lease {
                 // An earlier attempt at the same event died with it, or no attempt has resumed it.
@@ -232,10 +225,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     }
                     // The assembler that found the lease taken was woken for a manifest that was written before, and
                     // may have deleted the GIF before, which was there when this round looked.
-                    let etag = |info: Option<ObjectInfo>| info.map(|info| info.etag);
-                    let manifest = etag(self.head(&animation.manifest()).await?);
-                    if manifest == Some(known.etag) && etag(self.head(&animation.gif()).await?) == seen {
-                        return Ok(tally.of(&observed.head));
+                    let manifest = self.head(&animation.manifest()).await?.map(|info| info.etag);
+                    if manifest == Some(known.etag) {
+                        let mut now = Outputs::default();
+                        self.look_at_outputs(animation, &files.looked_at(), &mut now).await?;
+                        if now.are(&files) {
+                            return Ok(tally.of(&observed.head));
+                        }
                     }
                 }
                 Next::HandOver => {
@@ -254,34 +250,35 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     async fn clear(
         &self,
         animation: &Animation,
-        has_gif: bool,
+        files: &Outputs,
         observation: &Observation,
         tally: &mut Tally,
     ) -> Result<bool> {
-        if has_gif {
-            self.delete(&animation.gif()).await?;
+        for output in files.existing() {
+            self.delete(&animation.output(output)).await?;
         }
+        let had_files = files.existing().next().is_some();
         if tally.lease.is_none() && observation.has_lease {
             tally.lease = self.reclaim_lease(animation).await?;
         }
-        let Some(mut held) = tally.lease.take() else { return Ok(has_gif) };
+        let Some(mut held) = tally.lease.take() else { return Ok(had_files) };
         self.give_up_lease(&observation.manifest.head, &mut held).await?;
         Ok(true)
     }
 
-    /// Gives the lease back, and with it the GIF that no assembler will go on with.
+    /// Gives the lease back, and with it the file that no assembler will go on with.
     async fn give_up_lease(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         self.abandon_checkpoint(head, held).await?;
         self.release_lease(&head.animation).await
     }
 
-    /// Waits until the set is settled, or builds its GIF, unless another assembler does.
-    async fn make_gif<A: Animator>(
+    /// Waits until the set is settled, or builds a file of it, unless another assembler does.
+    async fn make<A: Animator>(
         &self,
         animator: &A,
         observation: &Observation,
         known: &Known,
-        gif: Option<ObjectInfo>,
+        (output, there): (Container, Option<&ObjectInfo>),
         tally: &mut Tally,
     ) -> Result<Next> {
         let observed = &observation.manifest;
@@ -301,13 +298,21 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             tally.waited += wait;
             return Ok(Next::Round);
         }
+        // Another file is begun only with as much time as the others took: it may need most of an invocation.
+        if tally.built > 0 && self.is_out_of_time_in(self.clock.now().since(tally.began)) {
+            return Ok(Next::HandOver);
+        }
+        if output != Container::Gif && !observation.marked.contains(&output) {
+            let mark = Key::OutputMark { animation: observed.head.animation.clone(), output };
+            self.put_receipt(&mark.to_string(), Bytes::from_static(b"{}"), "application/json").await?;
+        }
         let start = self.clock.now();
-        let built = self.build(animator, observed, gif, tally.began, held).await?;
+        let built = self.build(animator, observed, (output, there), tally.began, held).await?;
         tally.building += self.clock.now().since(start);
         match built {
             Built::Put(version) => {
                 // If this fails, the next round writes it down.
-                self.record_gif(known, version).await?;
+                self.record_files(known, vec![(output, version)]).await?;
                 tally.built += 1;
                 tally.frames = observed.head.total;
                 if self.breaks(Mutation::AssemblerDoesNotLookAgain) {
@@ -320,7 +325,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             Built::Stale => {}
             Built::Corrupt(frame, reason) => self.draw_anew(observation, frame, &reason).await?,
-            Built::Refused(reason) => self.refuse(observed, &reason).await?,
+            Built::Refused(reason) => self.refuse(observed, output, &reason).await?,
         }
         Ok(Next::Round)
     }
@@ -342,11 +347,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_retry(animation, &frame.script, tag, frame.part, attempts + 1).await
     }
 
-    /// Writes down that this generation gives no GIF.
-    pub(crate) async fn refuse(&self, manifest: &Manifest, reason: &Reason) -> Result<()> {
+    /// Writes down that this generation gives no such file.
+    pub(crate) async fn refuse(&self, manifest: &Manifest, output: Container, reason: &Reason) -> Result<()> {
         let generation = manifest.head.generation.clone();
-        let key = manifest.head.animation.receipt(&Receipt::Refusal { generation });
-        let body = serde_json::to_vec(reason)
+        let key = manifest.head.animation.receipt(&Receipt::Refusal { generation, output });
+        let mut reason = reason.clone();
+        if manifest.head.outputs() != [Container::Gif] {
+            reason.message = format!("{}: {}", output.name(), reason.message);
+        }
+        let body = serde_json::to_vec(&reason)
             .map_err(|source| Error::Malformed { key: key.clone(), source: source.into() })?;
         self.put_receipt(&key, body.into(), "application/json").await.map(drop)
     }
@@ -357,57 +366,11 @@ mod tests {
     use super::*;
     use crate::manifest::Settings;
     use crate::reconcile::{Results, Scripts, reconcile};
-    use crate::store::Metadata;
 
     fn head(status: Status) -> Head {
         let animation = Animation::new("film").unwrap();
         let manifest = reconcile(&animation, &Scripts::default(), &Results::default(), &Settings::absent());
         Head { status, total: 9, ..manifest.head }
-    }
-
-    fn gif(generation: Option<&str>) -> ObjectInfo {
-        let metadata = generation.map(|generation| (GENERATION.to_owned(), generation.to_owned()));
-        let metadata: Metadata = metadata.into_iter().collect();
-        ObjectInfo { etag: ETag::new("e"), size: 1, modified: Timestamp(0), metadata }
-    }
-
-    #[test]
-    fn what_is_due_follows_from_the_status_and_the_gifs_generation() {
-        let current = gif(Some(head(Status::Done).generation.as_str()));
-        let older = gif(Some("another"));
-        let unknown = gif(None);
-        let gifs = [None, Some(&current), Some(&older), Some(&unknown)];
-        for (status, expected) in [
-            (Status::Done, [Due::Gif, Due::Nothing, Due::Gif, Due::Gif]),
-            (Status::Empty, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
-            (Status::Failed, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
-            (Status::Refused, [Due::Nothing, Due::NoGif, Due::NoGif, Due::NoGif]),
-            (Status::Waiting, [Due::Nothing; 4]),
-            (Status::Rendering, [Due::Nothing; 4]),
-        ] {
-            assert_eq!(gifs.map(|gif| due(&head(status), gif)), expected, "{status:?}");
-        }
-    }
-
-    /// One of another set, or that was named already, or of a set that is not whole, is not.
-    #[test]
-    fn a_gif_is_new_that_is_of_this_set_and_not_written_down() {
-        let generation = head(Status::Done).generation;
-        let this = gif(Some(generation.as_str()));
-        let named = |version: &str| {
-            Some(crate::manifest::Gif { generation: generation.clone(), version: ETag::new(version) })
-        };
-        for (status, named, gif, expected) in [
-            (Status::Done, None, Some(&this), Some(ETag::new("e"))),
-            (Status::Done, None, None, None),
-            (Status::Done, None, Some(&gif(Some("another"))), None),
-            (Status::Done, named("e"), Some(&this), None),
-            (Status::Done, named("f"), Some(&this), None),
-            (Status::Rendering, None, Some(&this), None),
-        ] {
-            let head = Head { gif: named, ..head(status) };
-            assert_eq!(new_gif(&head, gif), expected, "{status:?} {head:?}");
-        }
     }
 
     #[test]

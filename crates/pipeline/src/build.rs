@@ -1,14 +1,15 @@
-//! Builds a GIF, in one piece or in several.
+//! Builds a file of an animation, in one piece or in several.
 //!
 //! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and its output
 //! is sent part by part. If the time of an invocation does not suffice for one more frame, the invocation writes
-//! a [`checkpoint`](crate::checkpoint) and leaves the GIF to the next one; both together write the bytes that
+//! a [`checkpoint`](crate::checkpoint) and leaves the file to the next one; both together write the bytes that
 //! one would have written. Each takes at least one frame. A set of which not even one frame fits, or that takes
 //! a day, is refused.
 
 use std::time::Duration;
 
 use futures_util::stream::{self, StreamExt};
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::animator::{Animator, Encoding, Unfit};
 use crate::checkpoint::{Checkpoint, CheckpointHead, ResumedUpload};
@@ -19,24 +20,24 @@ use crate::manifest::{Frame, FrameState, Head, Manifest, Reason};
 use crate::store::{Condition, ETag, ObjectInfo, PutOptions, Store, Upload};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// The name of the GIF's metadata that holds its generation.
+/// The name of the entry of a file's metadata that holds its generation.
 pub const GENERATION: &str = "generation";
 
-/// The most invocations that may build a GIF, one after the other. 15 minutes each are 22 hours and a half: after a
+/// The most invocations that may build a file, one after the other. 15 minutes each are 22 hours and a half: after a
 /// day the bucket's rules remove the unfinished upload, and all would start over.
 pub const MAX_PIECES: u32 = 90;
 
 /// The end of a build.
 pub(crate) enum Built<'a> {
-    /// The GIF is put, as this version.
+    /// The file is put, as this version.
     Put(ETag),
     /// It is left after this number of frames, for the next invocation to continue.
     Left(u64),
-    /// A frame is gone, or another assembler's GIF came first: look again.
+    /// A frame is gone, or another assembler's file came first: look again.
     Stale,
     /// This frame cannot be read.
     Corrupt(&'a Frame, Reason),
-    /// These frames make no GIF.
+    /// These frames make no such file.
     Refused(Reason),
 }
 
@@ -46,43 +47,60 @@ enum Encoded<'a> {
     All,
     /// It has taken this number of frames, and there is no time for more.
     SoFar(u64),
+    /// A frame has alpha: the file has to be begun anew.
+    Alpha,
     /// This ends the build.
     No(Built<'a>),
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Writes the GIF of a manifest that is done over the version that was there, or fails to. `held`: the lease.
+    /// Writes a file of a manifest that is done over the version that was there, or fails to. `held`: the lease.
     pub(crate) async fn build<'m, A: Animator>(
         &self,
         animator: &A,
         manifest: &'m Manifest,
-        gif: Option<ObjectInfo>,
+        (output, there): (Container, Option<&ObjectInfo>),
         began: Timestamp,
         held: &mut HeldLease,
     ) -> Result<Built<'m>> {
         let head = &manifest.head;
-        let replaces = gif.map(|gif| gif.etag);
+        let replaces = there.map(|there| there.etag.clone());
         let condition = match &replaces {
             _ if self.breaks(Mutation::DropGifCondition) => Condition::Always,
             None => Condition::IfAbsent,
             Some(etag) => Condition::IfMatch(etag.clone()),
         };
         let options = PutOptions { condition, ..PutOptions::always() }
-            .content_type("image/gif")
+            .content_type(output.media_type())
             .metadata(GENERATION, head.generation.as_str());
-        let mut taken_up = match self.take_up(animator, head, replaces.as_ref(), &options, held).await? {
-            Some(taken_up) => taken_up,
-            None => {
-                let settings = head.settings.value.clone().unwrap_or_default();
-                let encoding = match animator.begin(&settings.of_frames(head.total)) {
-                    Ok(encoding) => encoding,
-                    Err(reason) => return Ok(Built::Refused(reason)),
-                };
-                let upload = self.store.upload(&head.animation.gif(), options).await?;
-                ResumedUpload { encoding, upload, frames: 0, pieces: 0 }
+        // A WebP begins with its length.
+        let options = if output == Container::Webp { options.start_last() } else { options };
+        let begin = async |alpha| match animator.begin(&settings_of(head), output, alpha) {
+            Ok(encoding) => {
+                let upload = self.store.upload(&head.animation.output(output), options.clone()).await?;
+                Ok::<_, Error>(Ok(ResumedUpload { encoding, upload, frames: 0, pieces: 0 }))
             }
+            Err(reason) => Ok(Err(Built::Refused(reason))),
         };
-        let ended = match self.encode(&mut taken_up, manifest, began).await {
+        let taken_up = self.take_up(animator, (head, output), replaces.as_ref(), &options, held).await?;
+        let mut taken_up = match taken_up {
+            Some(taken_up) => taken_up,
+            None => match begin(false).await? {
+                Ok(begun) => begun,
+                Err(refused) => return Ok(refused),
+            },
+        };
+        let mut encoded = self.encode(&mut taken_up, manifest, began).await;
+        if let Ok(Encoded::Alpha) = encoded {
+            taken_up.upload.abort().await?;
+            self.drop_checkpoint(head, held).await?;
+            taken_up = match begin(true).await? {
+                Ok(begun) => begun,
+                Err(refused) => return Ok(refused),
+            };
+            encoded = self.encode(&mut taken_up, manifest, began).await;
+        }
+        let ended = match encoded {
             Ok(Encoded::All) => return self.finish(taken_up, head, held).await,
             Ok(Encoded::SoFar(frames)) => {
                 let ResumedUpload { encoding, upload, pieces, .. } = taken_up;
@@ -99,12 +117,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                     Ok(encoding) => encoding,
                     Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
                 };
-                let of = CheckpointHead { generation: head.generation.clone(), replaces, frames, pieces };
+                let generation = head.generation.clone();
+                let of = CheckpointHead { generation, output, replaces, frames, pieces };
                 self.put_checkpoint(head, Checkpoint { head: of, upload: upload.leave(), encoding }).await?;
                 held.has_checkpoint = true;
                 return Ok(Built::Left(frames));
             }
             Ok(Encoded::No(ended)) => Ok(ended),
+            Ok(Encoded::Alpha) => Ok(Built::Refused(Reason::new("the encoder takes no frames with alpha"))),
             // The checkpoint stands: the next attempt continues from there.
             Err(error) if held.has_checkpoint && (error.is_retryable() || error.is_out_of_time()) => {
                 return Err(error);
@@ -135,7 +155,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         held: &mut HeldLease,
     ) -> Result<Built<'m>> {
         let ResumedUpload { encoding, mut upload, .. } = made;
-        let rest = match encoding.finish().await {
+        let (rest, patch) = match encoding.finish().await {
             Ok(rest) => rest,
             Err(reason) => return self.give_up(upload, head, held, Ok(Built::Refused(reason))).await,
         };
@@ -149,7 +169,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 error => self.give_up(upload, head, held, Err(error)).await,
             };
         }
-        let finished = upload.finish().await;
+        let finished = upload.finish(patch).await;
         // Whatever the result was, no assembler goes on with this upload.
         self.drop_checkpoint(head, held).await?;
         match finished {
@@ -170,7 +190,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<Encoded<'m>> {
         let ResumedUpload { encoding, upload, frames: before, .. } = made;
         let animation = &manifest.head.animation;
-        let settings = manifest.head.settings.value.clone().unwrap_or_default();
+        let settings = settings_of(&manifest.head);
         let shown = settings.shown(&manifest.frames);
         let keys = shown.filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
         let keys = keys.skip(usize::try_from(*before).unwrap_or(usize::MAX));
@@ -190,6 +210,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 Ok(piece) => upload.write(piece).await?,
                 Err(Unfit::Corrupt(reason)) => return Ok(Encoded::No(Built::Corrupt(frame, reason))),
                 Err(Unfit::Unlike(reason)) => return Ok(Encoded::No(Built::Refused(reason))),
+                Err(Unfit::Alpha) => return Ok(Encoded::Alpha),
             }
             pushed += 1;
             let now = self.clock.now();
@@ -232,6 +253,11 @@ fn out_of_time(head: &Head, before: Duration, building: Duration) -> Result<Reas
     )))
 }
 
+/// The settings of an animation, with the number of frames that there are.
+pub(crate) fn settings_of(head: &Head) -> AnimationSettings {
+    head.settings.value.clone().unwrap_or_default().of_frames(head.total)
+}
+
 /// The key of a frame that is drawn.
 pub fn frame_key(animation: &Animation, frame: &Frame) -> Option<String> {
     let FrameState::Done { pixels } = frame.state else { return None };
@@ -239,16 +265,16 @@ pub fn frame_key(animation: &Animation, frame: &Frame) -> Option<String> {
     Some(animation.receipt(&Receipt::Frame { name, tag: Tag { version, pixels }, part: frame.part }))
 }
 
-/// The generation that a GIF was made of.
-pub fn generation_of(gif: Option<&ObjectInfo>) -> Option<&str> {
-    gif?.metadata.get(GENERATION).map(String::as_str)
+/// The generation that a file was made of.
+pub fn generation_of(file: Option<&ObjectInfo>) -> Option<&str> {
+    file?.metadata.get(GENERATION).map(String::as_str)
 }
 
-/// Returns whether a GIF was made of this set: it is of the set's generation, and no other GIF has replaced it with a
+/// Returns whether a file was made of this set: it is of the set's generation, and no other file has replaced it with a
 /// copy of its metadata.
-pub fn is_current(head: &Head, gif: Option<&ObjectInfo>) -> bool {
-    let is_built = |gif: &ObjectInfo| head.gif_version().is_none_or(|built| gif.etag == *built);
-    generation_of(gif) == Some(head.generation.as_str()) && gif.is_some_and(is_built)
+pub fn is_current(head: &Head, output: Container, file: Option<&ObjectInfo>) -> bool {
+    let is_built = |file: &ObjectInfo| head.version_of(output).is_none_or(|built| file.etag == *built);
+    generation_of(file) == Some(head.generation.as_str()) && file.is_some_and(is_built)
 }
 
 #[cfg(test)]

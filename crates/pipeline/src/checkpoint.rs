@@ -1,18 +1,20 @@
-//! The progress of a GIF that does not fit the time of one invocation, written down for the next one.
+//! The progress of a file that does not fit the time of one invocation, written down for the next one.
 //!
-//! A checkpoint is resumed only if it makes the same bytes: the same set of frames, to replace the same GIF, by the
+//! A checkpoint is resumed only if it makes the same bytes: the same set of frames, to replace the same file, by the
 //! same version of the encoder. Any other one, also a damaged one, costs a build from the start. The lease says that
 //! there is a checkpoint, so an assembler that builds in one piece asks for none; one that no lease speaks of is
 //! litter, and the bucket's rules clear it away.
 //!
-//! The object is a line with the hash of the rest, a line of JSON, the bytes of the GIF that are not sent yet,
+//! The object is a line with the hash of the rest, a line of JSON, the bytes of the file that are not sent yet,
 //! and the encoder's state.
 
 use bytes::{Bytes, BytesMut};
+use rayfold_scene::Container;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::animator::Animator;
+use crate::build::settings_of;
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::Generation;
 use crate::lease::HeldLease;
@@ -26,7 +28,7 @@ const SCHEMA: u32 = 1;
 /// Bytes of the first line.
 const HASH: usize = 64;
 
-/// A GIF between two frames.
+/// A file between two frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Checkpoint {
     pub(crate) head: CheckpointHead,
@@ -34,17 +36,24 @@ pub(crate) struct Checkpoint {
     pub(crate) encoding: Bytes,
 }
 
-/// The identity of the GIF of which a checkpoint is.
+/// The identity of the file of which a checkpoint is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CheckpointHead {
     /// The set of frames.
     pub(crate) generation: Generation,
-    /// The GIF that it is to replace.
+    /// The kind of file.
+    #[serde(default = "gif")]
+    pub(crate) output: Container,
+    /// The file that it is to replace.
     pub(crate) replaces: Option<ETag>,
     /// The number of frames that the encoder has taken.
     pub(crate) frames: u64,
     /// In how many invocations.
     pub(crate) pieces: u32,
+}
+
+fn gif() -> Container {
+    Container::Gif
 }
 
 #[derive(Serialize, Deserialize)]
@@ -53,19 +62,22 @@ struct Line {
     #[serde(flatten)]
     head: CheckpointHead,
     upload: UnfinishedUpload,
-    /// Bytes of the upload's tail.
+    /// Bytes of the upload's start, and of its tail.
+    #[serde(default)]
+    start: usize,
     tail: usize,
 }
 
 impl Checkpoint {
     fn encode(self, key: &str) -> Result<Bytes> {
         let Checkpoint { head, upload, encoding } = self;
-        let tail = upload.tail.clone();
-        let line = Line { schema: SCHEMA, head, upload, tail: tail.len() };
+        let (start, tail) = (upload.start.clone(), upload.tail.clone());
+        let line = Line { schema: SCHEMA, head, upload, start: start.len(), tail: tail.len() };
         let line = serde_json::to_vec(&line)
             .map_err(|source| Error::Malformed { key: key.to_owned(), source: source.into() })?;
-        let mut body = BytesMut::with_capacity(HASH + 2 + line.len() + tail.len() + encoding.len());
-        let rest: [&[u8]; 4] = [&line, b"\n", &tail, &encoding];
+        let rest: [&[u8]; 5] = [&line, b"\n", &start, &tail, &encoding];
+        let length: usize = rest.iter().map(|part| part.len()).sum();
+        let mut body = BytesMut::with_capacity(HASH + 1 + length);
         body.extend_from_slice(hash(&rest).as_bytes());
         body.extend_from_slice(b"\n");
         rest.iter().for_each(|part| body.extend_from_slice(part));
@@ -85,13 +97,13 @@ impl Checkpoint {
         let mut rest = body.slice(1..);
         let end = rest.iter().position(|byte| *byte == b'\n')?;
         let line = rest.split_to(end);
-        let Line { schema, head, upload, tail } = serde_json::from_slice(&line).ok()?;
+        let Line { schema, head, upload, start, tail } = serde_json::from_slice(&line).ok()?;
         let mut encoding = rest.slice(1..);
-        if schema != SCHEMA || tail > encoding.len() {
+        if schema != SCHEMA || start.checked_add(tail)? > encoding.len() {
             return None;
         }
-        let tail = encoding.split_to(tail);
-        Some(Checkpoint { head, upload: UnfinishedUpload { tail, ..upload }, encoding })
+        let (start, tail) = (encoding.split_to(start), encoding.split_to(tail));
+        Some(Checkpoint { head, upload: UnfinishedUpload { start, tail, ..upload }, encoding })
     }
 }
 
@@ -101,7 +113,7 @@ fn hash(parts: &[&[u8]]) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A GIF that is gone on with.
+/// A file that is gone on with.
 pub(crate) struct ResumedUpload<E, U> {
     pub(crate) encoding: E,
     pub(crate) upload: U,
@@ -112,12 +124,12 @@ pub(crate) struct ResumedUpload<E, U> {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Goes on with the GIF that the lease's last holder has left, if it is one of this set over this GIF. Else its upload is
-    /// aborted, and the checkpoint goes.
+    /// Goes on with the file that the lease's last holder has left, if it is one of this kind and set, over this version. Else
+    /// its upload is aborted, and the checkpoint goes.
     pub(crate) async fn take_up<A: Animator>(
         &self,
         animator: &A,
-        head: &Head,
+        (head, output): (&Head, Container),
         replaces: Option<&ETag>,
         options: &PutOptions,
         held: &mut HeldLease,
@@ -129,12 +141,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         if let Some(Checkpoint { head: of, upload, encoding }) =
             found.and_then(|found| Checkpoint::decode(found.body))
         {
-            let upload = self.store.take_up(&head.animation.gif(), options.clone(), upload);
+            let upload = self.store.take_up(&head.animation.output(of.output), options.clone(), upload);
             let fits = of.generation == head.generation
+                && of.output == output
                 && of.replaces.as_ref() == replaces
                 && of.frames <= head.total;
             if (fits || self.breaks(Mutation::TakeUpAnyCheckpoint))
-                && let Ok(encoding) = animator.resume(encoding).await
+                && let Ok(encoding) = animator.resume(&settings_of(head), output, encoding).await
             {
                 return Ok(Some(ResumedUpload { encoding, upload, frames: of.frames, pieces: of.pieces }));
             }
@@ -145,7 +158,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(None)
     }
 
-    /// Writes down a GIF between two frames.
+    /// Writes down a file between two frames.
     pub(crate) async fn put_checkpoint(&self, head: &Head, checkpoint: Checkpoint) -> Result<()> {
         let key = head.animation.checkpoint();
         let body = checkpoint.encode(&key)?;
@@ -167,7 +180,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
         let found = self.get(&head.animation.checkpoint()).await?;
         if let Some(checkpoint) = found.and_then(|found| Checkpoint::decode(found.body)) {
-            let key = head.animation.gif();
+            let key = head.animation.output(checkpoint.head.output);
             // As above.
             let _ = self.store.take_up(&key, PutOptions::always(), checkpoint.upload).abort().await;
         }
@@ -181,9 +194,11 @@ mod tests {
 
     fn checkpoint() -> Checkpoint {
         let generation = Generation::new(&"0a".repeat(16)).unwrap();
-        let head = CheckpointHead { generation, replaces: Some(ETag::new("\"e\"")), frames: 7, pieces: 2 };
+        let (output, replaces) = (Container::Webp, Some(ETag::new("\"e\"")));
+        let head = CheckpointHead { generation, output, replaces, frames: 7, pieces: 2 };
         let (parts, tail) = (vec![ETag::new("p1"), ETag::new("p2")], Bytes::from_static(b"tail\n{}"));
-        let upload = UnfinishedUpload { id: Some("id".to_owned()), parts, tail };
+        let start = Bytes::from_static(b"{start");
+        let upload = UnfinishedUpload { id: Some("id".to_owned()), parts, start, tail };
         Checkpoint { head, upload, encoding: Bytes::from_static(b"\nstate") }
     }
 

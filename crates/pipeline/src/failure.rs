@@ -8,14 +8,14 @@
 
 use serde::Deserialize;
 
-use crate::assemble::is_current;
 use crate::fold::{Age, Folded};
 use crate::invocation::Invocation;
 use crate::keys::{
     Animation, Band, Generation, Key, Part, Receipt, ScriptName, Tag, Uploaded, decode_event_key,
 };
-use crate::manifest::{Fact, Reason, Status};
+use crate::manifest::{Fact, Reason};
 use crate::observe::version_result;
+use crate::outputs::{Due, Outputs, needed};
 use crate::render::bands::Bands;
 use crate::store::{ETag, ListRequest, Store};
 use crate::{Clock, Error, Result};
@@ -242,13 +242,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             End::TooOld | End::Error(_) => return Ok(Recorded::LeftToSweep),
         };
         let known = self.manifest(&animation).await?;
-        let gif = self.head(&animation.gif()).await?;
-        let mut manifest = self.observe(&animation, known.as_ref()).await?.manifest;
-        // No listing shows which GIF was built.
-        manifest.head.gif = known.and_then(|known| known.manifest.head.gif);
+        let mut outputs = Outputs::default();
+        self.look_at_outputs(&animation, &needed(known.as_ref(), None), &mut outputs).await?;
+        let observation = self.observe(&animation, known.as_ref()).await?;
+        self.look_at_outputs(&animation, &needed(None, Some(&observation)), &mut outputs).await?;
+        let mut manifest = observation.manifest;
+        manifest.head = manifest.head.with_files_of(known.as_ref().map(|known| &known.manifest.head));
         let head = &manifest.head;
-        let current = head.status == Status::Done && head.generation == claimed;
-        if !current || is_current(head, gif.as_ref()) {
+        let Due::File(output) = outputs.due(head) else { return Ok(Recorded::LeftToSweep) };
+        if head.generation != claimed {
             return Ok(Recorded::LeftToSweep);
         }
         let tries = failure.attempts;
@@ -257,7 +259,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
              retry, or fetch the frames and assemble them locally",
             head.total
         ));
-        self.refuse(&manifest, &reason).await?;
+        self.refuse(&manifest, output, &reason).await?;
         self.fold(&animation, &Fact::Fold, Age::Old).await.map(Recorded::Refused)
     }
 }

@@ -16,13 +16,14 @@ use std::num::NonZeroU64;
 use std::time::Duration;
 
 use bytes::Bytes;
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::keys::{Band, Part, ScriptName};
 use crate::manifest::Reason;
 use crate::render::{BandJoiner, Drawing, File, Files, Renderer, Source};
+use crate::store::Patch;
 
 /// The request that a script makes to the fakes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,12 +160,25 @@ pub fn picture(name: &ScriptName, script: &[u8], part: Part) -> String {
 }
 
 /// The file of an animation.
-pub fn film(settings: &AnimationSettings, pictures: &[String]) -> String {
-    first_line((settings.fps(), settings.loops())) + &lines(pictures)
+pub fn film(settings: &AnimationSettings, output: Container, pictures: &[String]) -> String {
+    let film = first_lines(output, (settings.fps(), settings.loops())) + &lines(pictures);
+    film.replacen(LENGTH, &length(film.len()), 1)
 }
 
-fn first_line((fps, loops): (f64, u16)) -> String {
-    format!("fps {fps} loop {loops}\n")
+/// Stands for the length of a file that begins with it, until it is known.
+const LENGTH: &str = "of ........ bytes";
+
+fn length(bytes: usize) -> String {
+    format!("of {bytes:08} bytes")
+}
+
+fn first_lines(output: Container, (fps, loops): (f64, u16)) -> String {
+    let first = match output {
+        Container::Gif => String::new(),
+        Container::Webp => format!("{LENGTH}\nwebp\n"),
+        Container::Apng | Container::Y4m => format!("{}\n", output.ending()),
+    };
+    format!("{first}fps {fps} loop {loops}\n")
 }
 
 fn lines(pictures: &[String]) -> String {
@@ -234,14 +248,17 @@ fn text_of(source: &Source) -> Result<Vec<u8>, String> {
 #[derive(Serialize, Deserialize)]
 pub struct Listed {
     settings: (f64, u16),
-    is_begun: bool,
+    output: Container,
+    /// The number of bytes that were taken.
+    taken: usize,
     pictures: Vec<String>,
 }
 
 impl Listed {
     /// An animation without frames.
-    pub fn new(settings: &AnimationSettings) -> Self {
-        Listed { settings: (settings.fps(), settings.loops()), is_begun: false, pictures: Vec::new() }
+    pub fn new(settings: &AnimationSettings, output: Container) -> Self {
+        let settings = (settings.fps(), settings.loops());
+        Listed { settings, output, taken: 0, pictures: Vec::new() }
     }
 
     /// Appends a frame to the list.
@@ -253,10 +270,18 @@ impl Listed {
     pub fn take(&mut self) -> Bytes {
         let pictures = std::mem::take(&mut self.pictures);
         let mut text = lines(&pictures);
-        if !std::mem::replace(&mut self.is_begun, true) {
-            text.insert_str(0, &first_line(self.settings));
+        if self.taken == 0 {
+            text.insert_str(0, &first_lines(self.output, self.settings));
         }
+        self.taken += text.len();
         text.into()
+    }
+
+    /// Takes the last bytes, and the length of the whole if the file begins with it.
+    pub fn finish(&mut self) -> (Bytes, Option<Patch>) {
+        let rest = self.take();
+        let bytes = length(self.taken).into();
+        (rest, (self.output == Container::Webp).then_some(Patch { at: 0, bytes }))
     }
 
     /// # Errors

@@ -30,9 +30,11 @@
 
 use std::time::Duration;
 
+use rayfold_scene::Container;
+
 use crate::invocation::{Invocation, Known, ManifestPrefix, Mutation};
 use crate::keys::{Animation, Key};
-use crate::manifest::{Fact, Gif, Manifest};
+use crate::manifest::{Fact, Manifest};
 use crate::observe::Observation;
 use crate::store::{ETag, PAGE, PutOptions, Store};
 use crate::survey::{Next, Page};
@@ -239,7 +241,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         next.head.revision = before.map_or(0, |manifest| manifest.head.revision) + 1;
         next.head.writer = self.request_id().to_owned();
         next.head.removed_at = next.removed_at(before, self.clock.now());
-        next.head.gif = before.and_then(|before| before.head.gif.clone());
+        next.head = next.head.with_files_of(before.map(|before| &before.head));
         invariants::check(&next, before)?;
         let options = match known {
             _ if self.breaks(Mutation::DropIfMatch) => PutOptions::always(),
@@ -254,14 +256,20 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_manifest(next, options).await
     }
 
-    /// Records the GIF of this generation in the manifest; `None` as for a commit. This is no new revision: everything
+    /// Records files of this generation in the manifest; `None` as for a commit. This is no new revision: everything
     /// else in the manifest was listed before it.
-    pub(crate) async fn record_gif(&self, known: &Known, version: ETag) -> Result<Option<Known>> {
-        if known.manifest.head.gif_version() == Some(&version) {
+    pub(crate) async fn record_files(
+        &self,
+        known: &Known,
+        files: Vec<(Container, ETag)>,
+    ) -> Result<Option<Known>> {
+        let mut next = known.manifest.clone();
+        for (output, version) in files {
+            next.head.record(output, version);
+        }
+        if next.head == known.manifest.head {
             return Ok(Some(known.clone()));
         }
-        let mut next = known.manifest.clone();
-        next.head.gif = Some(Gif { generation: next.head.generation.clone(), version });
         let options = PutOptions::if_match(known.etag.clone()).content_type("application/json");
         self.put_manifest(next, options).await
     }

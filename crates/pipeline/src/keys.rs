@@ -15,7 +15,7 @@ use std::fmt;
 use std::num::NonZeroU64;
 use std::str::FromStr;
 
-use rayfold_scene::{Name, SETTINGS_FILE};
+use rayfold_scene::{Container, Name, SETTINGS_FILE};
 use serde::{Deserialize, Serialize};
 
 use crate::store::ETag;
@@ -25,6 +25,7 @@ mod band;
 mod event;
 mod files;
 mod names;
+mod output;
 
 pub use band::Band;
 pub use event::decode_event_key;
@@ -149,8 +150,10 @@ pub enum Key {
     },
     /// `checkpoints/<animation>.state`: how far a GIF is that is made by several invocations, one after the other.
     Checkpoint { animation: Animation },
-    /// `animations/<animation>.gif`
-    Gif { animation: Animation },
+    /// `animations/<animation>.gif`, or another ending: a file that is made of the animation.
+    Output { animation: Animation, output: Container },
+    /// `frames/<animation>/@output.<ending>`: there may be such a file of the animation. A GIF needs none.
+    OutputMark { animation: Animation, output: Container },
 }
 
 /// The part of a receipt's key below `frames/<animation>/`.
@@ -212,10 +215,11 @@ pub enum Receipt {
     Taken { name: ScriptName, tag: Tag },
     /// `<name>@<tag>.waits.json`: the frame cannot be drawn before files come that the script names.
     Waits { name: ScriptName, tag: Tag },
-    /// `@<generation>.error.json`: this set of frames gives no GIF.
+    /// `@<generation>.error.json`: this set of frames gives no GIF; of another file `@<generation>.<ending>.error.json`
     Refusal {
         /// The set that was refused.
         generation: Generation,
+        output: Container,
     },
 }
 
@@ -266,9 +270,14 @@ impl Animation {
         format!("{MANIFESTS}{self}.json")
     }
 
+    /// Returns the key `animations/<animation>.<ending>`.
+    pub fn output(&self, output: Container) -> String {
+        format!("animations/{self}.{}", output.ending())
+    }
+
     /// Returns the key `animations/<animation>.gif`.
     pub fn gif(&self) -> String {
-        format!("animations/{self}.gif")
+        self.output(Container::Gif)
     }
 
     /// Returns the key `checkpoints/<animation>.state`.
@@ -370,7 +379,8 @@ impl Key {
             | Key::Claim { animation, .. }
             | Key::Retry { animation, .. }
             | Key::Checkpoint { animation }
-            | Key::Gif { animation } => animation,
+            | Key::Output { animation, .. }
+            | Key::OutputMark { animation, .. } => animation,
         }
     }
 }
@@ -405,6 +415,10 @@ impl FromStr for Key {
             }
             "frames" if rest.ends_with(SWEEP_LEASE_FILE) => {
                 Key::SweepLease { animation: above(rest, SWEEP_LEASE_FILE).ok_or_else(unknown)? }
+            }
+            "frames" if output::of_mark(rest).is_some() => {
+                let (animation, output) = output::of_mark(rest).ok_or_else(unknown)?;
+                Key::OutputMark { animation: Animation::new(animation)?, output }
             }
             "frames" => {
                 let (animation, receipt) = receipt(rest).ok_or_else(unknown)?;
@@ -441,8 +455,9 @@ impl FromStr for Key {
                 Key::Checkpoint { animation: Animation::new(animation)? }
             }
             "animations" => {
-                let animation = rest.strip_suffix(".gif").ok_or_else(unknown)?;
-                Key::Gif { animation: Animation::new(animation)? }
+                let (animation, ending) = rest.rsplit_once('.').ok_or_else(unknown)?;
+                let output = ending.parse().map_err(|_| unknown())?;
+                Key::Output { animation: Animation::new(animation)?, output }
             }
             _ => return Err(unknown()),
         };
@@ -546,8 +561,8 @@ fn receipt(rest: &str) -> Option<(&str, Receipt)> {
     if file.contains('@') {
         // A script's name may start with `@`, too; but nothing more follows a generation.
         let refused = file.strip_prefix('@').and_then(|file| file.strip_suffix(".error.json"));
-        if let Some(generation) = refused.and_then(|text| Generation::new(text).ok()) {
-            return Some((above, Receipt::Refusal { generation }));
+        if let Some((generation, output)) = refused.and_then(output::of_refusal) {
+            return Some((above, Receipt::Refusal { generation, output }));
         }
         // A name may hold whatever ends a receipt; a tag holds no dot.
         let (name, rest) = file.rsplit_once('@')?;
@@ -653,7 +668,10 @@ impl fmt::Display for Key {
                 write!(f, "retries/{animation}/{name}@{tag}/{number}/{attempt}")
             }
             Key::Checkpoint { animation } => f.write_str(&animation.checkpoint()),
-            Key::Gif { animation } => f.write_str(&animation.gif()),
+            Key::Output { animation, output } => f.write_str(&animation.output(*output)),
+            Key::OutputMark { animation, output } => {
+                write!(f, "{}{}", animation.frames(), output::mark(*output))
+            }
         }
     }
 }
@@ -681,7 +699,9 @@ impl fmt::Display for Receipt {
             Receipt::Files { name, tag, list } => write!(f, "{name}@{tag}.{list}"),
             Receipt::Taken { name, tag } => write!(f, "{name}@{tag}.taken"),
             Receipt::Waits { name, tag } => write!(f, "{name}@{tag}.waits.json"),
-            Receipt::Refusal { generation } => write!(f, "@{generation}.error.json"),
+            Receipt::Refusal { generation, output } => {
+                write!(f, "@{}.error.json", output::refusal(generation, *output))
+            }
         }
     }
 }

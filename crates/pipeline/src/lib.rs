@@ -20,6 +20,7 @@ pub mod keys;
 mod lease;
 pub mod manifest;
 mod observe;
+mod outputs;
 pub mod reconcile;
 pub mod render;
 pub mod retry;

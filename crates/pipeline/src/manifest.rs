@@ -6,11 +6,11 @@
 //! Its first line is the [`Head`], whose size does not grow with the number of frames. The frames follow, a line
 //! each, and the first line says where.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::num::NonZeroU64;
 
-use rayfold_scene::{AnimationSettings, Diagnostic, SETTINGS_FILE, parse_settings};
+use rayfold_scene::{AnimationSettings, Container, Diagnostic, SETTINGS_FILE, parse_settings};
 use serde::{Deserialize, Serialize};
 
 use crate::Timestamp;
@@ -52,7 +52,7 @@ pub struct Head {
     pub writer: String,
     /// The progress of the animation.
     pub status: Status,
-    /// The identity of this set of frames and settings; a GIF of the same generation is up to date.
+    /// The identity of this set of frames and settings; a file of the same generation is up to date.
     pub generation: Generation,
     /// Scripts in the folder.
     pub scripts: u64,
@@ -75,7 +75,7 @@ pub struct Head {
     /// Files that are not read because they are not called as scripts and settings are.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Rejected>,
-    /// Why this generation gives no GIF though all its frames are there.
+    /// Why one of the files cannot be made of this generation though all its frames are there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
     /// The reason if there are more frames than an animation may have.
@@ -87,18 +87,21 @@ pub struct Head {
     /// The last GIF that an assembler has seen or put. Another GIF with the metadata of this generation
     /// is not that one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gif: Option<Gif>,
+    pub gif: Option<Made>,
+    /// The other files, likewise.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub outputs: BTreeMap<Container, Made>,
     /// Every 1,000th script's name: where listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
 }
 
-/// A GIF that was built.
+/// A file that was made of an animation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Gif {
-    /// The set that the GIF was made of.
+pub struct Made {
+    /// The set that it was made of.
     pub generation: Generation,
-    /// The entity tag of the GIF.
+    /// Its entity tag.
     pub version: ETag,
 }
 
@@ -114,9 +117,9 @@ pub enum Status {
     Rendering,
     /// Everything has been tried, and something cannot be drawn or understood: there will be no GIF.
     Failed,
-    /// All frames are drawn, but they cannot be assembled: there will be no GIF.
+    /// All frames are drawn, but one of the files cannot be made of them: there will be none.
     Refused,
-    /// All frames are drawn: there is a GIF of this generation, or there will be.
+    /// All frames are drawn: there are the files of this generation, or there will be.
     Done,
 }
 
@@ -236,9 +239,33 @@ impl Head {
         !matches!(self.status, Status::Waiting | Status::Rendering)
     }
 
-    /// The version of this generation's GIF, if an assembler has seen it.
-    pub fn gif_version(&self) -> Option<&ETag> {
-        self.gif.as_ref().filter(|gif| gif.generation == self.generation).map(|gif| &gif.version)
+    /// The files that are to be made of the animation.
+    pub fn outputs(&self) -> &[Container] {
+        let settings = self.settings.value.as_ref();
+        settings.map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs)
+    }
+
+    /// The version of a file of this generation, if an assembler has seen it.
+    pub fn version_of(&self, output: Container) -> Option<&ETag> {
+        let made = if output == Container::Gif { self.gif.as_ref() } else { self.outputs.get(&output) };
+        made.filter(|made| made.generation == self.generation).map(|made| &made.version)
+    }
+
+    /// Records the version of a file of this generation.
+    pub(crate) fn record(&mut self, output: Container, version: ETag) {
+        let made = Made { generation: self.generation.clone(), version };
+        if output == Container::Gif {
+            self.gif = Some(made);
+        } else {
+            self.outputs.insert(output, made);
+        }
+    }
+
+    /// Takes over the recorded files of another head: no listing shows them.
+    pub(crate) fn with_files_of(mut self, other: Option<&Head>) -> Self {
+        self.gif = other.and_then(|other| other.gif.clone());
+        self.outputs = other.map(|other| other.outputs.clone()).unwrap_or_default();
+        self
     }
 
     /// Returns the number of frames that are expected and not there yet.

@@ -6,6 +6,7 @@ use std::num::NonZeroU64;
 
 use futures_util::future::try_join;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
+use rayfold_scene::Container;
 
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, NameHash, Part, Receipt, ScriptName, Tag, Uploaded, VersionHash};
@@ -29,6 +30,7 @@ pub(crate) struct Receipts {
     pub(crate) has_parts: bool,
     has_lease: bool,
     has_sweep_lease: bool,
+    marked: BTreeSet<Container>,
 }
 
 /// A listing of an animation and the manifest that follows from it.
@@ -41,6 +43,8 @@ pub(crate) struct Observation {
     pub(crate) has_lease: bool,
     /// A sweep deletes results, or died in it.
     pub(crate) has_sweep_lease: bool,
+    /// Files of which there may be one, beside the GIF.
+    pub(crate) marked: BTreeSet<Container>,
 }
 
 impl Receipts {
@@ -51,8 +55,12 @@ impl Receipts {
         };
         let has_lease = has(Key::Lease { animation: animation.clone() });
         let has_sweep_lease = has(Key::SweepLease { animation: animation.clone() });
+        let marks = Container::ALL.into_iter();
+        let mark =
+            |output: &Container| has(Key::OutputMark { animation: animation.clone(), output: *output });
+        let marked = marks.filter(mark).collect();
         let found = listed.into_iter().filter_map(|listed| receipt(animation, listed)).collect();
-        Receipts { found, has_parts, has_lease, has_sweep_lease }
+        Receipts { found, has_parts, has_lease, has_sweep_lease, marked }
     }
 }
 
@@ -114,7 +122,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         receipts: Receipts,
     ) -> Result<Option<Observation>> {
         let settings = self.settings(animation, settings, known).await?;
-        let Receipts { found, has_parts, has_lease, has_sweep_lease } = receipts;
+        let Receipts { found, has_parts, has_lease, has_sweep_lease, marked } = receipts;
         let mut results = Results { receipts: found };
         scripts.resolve(&results.receipts);
         if !has_parts {
@@ -123,7 +131,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let manifest = reconcile(animation, &scripts, &results, &settings);
         let mut manifest = manifest.bounded(self.policy.most_frames);
         let has_reasons = self.add_reasons(animation, &results, known, &mut manifest).await?;
-        Ok(has_reasons.then_some(Observation { scripts, results, manifest, has_lease, has_sweep_lease }))
+        let observation = Observation { scripts, results, manifest, has_lease, has_sweep_lease, marked };
+        Ok(has_reasons.then_some(observation))
     }
 
     /// The entity tags of the scripts on the first page of a listing.

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 
+use rayfold_scene::AnimationSettings;
 use sha2::{Digest, Sha256};
 
 use crate::Timestamp;
@@ -125,8 +126,12 @@ pub fn reconcile(
     let waiting = count(|state| matches!(state, FrameState::Waiting(_)));
     let failed = count(|state| matches!(state, FrameState::Failed(_)));
     let generation = generation(&frames, settings);
+    let outputs = settings.value.as_ref();
+    let outputs = outputs.map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs);
     let refusal = results.receipts.iter().find_map(|found| match &found.receipt {
-        Receipt::Refusal { generation: refused } if *refused == generation => {
+        Receipt::Refusal { generation: refused, output }
+            if *refused == generation && outputs.contains(output) =>
+        {
             Some(Fault { receipt: found.etag.clone(), reason: None })
         }
         _ => None,
@@ -167,6 +172,7 @@ pub fn reconcile(
         excess: None,
         removed_at: None,
         gif: None,
+        outputs: BTreeMap::new(),
         marks: marks(scripts),
     };
     Manifest { head, frames }
@@ -224,7 +230,7 @@ impl<'a> Resolution<'a> {
     }
 }
 
-/// Returns the hash of the sorted frames with their states, and of the settings.
+/// Returns the hash of the sorted frames with their states, and of the settings that show in a file.
 fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     let mut hash = Sha256::new();
     // Without lengths, different fields could concatenate to the same bytes.
@@ -237,6 +243,15 @@ fn generation(frames: &[Frame], settings: &Settings) -> Generation {
             field(&value.frames().unwrap_or(0).to_le_bytes());
             field(&value.fps().to_bits().to_le_bytes());
             field(&value.loops().to_le_bytes());
+            // No script has such a name.
+            if value.bounces() {
+                field(b"/bounce");
+            }
+            for (frame, seconds) in value.durations() {
+                field(b"/duration");
+                field(&frame.to_le_bytes());
+                field(&seconds.to_bits().to_le_bytes());
+            }
         }
         None => field(settings.version.as_ref().map_or("", ETag::as_str).as_bytes()),
     }

@@ -270,7 +270,8 @@ impl Subject {
             | Key::SetAside { .. }
             | Key::Claim { .. }
             | Key::Checkpoint { .. }
-            | Key::Gif { .. } => None,
+            | Key::Output { .. }
+            | Key::OutputMark { .. } => None,
         }
     }
 

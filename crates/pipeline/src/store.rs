@@ -120,6 +120,8 @@ pub struct PutOptions {
     pub content_type: &'static str,
     /// The user metadata of the object.
     pub metadata: Metadata,
+    /// Whether an upload keeps the start of the object back until its end, where it may be [changed](Upload::finish).
+    pub is_start_last: bool,
 }
 
 impl PutOptions {
@@ -129,6 +131,7 @@ impl PutOptions {
             condition: Condition::Always,
             content_type: "application/octet-stream",
             metadata: Metadata::new(),
+            is_start_last: false,
         }
     }
 
@@ -145,6 +148,11 @@ impl PutOptions {
     /// Sets the media type of the body.
     pub fn content_type(self, content_type: &'static str) -> Self {
         PutOptions { content_type, ..self }
+    }
+
+    /// Keeps the start of an upload back until its end.
+    pub fn start_last(self) -> Self {
+        PutOptions { is_start_last: true, ..self }
     }
 
     /// Adds an entry to the metadata.
@@ -210,9 +218,30 @@ pub struct UnfinishedUpload {
     pub id: Option<String>,
     /// The entity tags of the parts that the store has, in order.
     pub parts: Vec<ETag>,
+    /// The first part, if it is sent last: empty while it is shorter than a part.
+    #[serde(skip)]
+    pub start: Bytes,
     /// The bytes after the last part: fewer than a part has.
     #[serde(skip)]
     pub tail: Bytes,
+}
+
+/// Bytes that take the place of others at the start of an object, before its first 4 KiB end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Patch {
+    /// The offset of the first byte.
+    pub at: usize,
+    /// The new bytes.
+    pub bytes: Bytes,
+}
+
+impl Patch {
+    /// Changes the start of an object.
+    pub fn apply(&self, start: &mut [u8]) {
+        if let Some(old) = start.get_mut(self.at..self.at + self.bytes.len()) {
+            old.copy_from_slice(&self.bytes);
+        }
+    }
 }
 
 /// A bucket. See the [module](self) for its guarantees.
@@ -261,8 +290,9 @@ pub trait Upload: Send {
     fn write(&mut self, bytes: Bytes) -> impl Future<Output = Result<()>> + Send;
 
     /// Makes the object visible, under the condition that the upload began with. When that does not hold the upload
-    /// is aborted and the error is that of a conditional put.
-    fn finish(self) -> impl Future<Output = Result<ETag>> + Send;
+    /// is aborted and the error is that of a conditional put. `patch` changes the start of the object, and is for
+    /// uploads that [keep it back](PutOptions::start_last).
+    fn finish(self, patch: Option<Patch>) -> impl Future<Output = Result<ETag>> + Send;
 
     /// Gives up; nothing becomes visible.
     fn abort(self) -> impl Future<Output = Result<()>> + Send;

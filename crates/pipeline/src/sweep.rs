@@ -11,12 +11,12 @@ use std::num::NonZeroU64;
 
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
-use crate::assemble::{Due, due, new_gif};
 use crate::invocation::{Invocation, Known};
 use crate::keys::{Animation, Key, MANIFESTS, Part, Receipt, SCRIPTS, ScriptName, Tag, Uploaded};
 use crate::lease::SweepLease;
 use crate::manifest::{Fault, Frame, FrameState, Manifest, Reason, Status};
 use crate::observe::Observation;
+use crate::outputs::{Due, Outputs, needed};
 use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, ListRequest, Store};
 use crate::wake_count::WakeCount;
@@ -125,7 +125,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
 
     async fn visit(&self, animation: &Animation) -> Result<Visit> {
         let known = self.manifest(animation).await?;
-        let gif = self.head(&animation.gif()).await?;
+        let mut outputs = Outputs::default();
+        self.look_at_outputs(animation, &needed(known.as_ref(), None), &mut outputs).await?;
         let mut observation = self.observe(animation, known.as_ref()).await?;
         let mut visit = Visit::default();
         let mut lease = None;
@@ -134,6 +135,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             // Its holder may have deleted more since the listing.
             observation = self.observe(animation, known.as_ref()).await?;
         }
+        self.look_at_outputs(animation, &needed(None, Some(&observation)), &mut outputs).await?;
         if self.policy.is_fresh_start && observation.has_lease {
             self.release_stale_lease(animation).await?;
         }
@@ -141,12 +143,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let is_healed = self.heal_receipts(animation, &observation, &mut lease, &mut visit).await?;
         let head = &observation.manifest.head;
         let stands = known.as_ref().filter(|known| known.manifest.agrees_with(&observation.manifest));
-        // A GIF that no manifest has named could be cut off unnoticed.
-        let is_right = stands.map(|known| &known.manifest.head).is_some_and(|head| {
-            due(head, gif.as_ref()) == Due::Nothing && new_gif(head, gif.as_ref()).is_none()
-        });
+        // A file that no manifest has named could be cut off unnoticed.
+        let is_right = stands
+            .map(|known| &known.manifest.head)
+            .is_some_and(|head| outputs.due(head) == Due::Nothing && outputs.unrecorded(head).is_empty());
         let is_empty = head.status == Status::Empty && head.warnings.is_empty();
-        let nothing_at_all = known.is_none() && is_empty && gif.is_none();
+        let nothing_at_all = known.is_none() && is_empty && outputs.existing().next().is_none();
         if (!is_right || is_healed || visit.given_up > 0) && !nothing_at_all {
             self.claim(&claimable(&observation.manifest, known.as_ref())).await?;
             visit.claimed = true;
@@ -313,7 +315,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 (Receipt::Fault { name, tag, part }, Some(frame)) => {
                     (name, &tag.version, part) == (&frame.script, &frame.version, &frame.part)
                 }
-                (Receipt::Refusal { generation }, None) => *generation == manifest.head.generation,
+                (Receipt::Refusal { generation, .. }, None) => *generation == manifest.head.generation,
                 _ => false,
             };
             let receipts = observation.results.receipts.iter().filter(is_it);
@@ -364,7 +366,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 .is_some_and(|current| *current == version || current.as_str() == version.script())
         };
         let superseded = |found: &&ReceiptFound| match &found.receipt {
-            Receipt::Refusal { generation } => *generation != observation.manifest.head.generation,
+            Receipt::Refusal { generation, .. } => *generation != observation.manifest.head.generation,
             Receipt::Frame { name, tag, part } => match used.get(&(name, *part)) {
                 _ if !is_current(name, &tag.version) => true,
                 Some(used) => tag.pixels < *used,

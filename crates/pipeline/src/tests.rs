@@ -9,6 +9,7 @@ mod files;
 mod folds;
 mod observations;
 mod orders;
+mod outputs;
 mod pages;
 mod refusals;
 mod renders;
@@ -21,7 +22,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bytes::Bytes;
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::assemble::Assembled;
 use crate::failure::{End, Failure, Recorded};
@@ -31,8 +32,8 @@ use crate::manifest::{FrameState, Manifest, Reason, Status};
 use crate::render::{Outcome, Rendered};
 use crate::retry::{Scope, retry};
 use crate::store::{
-    Bucket, ETag, ListPage, ListRequest, Metadata, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
-    Upload,
+    Bucket, ETag, ListPage, ListRequest, Metadata, Object, ObjectInfo, Patch, PutOptions, Store,
+    UnfinishedUpload, Upload,
 };
 use crate::sweep::{Visit, visit};
 use crate::{
@@ -143,7 +144,7 @@ impl Pieces {
 impl Upload for Pieces {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
         let mut tail = [&self.unfinished.tail[..], &bytes].concat();
-        while tail.len() >= PART {
+        while tail.len() >= PART && !self.options.is_start_last {
             asked(&self.refuser, "part", &self.key)?;
             let rest = tail.split_off(PART);
             let mut bucket = self.bucket.lock().unwrap();
@@ -157,7 +158,10 @@ impl Upload for Pieces {
         Ok(())
     }
 
-    async fn finish(self) -> Result<ETag> {
+    async fn finish(mut self, patch: Option<Patch>) -> Result<ETag> {
+        let mut tail = self.unfinished.tail.to_vec();
+        patch.iter().for_each(|patch| patch.apply(&mut tail));
+        self.unfinished.tail = tail.into();
         asked(&self.refuser, "finish", &self.key)?;
         let (now, id) = (self.clock.now(), self.id());
         let (mut bucket, UnfinishedUpload { parts, tail, .. }) =
@@ -197,6 +201,8 @@ struct Joiner {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trouble {
     Begin,
+    /// At the beginning of this kind of file.
+    Output(Container),
     Suspend,
     Finish,
 }
@@ -204,6 +210,7 @@ enum Trouble {
 struct Joined {
     joiner: Joiner,
     listed: Listed,
+    alpha: bool,
 }
 
 impl Joiner {
@@ -215,13 +222,14 @@ impl Joiner {
 impl Animator for Joiner {
     type Encoding = Joined;
 
-    fn begin(&self, settings: &AnimationSettings) -> Result<Joined, Reason> {
+    fn begin(&self, settings: &AnimationSettings, output: Container, alpha: bool) -> Result<Joined, Reason> {
         self.meets(Trouble::Begin)?;
-        Ok(Joined { joiner: self.clone(), listed: Listed::new(settings) })
+        self.meets(Trouble::Output(output))?;
+        Ok(Joined { joiner: self.clone(), listed: Listed::new(settings, output), alpha })
     }
 
-    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
-        Ok(Joined { joiner: self.clone(), listed: Listed::resume(&state)? })
+    async fn resume(&self, _: &AnimationSettings, _: Container, state: Bytes) -> Result<Joined, Reason> {
+        Ok(Joined { joiner: self.clone(), listed: Listed::resume(&state)?, alpha: false })
     }
 }
 
@@ -234,15 +242,18 @@ impl Encoding for Joined {
         if frame.ends_with(b"frame odd") {
             return Err(Unfit::Unlike(Reason::new("odd")));
         }
+        if frame.ends_with(b"frame clear") && !self.alpha {
+            return Err(Unfit::Alpha);
+        }
         // One goes out when the next one comes.
         let before = self.listed.take();
         self.listed.push(&frame);
         Ok(before)
     }
 
-    async fn finish(mut self) -> Result<Bytes, Reason> {
+    async fn finish(mut self) -> Result<(Bytes, Option<Patch>), Reason> {
         self.joiner.meets(Trouble::Finish)?;
-        Ok(self.listed.take())
+        Ok(self.listed.finish())
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {

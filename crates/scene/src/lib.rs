@@ -15,6 +15,7 @@
 //! ```
 
 mod command;
+mod container;
 mod curve;
 pub mod diagnostic;
 mod form;
@@ -32,6 +33,7 @@ mod shared_slice;
 mod shown;
 
 pub use command::Command;
+pub use container::{Container, UnknownContainer};
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{

@@ -16,13 +16,14 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use crate::container::Container;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::model::{InvalidValue, Parameter};
 use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report};
 use crate::shown::quoted;
 
-const FIELDS: [&str; 5] = ["frames", "fps", "loop", "bounce", "durations"];
+const FIELDS: [&str; 6] = ["frames", "fps", "loop", "bounce", "durations", "outputs"];
 
 /// The settings of an animation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,6 +34,7 @@ pub struct AnimationSettings {
     loops: u16,
     bounce: bool,
     durations: BTreeMap<u64, f64>,
+    outputs: Vec<Container>,
 }
 
 /// The fields in the JSON file.
@@ -49,6 +51,12 @@ struct Fields {
     bounce: bool,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     durations: BTreeMap<u64, f64>,
+    #[serde(skip_serializing_if = "is_default")]
+    outputs: Vec<Container>,
+}
+
+fn is_default(outputs: &Vec<Container>) -> bool {
+    outputs == AnimationSettings::DEFAULT_OUTPUTS
 }
 
 /// Reads a number, or a fraction such as `"30000/1001"`.
@@ -82,6 +90,9 @@ impl AnimationSettings {
     /// The allowed times of a frame in seconds. Players slow down a shorter one, and a GIF can hold no longer one.
     pub const DURATION: RangeInclusive<f64> = 0.02..=655.35;
 
+    /// The files that a bucket makes of an animation if nothing else is asked for.
+    pub const DEFAULT_OUTPUTS: &[Container] = &[Container::Gif];
+
     /// Makes settings. `frames` is the expected number of frames, or `None` for the existing ones. `fps` is the frame
     /// rate. `loops` is the number of repetitions, 0 for endless.
     ///
@@ -94,7 +105,7 @@ impl AnimationSettings {
         if !Self::FPS.contains(&fps) {
             return Err(InvalidValue::OutOfRange(Parameter::FrameRate, *Self::FPS.start(), *Self::FPS.end()));
         }
-        Ok(Self { frames, fps, loops, bounce: false, durations: BTreeMap::new() })
+        Ok(Self { frames, fps, loops, ..Self::default() })
     }
 
     /// Sets the expected number of frames.
@@ -138,6 +149,23 @@ impl AnimationSettings {
             return Err(InvalidValue::OutOfRange(Parameter::Duration, least, most));
         }
         Ok(Self { durations, ..self })
+    }
+
+    /// Sets the files that a bucket makes of the animation, in this order.
+    ///
+    /// # Errors
+    /// Fails if there is none, or if one is named twice.
+    pub fn with_outputs(self, outputs: Vec<Container>) -> Result<Self, InvalidValue> {
+        let is_twice = |(place, output): (usize, &Container)| outputs[..place].contains(output);
+        if outputs.is_empty() || outputs.iter().enumerate().any(is_twice) {
+            return Err(InvalidValue::Outputs);
+        }
+        Ok(Self { outputs, ..self })
+    }
+
+    /// Returns the files that a bucket makes of the animation, in this order.
+    pub fn outputs(&self) -> &[Container] {
+        &self.outputs
     }
 
     /// Returns whether the animation runs back after its last frame.
@@ -197,7 +225,14 @@ impl AnimationSettings {
 
 impl Default for AnimationSettings {
     fn default() -> Self {
-        Self { frames: None, fps: Self::DEFAULT_FPS, loops: 0, bounce: false, durations: BTreeMap::new() }
+        Self {
+            frames: None,
+            fps: Self::DEFAULT_FPS,
+            loops: 0,
+            bounce: false,
+            durations: BTreeMap::new(),
+            outputs: Self::DEFAULT_OUTPUTS.to_vec(),
+        }
     }
 }
 
@@ -213,14 +248,15 @@ impl TryFrom<Fields> for AnimationSettings {
     fn try_from(fields: Fields) -> Result<Self, InvalidValue> {
         Self::new(fields.frames, fields.fps, fields.loops)?
             .bouncing(fields.bounce)
-            .with_durations(fields.durations)
+            .with_durations(fields.durations)?
+            .with_outputs(fields.outputs)
     }
 }
 
 impl From<AnimationSettings> for Fields {
     fn from(settings: AnimationSettings) -> Self {
-        let AnimationSettings { frames, fps, loops, bounce, durations } = settings;
-        Self { frames, fps, loops, bounce, durations }
+        let AnimationSettings { frames, fps, loops, bounce, durations, outputs } = settings;
+        Self { frames, fps, loops, bounce, durations, outputs }
     }
 }
 
@@ -281,6 +317,7 @@ fn settings(text: &str, report: &mut Report<'_>) -> Option<AnimationSettings> {
                 .map(|bounce| fields.bounce = bounce)
                 .map_err(|_| "expected true or false".to_string()),
             "durations" => durations(text, value, report).map(|durations| fields.durations = durations),
+            "outputs" => outputs(text, value, report).map(|outputs| fields.outputs = outputs),
             _ => {
                 tell(text, key, report, || unknown(&name));
                 Ok(())
@@ -352,6 +389,35 @@ fn durations(text: &str, value: &RawValue, report: &mut Report<'_>) -> Result<BT
         }
     }
     Ok(durations)
+}
+
+/// Returns the files in `value`, or a description of what is expected. Reports wrong names.
+fn outputs(text: &str, value: &RawValue, report: &mut Report<'_>) -> Result<Vec<Container>, String> {
+    let expected = || "expected a list of files to make, such as [\"gif\", \"webp\"]".to_string();
+    let entries = serde_json::from_str::<Vec<&RawValue>>(value.get()).map_err(|_| expected())?;
+    if entries.is_empty() {
+        return Err(expected());
+    }
+    let mut outputs: Vec<Container> = Vec::new();
+    for entry in entries {
+        let Ok(output) = serde_json::from_str(entry.get()) else {
+            tell(text, entry, report, || {
+                let entry = entry.get().lines().next().unwrap_or_default();
+                let endings = Container::ALL.map(Container::ending).join("\", \"");
+                Fault::new(Code::InvalidField, format!("{} is no file of an animation", quoted(entry)))
+                    .expected(format!("expected one of \"{endings}\""))
+            });
+            continue;
+        };
+        if outputs.contains(&output) {
+            tell(text, entry, report, || {
+                Fault::new(Code::DuplicateField, format!("`{}` is there twice", output.ending()))
+                    .expected("expected each file at most once")
+            });
+        }
+        outputs.push(output);
+    }
+    Ok(outputs)
 }
 
 fn unknown(name: &str) -> Fault {
@@ -508,6 +574,19 @@ mod tests {
     }
 
     #[test]
+    fn files_to_make_are_a_list_of_endings() {
+        let made = |outputs: &[Container]| AnimationSettings::default().with_outputs(outputs.to_vec()).ok();
+        assert_eq!(AnimationSettings::default().outputs(), [Container::Gif]);
+        check(r#"{"outputs": ["gif"]}"#, settings(None, 10.0, 0));
+        check(r#"{"outputs": ["webp", "gif"]}"#, made(&[Container::Webp, Container::Gif]));
+        check(r#"{"outputs": ["y4m", "apng"]}"#, made(&[Container::Y4m, Container::Apng]));
+        for value in ["[]", "null", "\"gif\"", "[\"mp4\"]", "[1]", "{}", "[\"gif\", \"gif\"]", "[\"GIF\"]"] {
+            check(&format!(r#"{{"outputs": {value}}}"#), None);
+        }
+        assert!(made(&[]).is_none() && made(&[Container::Gif, Container::Gif]).is_none());
+    }
+
+    #[test]
     fn there_and_back_shows_the_ends_once() {
         let settings = AnimationSettings::default().bouncing(true);
         let settings = settings.with_durations([(1, 1.0), (2, 2.0), (4, 4.0), (9, 9.0)].into()).unwrap();
@@ -541,7 +620,10 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back() {
-        for settings in [settings(None, 0.1, 3), settings(Some(7), 1000.0 / 3.0, 0)].into_iter().flatten() {
+        let made = settings(None, 5.0, 0).unwrap().with_outputs(vec![Container::Apng]).unwrap();
+        for settings in
+            [settings(None, 0.1, 3), settings(Some(7), 1000.0 / 3.0, 0), Some(made)].into_iter().flatten()
+        {
             let text = serde_json::to_string(&settings).unwrap();
             check(&text, Some(settings));
         }

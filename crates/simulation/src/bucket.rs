@@ -13,8 +13,8 @@ use bytes::{Bytes, BytesMut};
 
 use super::engine::{Engine, WorldClock, lock};
 use rayfold_pipeline::store::{
-    Bucket, Condition, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload,
-    Upload,
+    Bucket, Condition, ETag, ListPage, ListRequest, Object, ObjectInfo, Patch, PutOptions, Store,
+    UnfinishedUpload, Upload,
 };
 use rayfold_pipeline::{Clock, Error, Randomness, Result, Timestamp};
 
@@ -657,7 +657,7 @@ impl Store for WorldStore {
     }
 
     fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> WorldUpload {
-        let UnfinishedUpload { id, parts, tail } = unfinished;
+        let UnfinishedUpload { id, parts, tail, .. } = unfinished;
         let part = self.env.part.load(Ordering::Relaxed);
         let id = id.and_then(|id| id.parse().ok()).unwrap_or_default();
         WorldUpload {
@@ -687,7 +687,8 @@ pub(super) struct WorldUpload {
 impl Upload for WorldUpload {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
         self.gathered.extend_from_slice(&bytes);
-        while self.gathered.len() >= self.part {
+        // A start that may change is sent at the end; here with all the rest.
+        while self.gathered.len() >= self.part && !self.options.is_start_last {
             let (key, body) = (self.key.clone(), self.gathered.split_to(self.part).freeze());
             let part = Effect::Part { key, id: self.id, number: self.parts.len() + 1, body };
             match self.store.request(part).await? {
@@ -698,8 +699,9 @@ impl Upload for WorldUpload {
         Ok(())
     }
 
-    async fn finish(self) -> Result<ETag> {
-        let WorldUpload { store, key, options, id, parts, gathered, .. } = self;
+    async fn finish(self, patch: Option<Patch>) -> Result<ETag> {
+        let WorldUpload { store, key, options, id, parts, mut gathered, .. } = self;
+        patch.iter().for_each(|patch| patch.apply(&mut gathered));
         let tail = gathered.freeze();
         match store.request(Effect::Complete { key: key.clone(), id, parts, tail, options }).await? {
             Answer::ETag(etag) => Ok(etag),
@@ -713,6 +715,6 @@ impl Upload for WorldUpload {
 
     fn leave(self) -> UnfinishedUpload {
         let (id, parts, tail) = (Some(self.id.to_string()), self.parts, self.gathered.freeze());
-        UnfinishedUpload { id, parts, tail }
+        UnfinishedUpload { id, parts, tail, ..UnfinishedUpload::default() }
     }
 }

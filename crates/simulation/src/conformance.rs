@@ -12,7 +12,9 @@ use bytes::Bytes;
 use futures_util::future::join_all;
 
 use rayfold_pipeline::Error;
-use rayfold_pipeline::store::{ListPage, ListRequest, PAGE, PutOptions, Store, UnfinishedUpload, Upload};
+use rayfold_pipeline::store::{
+    ListPage, ListRequest, PAGE, Patch, PutOptions, Store, UnfinishedUpload, Upload,
+};
 
 /// Runs the whole suite below `prefix`, which must be empty; it leaves objects behind.
 pub async fn check<S: Store>(store: &S, prefix: &str) {
@@ -31,6 +33,7 @@ pub async fn check<S: Store>(store: &S, prefix: &str) {
     uploads_appear_whole(store, prefix).await;
     uploads_keep_their_condition(store, prefix).await;
     uploads_are_left_and_taken_up(store, prefix).await;
+    uploads_change_their_start_at_the_end(store, prefix).await;
     uploads_are_taken_up_twice_without_harm(store, prefix).await;
     uploads_that_are_gone_have_an_error_of_their_own(store, prefix).await;
 }
@@ -238,7 +241,7 @@ pub async fn uploads_appear_whole<S: Store>(store: &S, prefix: &str) {
         }
     }
     assert!(store.head(&key).await.unwrap_err().is_not_found(), "nothing is visible before the end");
-    let etag = upload.finish().await.unwrap();
+    let etag = upload.finish(None).await.unwrap();
     let object = store.get(&key).await.unwrap();
     assert!(object.body == body, "the body comes back");
     assert_eq!(object.info.etag, etag);
@@ -250,7 +253,7 @@ pub async fn uploads_appear_whole<S: Store>(store: &S, prefix: &str) {
         for piece in &pieces {
             upload.write(Bytes::from_static(piece.as_bytes())).await.unwrap();
         }
-        upload.finish().await.unwrap();
+        upload.finish(None).await.unwrap();
         assert_eq!(store.get(&small).await.unwrap().body, pieces.concat());
     }
 
@@ -270,23 +273,23 @@ pub async fn uploads_keep_their_condition<S: Store>(store: &S, prefix: &str) {
         let mut late = store.upload(&key, PutOptions::if_absent()).await.unwrap();
         late.write(piece()).await.unwrap();
         let first = store.put(&key, Bytes::from_static(b"first"), PutOptions::always()).await.unwrap();
-        assert!(late.finish().await.unwrap_err().is_conflict(), "someone was first");
+        assert!(late.finish(None).await.unwrap_err().is_conflict(), "someone was first");
         assert_eq!(store.get(&key).await.unwrap().body, "first");
 
         let mut stale = store.upload(&key, PutOptions::if_match(first.clone())).await.unwrap();
         stale.write(piece()).await.unwrap();
         let second = store.put(&key, Bytes::from_static(b"second"), PutOptions::always()).await.unwrap();
-        assert!(stale.finish().await.unwrap_err().is_conflict(), "the version is another");
+        assert!(stale.finish(None).await.unwrap_err().is_conflict(), "the version is another");
 
         let mut good = store.upload(&key, PutOptions::if_match(second.clone())).await.unwrap();
         good.write(piece()).await.unwrap();
-        good.finish().await.unwrap();
+        good.finish(None).await.unwrap();
         assert_eq!(store.get(&key).await.unwrap().body, piece());
 
         let mut orphan = store.upload(&key, PutOptions::if_match(second)).await.unwrap();
         orphan.write(piece()).await.unwrap();
         store.delete(&key).await.unwrap();
-        let error = orphan.finish().await.unwrap_err();
+        let error = orphan.finish(None).await.unwrap_err();
         assert!(error.is_not_found() || error.is_conflict(), "the object is gone: {error:?}");
         assert!(store.head(&key).await.unwrap_err().is_not_found());
     }
@@ -307,7 +310,7 @@ pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
         upload = store.take_up(&key, options.clone(), written_down(upload.leave()));
     }
     assert!(rest.is_empty() && store.head(&key).await.unwrap_err().is_not_found(), "nothing is visible yet");
-    let etag = upload.finish().await.unwrap();
+    let etag = upload.finish(None).await.unwrap();
     let object = store.get(&key).await.unwrap();
     assert!(object.body == body, "the body comes back");
     assert_eq!(
@@ -319,7 +322,33 @@ pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
         let mut late = store.upload(&key, PutOptions::if_absent()).await.unwrap();
         late.write(Bytes::from(vec![1; size])).await.unwrap();
         let late = store.take_up(&key, PutOptions::if_absent(), written_down(late.leave()));
-        assert!(late.finish().await.unwrap_err().is_conflict(), "there is one already");
+        assert!(late.finish(None).await.unwrap_err().is_conflict(), "there is one already");
+    }
+}
+
+/// However long the object is, and wherever it was left.
+pub async fn uploads_change_their_start_at_the_end<S: Store>(store: &S, prefix: &str) {
+    let options = PutOptions::if_absent().start_last();
+    for (name, pieces) in [
+        ("empty", vec![]),
+        ("short", vec![8]),
+        ("piece", vec![9_000_000]),
+        ("pieces", vec![10, 9_000_000, 8_000_000, 500_000, 9_000_000]),
+    ] {
+        let key = format!("{prefix}/upload-start-{name}");
+        let mut upload = store.upload(&key, options.clone()).await.unwrap();
+        let mut expected = Vec::new();
+        for (number, size) in pieces.into_iter().enumerate() {
+            let piece: Vec<u8> = (0..size).map(|n| (n % 249) as u8 ^ number as u8).collect();
+            expected.extend_from_slice(&piece);
+            upload.write(piece.into()).await.unwrap();
+            upload = store.take_up(&key, options.clone(), written_down(upload.leave()));
+        }
+        let patch = Patch { at: 4, bytes: Bytes::from_static(b"size") };
+        patch.apply(&mut expected);
+        assert_eq!(expected.get(4..8).is_none_or(|bytes| bytes == b"size"), true);
+        upload.finish(Some(patch)).await.unwrap();
+        assert!(store.get(&key).await.unwrap().body == expected, "{name}");
     }
 }
 
@@ -334,8 +363,8 @@ pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix
     let mut second = store.take_up(&key, PutOptions::if_absent(), left);
     first.write(piece(2)).await.unwrap();
     second.write(piece(2)).await.unwrap();
-    first.finish().await.unwrap();
-    let error = second.finish().await.unwrap_err();
+    first.finish(None).await.unwrap();
+    let error = second.finish(None).await.unwrap_err();
     assert!(error.is_conflict() || error.is_ambiguous() || error.is_not_found(), "{error:?}");
     assert!(store.get(&key).await.unwrap().body == [piece(1), piece(2)].concat());
 }
@@ -350,7 +379,7 @@ pub async fn uploads_that_are_gone_have_an_error_of_their_own<S: Store>(store: &
     store.take_up(&key, PutOptions::always(), left.clone()).abort().await.unwrap();
     let mut late = store.take_up(&key, PutOptions::always(), left.clone());
     assert!(late.write(piece()).await.unwrap_err().is_not_found());
-    let error = store.take_up(&key, PutOptions::always(), left.clone()).finish().await.unwrap_err();
+    let error = store.take_up(&key, PutOptions::always(), left.clone()).finish(None).await.unwrap_err();
     assert!(error.is_ambiguous() || error.is_not_found(), "{error:?}");
     store.take_up(&key, PutOptions::always(), left).abort().await.expect("it may be gone");
     assert!(store.head(&key).await.unwrap_err().is_not_found());
@@ -359,8 +388,8 @@ pub async fn uploads_that_are_gone_have_an_error_of_their_own<S: Store>(store: &
 /// As another process finds it.
 fn written_down(unfinished: UnfinishedUpload) -> UnfinishedUpload {
     let text = serde_json::to_string(&unfinished).unwrap();
-    let tail = unfinished.tail;
-    UnfinishedUpload { tail, ..serde_json::from_str(&text).unwrap() }
+    let UnfinishedUpload { start, tail, .. } = unfinished;
+    UnfinishedUpload { start, tail, ..serde_json::from_str(&text).unwrap() }
 }
 
 /// All keys and folders of a listing, page by page.

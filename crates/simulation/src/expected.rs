@@ -3,7 +3,7 @@
 
 use std::num::NonZeroU64;
 
-use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
+use rayfold_scene::{AnimationSettings, Container, SETTINGS_FILE, parse_settings};
 
 use rayfold_pipeline::fakes::{Play, drawn_text, film, picture};
 use rayfold_pipeline::keys::{Animation, Key, Part, ScriptName};
@@ -106,9 +106,9 @@ impl Expected {
             Err(_) => None,
         };
         let status = self.status(manifest.as_ref());
-        let gif = bucket.get(&animation.gif()).ok();
+        let file = |output: Container| bucket.get(&animation.output(output)).ok();
         let Some(manifest) = manifest else {
-            return match (self.frames.is_empty(), gif) {
+            return match (self.frames.is_empty(), Container::ALL.into_iter().find_map(file)) {
                 (true, None) => Ok(()),
                 _ => Err("there is no manifest".to_owned()),
             };
@@ -147,31 +147,38 @@ impl Expected {
         if manifest.head.status != status {
             return Err(format!("the manifest is {:?}, not {status:?}", manifest.head.status));
         }
-        let film = self.settings.as_ref().filter(|_| status == Status::Done).map(|settings| {
-            let pictures: Vec<String> = self.frames.iter().filter_map(|shot| shot.picture.clone()).collect();
-            film(settings, &pictures)
-        });
-        match (film, gif) {
-            (Some(film), Some(gif)) if gif.body != film => Err(format!(
-                "the GIF is from another set:\n{}\nnot\n{film}",
-                String::from_utf8_lossy(&gif.body)
-            )),
-            (Some(_), None) => Err("there is no GIF".to_owned()),
-            // While more frames are to be uploaded the last GIF stays.
-            (None, Some(_)) if status != Status::Waiting => {
-                Err(format!("there is a GIF of what is {status:?}"))
+        let settings = self.settings.as_ref().filter(|_| status == Status::Done);
+        for output in Container::ALL {
+            let film = settings.filter(|settings| settings.outputs().contains(&output)).map(|settings| {
+                let pictures: Vec<String> =
+                    self.frames.iter().filter_map(|shot| shot.picture.clone()).collect();
+                film(settings, output, &pictures)
+            });
+            let name = output.name();
+            match (film, file(output)) {
+                (Some(film), Some(file)) if file.body != film => {
+                    let body = String::from_utf8_lossy(&file.body);
+                    return Err(format!("the {name} is from another set:\n{body}\nnot\n{film}"));
+                }
+                (Some(_), None) => return Err(format!("there is no {name}")),
+                // While more frames are to be uploaded the last files stay.
+                (None, Some(_)) if status != Status::Waiting => {
+                    return Err(format!("there is a {name} that nobody asks for: {status:?}"));
+                }
+                _ => {}
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 }
 
-/// A manifest takes another one's place as its next revision, or with nothing new but which GIF is there.
+/// A manifest takes another one's place as its next revision, or with nothing new but which files are there.
 pub(super) fn follows(next: &Manifest, before: Option<&Manifest>) -> Result<(), String> {
     let revision = before.map_or(0, |before| before.head.revision);
     let is_record = before.is_some_and(|before| {
-        let head = Head { gif: next.head.gif.clone(), ..before.head.clone() };
-        next.head.gif != before.head.gif && next.head == head && next.frames == before.frames
+        let (gif, outputs) = (next.head.gif.clone(), next.head.outputs.clone());
+        let head = Head { gif, outputs, ..before.head.clone() };
+        head != before.head && next.head == head && next.frames == before.frames
     });
     if next.head.revision == revision + 1 || is_record {
         return Ok(());

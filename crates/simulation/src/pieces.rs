@@ -78,7 +78,7 @@ pub fn in_pieces(pieces: Pieces) -> Result<PiecesReport, String> {
         let (world, first) = (Arc::downgrade(&env), script(0));
         *lock(&env.notify) = Some(Arc::new(move |_: Actor, key: &str, there: bool, bucket: &Bucket| {
             match key.parse() {
-                Ok(Key::Gif { .. }) if there => lock(&counted).gifs += 1,
+                Ok(Key::Output { .. }) if there => lock(&counted).gifs += 1,
                 Ok(Key::Checkpoint { .. }) if there => {
                     lock(&counted).checkpoints += 1;
                     let is_due = pieces.overwritten_at == Some(lock(&counted).checkpoints);

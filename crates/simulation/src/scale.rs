@@ -260,7 +260,7 @@ impl Moments {
                 self.revisions += 1;
                 self.manifest = self.manifest.max(bucket.head(key).map_or(0, |info| info.size));
             }
-            Ok(Key::Gif { .. }) => {
+            Ok(Key::Output { .. }) => {
                 self.first_gif_us.get_or_insert(now_us);
                 self.gif_us = now_us;
             }

@@ -72,7 +72,7 @@ pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
         let (platform, counted) = (Arc::downgrade(&platform), counted.clone());
         *lock(&env.notify) = Some(Arc::new(move |_: Actor, key: &str, there: bool, bucket: &Bucket| {
             match key.parse() {
-                Ok(Key::Gif { .. }) if there => lock(&counted).gifs += 1,
+                Ok(Key::Output { .. }) if there => lock(&counted).gifs += 1,
                 Ok(Key::Claim { .. }) => lock(&counted).claims += 1,
                 _ => {}
             }

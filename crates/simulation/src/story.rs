@@ -19,6 +19,7 @@ use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::{Bucket, Object, PutOptions};
 use rayfold_pipeline::sweep::Visit;
 use rayfold_pipeline::{Clock, Mutation, Policy, Randomness};
+use rayfold_scene::Container;
 
 /// By when a run must have come to rest.
 const PATIENCE: Duration = Duration::from_secs(24 * 3600);
@@ -115,7 +116,7 @@ fn begin(
     }
     let animation = Animation::new("an/im").map_err(|error| error.to_string())?;
     let watch = watch(&env, &platform);
-    write_story(random, &env, &platform, &animation);
+    write_story((random, hurry), &env, &platform, &animation);
     if random.one_in(2) {
         *lock(&env.moments) = Some(awkward_user(random, &env));
     }
@@ -184,18 +185,27 @@ fn pick(random: &Randomness, of: usize) -> usize {
 
 /// Writes the acts of users and their times.
 fn write_story(
-    random: &Randomness,
+    (random, hurry): (&Randomness, &Randomness),
     env: &Arc<SimEnvironment>,
     platform: &Arc<Platform>,
     animation: &Animation,
 ) {
     let count = 1 + pick(random, 4).min(1 + pick(random, 3));
     let span_ms = [50, 500, 4_000, 20_000][pick(random, 4)];
-    let settings_text = |random: &Randomness, scripts: usize| match random.below(8) {
-        0 => r#"{"frames": 0.5}"#.to_owned(),
-        1 | 2 => r#"{"fps": 20}"#.to_owned(),
-        3 => format!(r#"{{"frames": {}}}"#, scripts + 1),
-        _ => format!(r#"{{"frames": {scripts}}}"#),
+    let settings_text = |random: &Randomness, scripts: usize| {
+        let settings = match random.below(8) {
+            0 => r#""frames": 0.5"#.to_owned(),
+            1 | 2 => r#""fps": 20"#.to_owned(),
+            3 => format!(r#""frames": {}"#, scripts + 1),
+            _ => format!(r#""frames": {scripts}"#),
+        };
+        let outputs = match hurry.below(8) {
+            0 => r#", "outputs": ["gif", "webp"]"#,
+            1 => r#", "outputs": ["webp", "apng", "gif"]"#,
+            2 => r#", "outputs": ["y4m"]"#,
+            _ => "",
+        };
+        format!("{{{settings}{outputs}}}")
     };
     if random.one_in(2) {
         let delay = Duration::from_millis(random.below(span_ms));
@@ -386,9 +396,9 @@ impl Watch {
                 let before = self.manifest.replace(manifest.clone());
                 follows(&manifest, before.as_ref())?;
             }
-            Key::Gif { .. } if there => {
+            Key::Output { .. } if there => {
                 let text = String::from_utf8_lossy(&body);
-                let frames: Vec<(u64, String, u64)> = text.lines().skip(1).filter_map(place_of).collect();
+                let frames: Vec<(u64, String, u64)> = text.lines().filter_map(place_of).collect();
                 if !frames.is_sorted()
                     || frames.windows(2).any(|pair| pair[0] == pair[1])
                     || frames.is_empty()
@@ -429,7 +439,7 @@ impl Judge {
         let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
         match random.below(3) {
             0 => return self.garble_a_frame(random.bits(), delay),
-            1 => return self.cut_off_the_gif(delay),
+            1 => return self.cut_off_a_file(delay),
             _ => {}
         }
         let text = ["", "garbage\n", "{\"schema\":9},\n\"frames\":[\n\n]}\n"][pick(random, 3)];
@@ -451,20 +461,22 @@ impl Judge {
         });
     }
 
-    /// A user puts half of the GIF in its place, with its metadata, once the manifest says which one it is.
-    fn cut_off_the_gif(&self, delay: Duration) {
+    /// A user puts half of a file in its place, with its metadata, once the manifest says which one it is.
+    fn cut_off_a_file(&self, delay: Duration) {
         let (world, platform, animation) = (self.env.clone(), self.platform.clone(), self.animation.clone());
         self.engine.after(delay, move || {
             let now = WorldClock::exact(&world.engine).now();
             let mut bucket = lock(&world.bucket);
-            let (key, manifest) = (animation.gif(), bucket.get(&animation.manifest()).ok());
+            let manifest = bucket.get(&animation.manifest()).ok();
             let manifest = manifest.and_then(|object| Manifest::decode(&animation, &object.body).ok());
+            let output = manifest.as_ref().and_then(|manifest| manifest.head.outputs().last().copied());
+            let key = animation.output(output.unwrap_or(Container::Gif));
             let Ok(Object { info, body }) = bucket.get(&key) else { return };
             // Files of two generations may be equal: then their metadata tell them apart.
             let is_named = |manifest: &Manifest| {
-                manifest.head.gif.as_ref().is_some_and(|named| {
-                    named.version == info.etag
-                        && generation_of(Some(&info)) == Some(named.generation.as_str())
+                let head = &manifest.head;
+                output.and_then(|output| head.version_of(output)).is_some_and(|named| {
+                    *named == info.etag && generation_of(Some(&info)) == Some(head.generation.as_str())
                 })
             };
             if !manifest.as_ref().is_some_and(is_named) {
@@ -473,7 +485,7 @@ impl Judge {
             world.note(|| format!("someone cuts off {key}"));
             let options = PutOptions { metadata: info.metadata, ..PutOptions::always() };
             let _ = bucket.put(now, &key, body.slice(..body.len() / 2), options);
-            platform.only_the_sweep_heals("the GIF was cut off");
+            platform.only_the_sweep_heals("a file was cut off");
         });
     }
 

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use rayfold_scene::AnimationSettings;
+use rayfold_pipeline::store::Patch;
+use rayfold_scene::{AnimationSettings, Container};
 
 use super::bucket::{Fate, SimEnvironment};
 use super::engine::Engine;
@@ -103,11 +104,11 @@ pub(super) struct List {
 impl Animator for FakeAnimator {
     type Encoding = List;
 
-    fn begin(&self, settings: &AnimationSettings) -> Result<List, Reason> {
-        Ok(self.list(Listed::new(settings)))
+    fn begin(&self, settings: &AnimationSettings, output: Container, _: bool) -> Result<List, Reason> {
+        Ok(self.list(Listed::new(settings, output)))
     }
 
-    async fn resume(&self, state: Bytes) -> Result<List, Reason> {
+    async fn resume(&self, _: &AnimationSettings, _: Container, state: Bytes) -> Result<List, Reason> {
         Listed::resume(&state).map(|listed| self.list(listed))
     }
 }
@@ -129,8 +130,8 @@ impl Encoding for List {
         Ok(before)
     }
 
-    async fn finish(mut self) -> Result<Bytes, Reason> {
-        Ok(self.listed.take())
+    async fn finish(mut self) -> Result<(Bytes, Option<Patch>), Reason> {
+        Ok(self.listed.finish())
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {

@@ -75,7 +75,14 @@ fn every_kind_of_key_reads_back() {
             "00 1@x@d41d8cd9-2-p3/12.12-of-12.band",
             Receipt::Band { name: name.clone(), tag: t(), part: Some(number), band },
         ),
-        ("@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.error.json", Receipt::Refusal { generation: generation.clone() }),
+        (
+            "@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.error.json",
+            Receipt::Refusal { generation: generation.clone(), output: Container::Gif },
+        ),
+        (
+            "@0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a.webp.error.json",
+            Receipt::Refusal { generation: generation.clone(), output: Container::Webp },
+        ),
     ] {
         assert_eq!(text.parse::<Receipt>().unwrap(), receipt);
         check(&format!("frames/films/ä+b/{text}"), Key::Receipt { animation: a(), receipt });
@@ -92,7 +99,11 @@ fn every_kind_of_key_reads_back() {
     check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12", retry(None));
     check("retries/films/ä+b/00 1@x@d41d8cd9-2-p3/12/12", retry(Some(number)));
     check("checkpoints/films/ä+b.state", Key::Checkpoint { animation: a() });
-    check("animations/films/ä+b.gif", Key::Gif { animation: a() });
+    for output in Container::ALL {
+        let ending = output.ending();
+        check(&format!("animations/films/ä+b.{ending}"), Key::Output { animation: a(), output });
+        check(&format!("frames/films/ä+b/@output.{ending}"), Key::OutputMark { animation: a(), output });
+    }
 }
 
 /// An error receipt of a script whose name starts with `@` was taken for a refusal, and the script was pending for ever.
@@ -100,7 +111,14 @@ fn every_kind_of_key_reads_back() {
 fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
     let generation = "0a".repeat(16);
     let band = Band::all(NonZeroU64::MIN).next().unwrap();
-    for name in ["@", "@1", "@@", &format!("@{generation}"), &format!("{generation}.error.json")] {
+    for name in [
+        "@",
+        "@1",
+        "@@",
+        &format!("@{generation}"),
+        &format!("{generation}.error.json"),
+        &format!("@{generation}.webp"),
+    ] {
         let (name, tag) = (ScriptName::new(name).unwrap(), tag("v", 1));
         for part in [None, NonZeroU64::new(2)] {
             let receipts = [
@@ -116,7 +134,8 @@ fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
             }
         }
     }
-    let receipt = Receipt::Refusal { generation: Generation::new(&generation).unwrap() };
+    let receipt =
+        Receipt::Refusal { generation: Generation::new(&generation).unwrap(), output: Container::Gif };
     check(&format!("frames/a/@{generation}.error.json"), Key::Receipt { animation: animation("a"), receipt });
 }
 
@@ -266,5 +285,6 @@ fn a_receipt_is_of_one_version_of_one_script() {
         assert!(receipt.is_of(&c, &v), "{receipt}");
         assert!(!receipt.is_of(&c, &w) && !receipt.is_of(&d, &v) && !receipt.is_of(&d, &w), "{receipt}");
     }
-    assert!(!Receipt::Refusal { generation: Generation::new(&"0a".repeat(16)).unwrap() }.is_of(&c, &v));
+    let generation = Generation::new(&"0a".repeat(16)).unwrap();
+    assert!(!Receipt::Refusal { generation, output: Container::Gif }.is_of(&c, &v));
 }

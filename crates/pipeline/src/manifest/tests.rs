@@ -101,12 +101,13 @@ fn manifests_agree_that_say_the_same() {
 #[test]
 fn the_gif_that_counts_is_that_of_this_generation() {
     let mut head = full().head;
-    assert_eq!(head.gif_version(), None);
-    let gif = |generation: &Generation| Gif { generation: generation.clone(), version: ETag::new("g") };
+    assert_eq!(head.version_of(Container::Gif), None);
+    let gif = |generation: &Generation| Made { generation: generation.clone(), version: ETag::new("g") };
     head.gif = Some(gif(&head.generation));
-    assert_eq!(head.gif_version(), Some(&ETag::new("g")));
+    assert_eq!(head.version_of(Container::Gif), Some(&ETag::new("g")));
+    assert_eq!(head.version_of(Container::Webp), None);
     head.gif = Some(gif(&Generation::new(&"0b".repeat(16)).unwrap()));
-    assert_eq!(head.gif_version(), None);
+    assert_eq!(head.version_of(Container::Gif), None);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use bytes::{Bytes, BytesMut};
 
 use super::{
-    Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+    Bucket, ETag, ListPage, ListRequest, Object, ObjectInfo, Patch, PutOptions, Store, UnfinishedUpload,
+    Upload,
 };
 use crate::clock::Clock;
 use crate::{Error, Result};
@@ -66,7 +67,7 @@ impl<C: Clock + Clone + 'static> Store for MemoryStore<C> {
     }
 
     fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload {
-        let UnfinishedUpload { id, parts, tail } = unfinished;
+        let UnfinishedUpload { id, parts, tail, .. } = unfinished;
         let id = id.and_then(|id| id.parse().ok());
         MemoryUpload { store: self.clone(), key: key.to_owned(), options, id, parts, gathered: tail.into() }
     }
@@ -89,7 +90,8 @@ pub struct MemoryUpload<C> {
 impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
     async fn write(&mut self, bytes: Bytes) -> Result<()> {
         self.gathered.extend_from_slice(&bytes);
-        while self.gathered.len() >= PART {
+        // A start that may change is sent at the end; here with all the rest.
+        while self.gathered.len() >= PART && !self.options.is_start_last {
             let part = self.gathered.split_to(PART).freeze();
             let mut bucket = self.store.bucket();
             let id = *self.id.get_or_insert_with(|| bucket.begin_upload());
@@ -98,7 +100,8 @@ impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
         Ok(())
     }
 
-    async fn finish(self) -> Result<ETag> {
+    async fn finish(mut self, patch: Option<Patch>) -> Result<ETag> {
+        patch.iter().for_each(|patch| patch.apply(&mut self.gathered));
         let Some(id) = self.id else {
             return self.store.put(&self.key, self.gathered.freeze(), self.options).await;
         };
@@ -115,7 +118,7 @@ impl<C: Clock + Clone + 'static> Upload for MemoryUpload<C> {
 
     fn leave(self) -> UnfinishedUpload {
         let id = self.id.map(|id| id.to_string());
-        UnfinishedUpload { id, parts: self.parts, tail: self.gathered.freeze() }
+        UnfinishedUpload { id, parts: self.parts, start: Bytes::new(), tail: self.gathered.freeze() }
     }
 }
 

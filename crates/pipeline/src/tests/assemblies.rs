@@ -32,20 +32,23 @@ impl World {
         let text = |number: u64| format!("frame {number}");
         let pictures: Vec<_> =
             (1..=frames).map(|number| picture(&name(number), text(number).as_bytes(), None)).collect();
-        film(&AnimationSettings::default(), &pictures)
+        film(&AnimationSettings::default(), Container::Gif, &pictures)
     }
 
     pub(super) fn slow(&self, takes: Duration) -> Joiner {
         Joiner { takes, ..self.joiner() }
     }
 
-    /// Returns whether no lease is held, nothing is unfinished, and the manifest names the GIF, if there is one.
+    /// Returns whether no lease is held, nothing is unfinished, and the manifest names the files that there are.
     pub(super) fn is_at_rest(&self) -> bool {
         let head = self.manifest().head;
         let bucket = self.store.bucket.lock().unwrap();
-        let gif = bucket.head(GIF).ok().map(|info| info.etag);
+        let is_named = |output: Container| {
+            let file = bucket.head(&World::film().output(output)).ok().map(|info| info.etag);
+            file.is_none() || file.as_ref() == head.version_of(output)
+        };
         let is_clean = bucket.keys().all(|key| key != LEASE && key != CHECKPOINT);
-        is_clean && bucket.unfinished_uploads() == 0 && (gif.is_none() || gif.as_ref() == head.gif_version())
+        is_clean && bucket.unfinished_uploads() == 0 && Container::ALL.into_iter().all(is_named)
     }
 }
 

@@ -43,6 +43,9 @@ pub enum InvalidValue {
     /// The ends of an axis are the same.
     #[error("the ends of the axis must differ")]
     NoAxis,
+    /// No file is to be made of an animation, or one twice.
+    #[error("the outputs must be one file or more, each once")]
+    Outputs,
     /// A cone has radius zero at both ends.
     #[error("the radii must not both be zero")]
     NoRadius,
@@ -75,6 +78,8 @@ impl InvalidValue {
             Self::GazeParallelToUp => matches!(parameter, Parameter::Gaze | Parameter::Up),
             Self::EmptyWindowWidth => matches!(name, "au" | "bu"),
             Self::EmptyWindowHeight => matches!(name, "av" | "bv"),
+            // About no parameter of a script.
+            Self::Outputs => false,
             Self::NoAxis => parameter == Parameter::AxisEnd,
             Self::NoRadius => matches!(parameter, Parameter::RadiusA | Parameter::RadiusB),
             Self::ThickTorus => parameter == Parameter::Thickness,

@@ -236,6 +236,7 @@ fn expectation(fault: InvalidValue) -> String {
         InvalidValue::OutOfRange(_, least, most) => format!("expected a number from {least} to {most}"),
         InvalidValue::Negative(_) => "expected a number from 0".into(),
         InvalidValue::TooSmall(_, least) => format!("expected a number from {least}"),
+        InvalidValue::Outputs => "expected one file or more, each once".into(),
         InvalidValue::NoAxis => "expected two points that differ".into(),
         InvalidValue::NoRadius => "expected a number greater than 0 at one end at least".into(),
         InvalidValue::ThickTorus => "expected `r` to be less than `R`".into(),

@@ -20,7 +20,7 @@ use std::task::{Context, Poll, Wake, Waker};
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::PIXELS;
 use crate::engine::lock;
@@ -28,7 +28,7 @@ use crate::explore::World;
 use rayfold_pipeline::fakes::{InstantRenderer, Listed};
 use rayfold_pipeline::manifest::Reason;
 use rayfold_pipeline::store::{
-    ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store, UnfinishedUpload, Upload,
+    ETag, ListPage, ListRequest, Object, ObjectInfo, Patch, PutOptions, Store, UnfinishedUpload, Upload,
 };
 use rayfold_pipeline::{Animator, Encoding, Unfit};
 use rayfold_pipeline::{
@@ -517,7 +517,8 @@ impl Upload for BoardUpload {
         Ok(())
     }
 
-    async fn finish(self) -> Result<ETag> {
+    async fn finish(mut self, patch: Option<Patch>) -> Result<ETag> {
+        patch.iter().for_each(|patch| patch.apply(&mut self.body));
         self.store.put(&self.key, self.body.freeze(), self.options).await
     }
 
@@ -555,11 +556,11 @@ impl Joiner {
 impl Animator for Joiner {
     type Encoding = Joined;
 
-    fn begin(&self, settings: &AnimationSettings) -> Result<Joined, Reason> {
-        Ok(self.joined(Listed::new(settings)))
+    fn begin(&self, settings: &AnimationSettings, output: Container, _: bool) -> Result<Joined, Reason> {
+        Ok(self.joined(Listed::new(settings, output)))
     }
 
-    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+    async fn resume(&self, _: &AnimationSettings, _: Container, state: Bytes) -> Result<Joined, Reason> {
         Listed::resume(&state).map(|listed| self.joined(listed))
     }
 }
@@ -572,8 +573,8 @@ impl Encoding for Joined {
         Ok(Bytes::new())
     }
 
-    async fn finish(mut self) -> Result<Bytes, Reason> {
-        Ok(self.listed.take())
+    async fn finish(mut self) -> Result<(Bytes, Option<Patch>), Reason> {
+        Ok(self.listed.finish())
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {

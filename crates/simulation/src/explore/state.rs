@@ -14,6 +14,7 @@ use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::{Bucket, ETag, PutOptions};
 use rayfold_pipeline::{Error, Timestamp};
+use rayfold_scene::Container;
 
 /// When the story begins.
 const EPOCH: Timestamp = Timestamp(1_000_000_000_000);
@@ -104,8 +105,8 @@ pub(super) struct State {
     ghosts: Vec<Arc<Ghost>>,
     budget: Budget,
     needs_sweep: bool,
-    /// When the GIF's scripts were listed.
-    gif_of: Timestamp,
+    /// When the scripts of each file were listed.
+    files_of: BTreeMap<Container, Timestamp>,
 }
 
 impl State {
@@ -119,7 +120,7 @@ impl State {
             ghosts: Vec::new(),
             budget: Budget::default(),
             needs_sweep: false,
-            gif_of: Timestamp(0),
+            files_of: BTreeMap::new(),
         };
         while state.acted < world.past {
             state = state.after(world, memo, Choice::User(Delivery::Once))?.at_rest(world, memo)?;
@@ -139,8 +140,8 @@ impl State {
         let listed = |process: &Arc<Process>| process.hash ^ process.listed.0;
         let processes = self.processes.iter().map(listed).map(spread).fold(0, u64::wrapping_add);
         let ghosts = self.ghosts.iter().map(|ghost| ghost.hash).map(spread).fold(1, u64::wrapping_add);
-        let State { acted, ahead, budget, needs_sweep, gif_of, .. } = self;
-        hash_of(&(self.contents.hash, acted, ahead, budget, needs_sweep, gif_of, processes, ghosts))
+        let State { acted, ahead, budget, needs_sweep, files_of, .. } = self;
+        hash_of(&(self.contents.hash, acted, ahead, budget, needs_sweep, files_of, processes, ghosts))
     }
 
     /// Returns a hash of all that can be seen from outside: the contents of the bucket, and the next
@@ -416,12 +417,13 @@ impl State {
                 let next = Manifest::decode(&animation, &body).map_err(|error| error.to_string())?;
                 follows(&next, before.as_ref())
             }
-            Ok(Key::Gif { .. }) => {
+            Ok(Key::Output { output, .. }) => {
                 let is_same = before.as_ref().is_some_and(|(of, _)| of == etag);
-                if before.is_some() && !is_same && listed < self.gif_of {
-                    return Err("a GIF gave way to one from an older listing".to_owned());
+                let file_of = self.files_of.entry(output).or_default();
+                if before.is_some() && !is_same && listed < *file_of {
+                    return Err(format!("a {} gave way to one from an older listing", output.name()));
                 }
-                self.gif_of = if is_same { self.gif_of.min(listed) } else { listed };
+                *file_of = if is_same { listed.min(*file_of) } else { listed };
                 Ok(())
             }
             Ok(_) => Ok(()),

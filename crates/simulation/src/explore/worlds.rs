@@ -40,6 +40,10 @@ const B: Option<&str> = Some("frame 1");
 const C: Option<&str> = Some("frame 2");
 /// One frame that is drawn in bands.
 const BIG: Option<&str> = Some("big frame 0");
+/// Settings that ask for two files.
+const BOTH: Option<&str> = Some("{\"outputs\": [\"gif\", \"webp\"]}");
+/// Settings that ask for another file than a GIF.
+const WEBP: Option<&str> = Some("{\"outputs\": [\"webp\"]}");
 /// A script that names a file.
 const WITH_F: Option<&str> = Some("with f frame 0");
 /// The file.
@@ -104,6 +108,9 @@ pub fn worlds() -> Vec<World> {
     let announced_last = [("1.txt", A), ("2.txt", A), ("animation.json", Some("{\"frames\": 2}"))];
     let returning_early = [("1.txt", A), ("2.txt", A), ("2.txt", B), ("2.txt", A)];
     let deleted_early = [("1.txt", A), ("2.txt", A), ("3.txt", A), ("3.txt", GONE)];
+    let both = [("animation.json", BOTH), ("1.txt", A), ("1.txt", B)];
+    let both_late = [("1.txt", A), ("animation.json", BOTH), ("animation.json", GONE)];
+    let one_for_another = [("animation.json", WEBP), ("1.txt", A), ("animation.json", GONE)];
     let file = [("f", RED), ("1.txt", WITH_F)];
     let file_late = [("1.txt", WITH_F), ("f", RED)];
     let file_changed = [("f", RED), ("1.txt", WITH_F), ("f", BLUE)];
@@ -132,6 +139,12 @@ pub fn worlds() -> Vec<World> {
         world("two scripts that name a file", 2, CALM, &two_with_file),
         world("two scripts that name a file, at once", 0, CALM, &two_with_file),
         world("a file and then its script, changed", 2, CALM, &file_and_script),
+        world("two outputs, one frame", 1, CALM, &both),
+        world("two outputs, one frame, a kill", 1, kill, &both),
+        world("two outputs, one frame, overwritten when done, a late write", 2, late, &both),
+        world("another output when done, and no longer", 1, CALM, &both_late),
+        world("another output when done, and no longer, a kill", 1, kill, &both_late),
+        world("an output that gives way to another", 2, kill, &one_for_another),
         world("one frame, a kill", 0, kill, &one),
         world("one frame, a kill and a late write", 0, late, &one),
         world("one frame, a lost answer", 0, loss, &one),

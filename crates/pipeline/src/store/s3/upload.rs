@@ -8,7 +8,7 @@ use bytes::{Bytes, BytesMut};
 
 use super::S3Store;
 use super::answers::error_of;
-use crate::store::{Condition, ETag, PutOptions, Store, UnfinishedUpload, Upload};
+use crate::store::{Condition, ETag, Patch, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Error, Result};
 
 /// The size of all parts but the last, in bytes. S3 allows 10,000 parts of at least 5 MiB: this allows
@@ -23,16 +23,20 @@ pub struct S3Upload {
     options: PutOptions,
     gathered: BytesMut,
     id: Option<String>,
+    /// The first part, if it is sent last and has its length; its number is kept free.
+    start: Option<BytesMut>,
     parts: Vec<CompletedPart>,
 }
 
 impl S3Upload {
     /// As far as it has come already.
     pub(super) fn new(store: S3Store, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self {
-        let UnfinishedUpload { id, parts, tail } = unfinished;
-        let parts = (1..).zip(parts).map(|(number, etag)| part(number, Some(etag.as_str().to_owned())));
+        let UnfinishedUpload { id, parts, start, tail } = unfinished;
+        let start = Some(BytesMut::from(start)).filter(|start| !start.is_empty());
+        let first = 1 + i32::from(start.is_some());
+        let parts = (first..).zip(parts).map(|(number, etag)| part(number, Some(etag.as_str().to_owned())));
         let (key, parts) = (key.to_owned(), parts.collect());
-        Self { store, key, options, gathered: tail.into(), id, parts }
+        Self { store, key, options, gathered: tail.into(), id, start, parts }
     }
 
     async fn begun(&mut self) -> Result<String> {
@@ -55,9 +59,15 @@ impl S3Upload {
         Ok(id)
     }
 
-    async fn send_part(&mut self, body: Bytes) -> Result<()> {
+    async fn send_next(&mut self, body: Bytes) -> Result<()> {
+        let number = self.parts.len() + 1 + usize::from(self.start.is_some());
+        let sent = self.send_part(i32::try_from(number).unwrap_or(i32::MAX), body).await?;
+        self.parts.push(sent);
+        Ok(())
+    }
+
+    async fn send_part(&mut self, number: i32, body: Bytes) -> Result<CompletedPart> {
         let id = self.begun().await?;
-        let number = i32::try_from(self.parts.len() + 1).unwrap_or(i32::MAX);
         let answer = self
             .store
             .client
@@ -70,7 +80,20 @@ impl S3Upload {
             .send()
             .await
             .map_err(|error| error_of(&self.key, error))?;
-        self.parts.push(part(number, answer.e_tag));
+        Ok(part(number, answer.e_tag))
+    }
+
+    /// Sends what is left: the last part, and the first one if it is sent last.
+    async fn send_rest(&mut self, patch: Option<Patch>) -> Result<()> {
+        let last = self.gathered.split().freeze();
+        if !last.is_empty() {
+            self.send_next(last).await?;
+        }
+        if let Some(mut start) = self.start.take() {
+            patch.iter().for_each(|patch| patch.apply(&mut start));
+            let sent = self.send_part(1, start.freeze()).await?;
+            self.parts.insert(0, sent);
+        }
         Ok(())
     }
 
@@ -120,19 +143,23 @@ impl Upload for S3Upload {
         while self.gathered.len() + bytes.len() >= PART {
             let fitting = bytes.split_to(PART - self.gathered.len());
             self.gathered.extend_from_slice(&fitting);
-            let part = self.gathered.split().freeze();
-            self.send_part(part).await?;
+            let part = self.gathered.split();
+            if self.options.is_start_last && self.start.is_none() {
+                self.start = Some(part);
+            } else {
+                self.send_next(part.freeze()).await?;
+            }
         }
         self.gathered.extend_from_slice(&bytes);
         Ok(())
     }
 
-    async fn finish(mut self) -> Result<ETag> {
-        let last = self.gathered.split().freeze();
-        if self.id.is_none() {
-            return self.store.put(&self.key, last, self.options).await;
+    async fn finish(mut self, patch: Option<Patch>) -> Result<ETag> {
+        if self.id.is_none() && self.start.is_none() {
+            patch.iter().for_each(|patch| patch.apply(&mut self.gathered));
+            return self.store.put(&self.key, self.gathered.freeze(), self.options).await;
         }
-        let sent = if last.is_empty() { Ok(()) } else { self.send_part(last).await };
+        let sent = self.send_rest(patch).await;
         let id = self.begun().await?;
         let finished = match sent {
             Ok(()) => self.complete(&id).await,
@@ -154,7 +181,8 @@ impl Upload for S3Upload {
 
     fn leave(self) -> UnfinishedUpload {
         let etags = self.parts.iter().map(|part| ETag::new(part.e_tag().unwrap_or_default()));
-        UnfinishedUpload { id: self.id, parts: etags.collect(), tail: self.gathered.freeze() }
+        let start = self.start.map(BytesMut::freeze).unwrap_or_default();
+        UnfinishedUpload { id: self.id, parts: etags.collect(), start, tail: self.gathered.freeze() }
     }
 }
 
