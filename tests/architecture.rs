@@ -23,7 +23,7 @@ const KNOWS: &[(&str, &[&str])] = &[
     ("rayfold-pipeline", &["rayfold-scene"]),
     ("rayfold-simulation", &["rayfold-scene", "rayfold-pipeline"]),
     ("rayfold-client", &["rayfold-scene", "rayfold-files", "rayfold-pipeline"]),
-    ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-gif", "rayfold-pipeline"]),
+    ("rayfold-lambda", &["rayfold-scene", "rayfold-tracer", "rayfold-movie", "rayfold-pipeline"]),
     ("rayfold-local", &["rayfold-bucket", "rayfold-pipeline"]),
     (
         "rayfold-studio",

@@ -151,7 +151,7 @@ async fn attempt(store: &S3Store, operation: &str, key: &str) -> Result<()> {
         "upload" => {
             let mut upload = store.upload(key, PutOptions::always()).await?;
             upload.write(Bytes::from(vec![7; 20 << 20])).await?;
-            upload.finish().await.map(drop)
+            upload.finish(None).await.map(drop)
         }
         "delete" => store.delete(key).await,
         other => panic!("no operation {other}"),

@@ -18,6 +18,7 @@ use rayfold_pipeline::keys::ScriptName;
 use rayfold_pipeline::manifest::{FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{ListRequest, Store};
 use rayfold_pipeline::{Drawing, Files, Renderer, Source};
+use rayfold_scene::parse_settings;
 use stage::stores::on_every_store;
 use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene, scene_of_a_model};
 
@@ -220,6 +221,37 @@ async fn an_invalid_animation_json_fails_the_animation_until_it_is_mended() {
         files[1] = frames(1);
         stage.upload("film", &files[1..]).await;
         stage.until_gif_of("film", &files).await;
+    })
+    .await;
+}
+
+/// Without a frame that is drawn again; the second frame is transparent.
+#[tokio::test(flavor = "multi_thread")]
+async fn files_are_made_and_go_as_the_settings_ask() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let settings =
+            |outputs: &str| format!("{{\"frames\": 2, \"bounce\": true, \"outputs\": [{outputs}]}}");
+        let clear = scene(9.0).replace("Background .1 .2 .3", "Background none");
+        let mut files = vec![
+            ("a.txt", scene(8.0)),
+            ("b.txt", clear),
+            ("animation.json", settings("\"gif\", \"webp\", \"apng\", \"y4m\"")),
+        ];
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        assert_eq!(drawn(&stage.seen()), 2);
+        for outputs in ["\"apng\"", "\"apng\", \"gif\"", "\"webp\""] {
+            files[2].1 = settings(outputs);
+            stage.upload("film", &files[2..]).await;
+            while stage.manifest("film").await.unwrap().head.settings.value
+                != parse_settings("animation.json", files[2].1.as_bytes()).settings
+            {
+                tokio::time::sleep(Duration::from_millis(25)).await;
+            }
+            stage.until_gif_of("film", &files).await;
+            assert_eq!(drawn(&stage.seen()), 0, "{outputs}");
+        }
     })
     .await;
 }

@@ -75,6 +75,23 @@ async fn a_gif_in_pieces_has_the_bytes_of_one_in_one_piece() {
     .await;
 }
 
+/// Each in turn. The length of a WebP stands at its start, which is sent last.
+#[tokio::test(flavor = "multi_thread")]
+async fn files_of_all_kinds_in_pieces_have_the_bytes_of_those_in_one_piece() {
+    on_every_store(async |store| {
+        let mut stage = stage(store, |_| {}).await;
+        let mut files = film((480, 360), 3);
+        let settings = r#"{"frames": 3, "bounce": true, "outputs": ["webp", "gif", "apng", "y4m"]}"#;
+        files.last_mut().unwrap().1 = settings.to_owned();
+        stage.upload("film", &files).await;
+        stage.until_gif_of("film", &files).await;
+        let seen = stage.seen();
+        assert_eq!((left(&seen), stage::built(&seen)), ([1, 2, 3].repeat(4), 4));
+        assert_tidy(&stage).await;
+    })
+    .await;
+}
+
 /// Returns a fate for the `number`th request of a kind below a prefix by assemblers.
 /// From the third frame on there is no background.
 #[tokio::test(flavor = "multi_thread")]

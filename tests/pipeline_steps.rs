@@ -8,8 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use rayfold_lambda::animator::GifAnimator;
+use rayfold_lambda::animator::MovieAnimator;
 use rayfold_lambda::raytracer::RayTracer;
+use rayfold_movie::{Container, Movie, Plays};
 use rayfold_pipeline::failure::{End, Failure, Recorded};
 use rayfold_pipeline::keys::{Animation, Key, Receipt};
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
@@ -92,7 +93,9 @@ impl World {
                 if prefix == "assemblies/" {
                     let invocation =
                         Invocation::new(&self.store, &self.clock, &self.random, &self.policy, &listed.key);
-                    require_send(assemble(&invocation, &GifAnimator::default(), &listed.key)).await.unwrap();
+                    require_send(assemble(&invocation, &MovieAnimator::default(), &listed.key))
+                        .await
+                        .unwrap();
                 } else {
                     self.event(&listed.key).await;
                 }
@@ -145,15 +148,23 @@ fn script(x: u32, traces: usize) -> String {
 /// Returns the GIF of the same scripts, made in one process.
 fn local_gif(scripts: &[String], fps: f64) -> Vec<u8> {
     let mut file = Vec::new();
-    let settings = rayfold_gif::Settings::new(fps, 0);
-    let mut encoder = rayfold_gif::Encoder::new(&mut file, settings).unwrap();
+    let movie = Movie {
+        size: (16, 12),
+        frames: None,
+        fps,
+        plays: Plays::Endless,
+        last_delay_cs: None,
+        exact: false,
+        alpha: false,
+    };
+    let mut encoding = rayfold_movie::Encoding::begin(&mut file, Container::Gif, movie).unwrap();
     for script in scripts {
         let parsed = rayfold_scene::parse("x.txt", script.as_bytes(), &rayfold_scene::Limits::default());
         for scene in parsed.script.unwrap().frames() {
-            encoder.push(rayfold_tracer::render(&scene, &Default::default()).unwrap()).unwrap();
+            encoding.push(rayfold_tracer::render(&scene, &Default::default()).unwrap(), None).unwrap();
         }
     }
-    encoder.finish().unwrap();
+    encoding.finish().unwrap();
     file
 }
 

@@ -13,11 +13,11 @@ use aws_smithy_http_client::Builder as HttpBuilder;
 use bytes::{Bytes, BytesMut};
 use rayfold_local::{S3Server, StoreKind, any_port};
 use rayfold_pipeline::manifest::Reason;
-use rayfold_pipeline::store::{Connection, ListRequest, PutOptions, S3Store, Store, Upload};
+use rayfold_pipeline::store::{Connection, ListRequest, Patch, PutOptions, S3Store, Store, Upload};
 use rayfold_pipeline::{
     Animator, Clock, Encoding, Error, Invocation, Policy, Randomness, SystemClock, Unfit, assemble,
 };
-use rayfold_scene::AnimationSettings;
+use rayfold_scene::{AnimationSettings, Container};
 use rayfold_simulation::conformance;
 use stores::on_every_store;
 
@@ -49,11 +49,11 @@ struct Joined(BytesMut);
 impl Animator for Joiner {
     type Encoding = Joined;
 
-    fn begin(&self, _: &AnimationSettings) -> Result<Joined, Reason> {
+    fn begin(&self, _: &AnimationSettings, _: Container, _: bool) -> Result<Joined, Reason> {
         Ok(Joined(BytesMut::new()))
     }
 
-    async fn resume(&self, state: Bytes) -> Result<Joined, Reason> {
+    async fn resume(&self, _: &AnimationSettings, _: Container, state: Bytes) -> Result<Joined, Reason> {
         Ok(Joined(state.into()))
     }
 }
@@ -63,8 +63,8 @@ impl Encoding for Joined {
         Ok(std::mem::replace(&mut self.0, frame.into()).freeze())
     }
 
-    async fn finish(self) -> Result<Bytes, Reason> {
-        Ok(self.0.freeze())
+    async fn finish(self) -> Result<(Bytes, Option<Patch>), Reason> {
+        Ok((self.0.freeze(), None))
     }
 
     async fn suspend(self) -> Result<Bytes, Reason> {
@@ -121,7 +121,7 @@ async fn an_upload_that_may_not_finish_leaves_no_parts() {
             let mut upload = store.upload("gif", options.clone()).await.unwrap();
             upload.write(Bytes::from(vec![1; 20 << 20])).await.unwrap();
             store.put("gif", Bytes::from_static(b"second"), PutOptions::always()).await.unwrap();
-            assert!(upload.finish().await.unwrap_err().is_conflict(), "{options:?}");
+            assert!(upload.finish(None).await.unwrap_err().is_conflict(), "{options:?}");
             assert_eq!(store.get("gif").await.unwrap().body, "second");
         }
         assert_eq!(unfinished(&server, "uploads", "gif").await, 0);

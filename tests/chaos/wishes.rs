@@ -8,9 +8,9 @@ use rayfold_pipeline::assemble::generation_of;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Fault, FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{PutOptions, S3Store, Store};
-use rayfold_scene::parse_settings;
+use rayfold_scene::{Container, parse_settings};
 
-use crate::stage::{big_scene, locally, scene};
+use crate::stage::{big_scene, locally_as, scene};
 
 /// The number of attempts of a request.
 const ASKS: usize = 5;
@@ -28,6 +28,14 @@ const SETTINGS: &str = "animation.json";
 
 /// A script that cannot be drawn, so its error must be reported.
 const FAULTY: &str = "Screen 24 18\nSpere 6\nTrace\n";
+
+/// The files that settings ask for.
+const OUTPUTS: [&str; 4] = [
+    "",
+    ", \"outputs\": [\"gif\", \"webp\"]",
+    ", \"outputs\": [\"apng\"]",
+    ", \"outputs\": [\"y4m\", \"gif\"]",
+];
 
 /// Settings that cannot be parsed.
 const FAULTY_SETTINGS: &str = "{\"fps\": ";
@@ -66,7 +74,10 @@ impl Wishes {
             0..=2 => None,
             3 => Some(if is_settings { FAULTY_SETTINGS.to_owned() } else { FAULTY.to_owned() }),
             4 if !is_settings => Some(three_frames(animation)),
-            _ if is_settings => Some(format!("{{\"frames\": {}, \"fps\": 5}}", random.u32(1..4))),
+            _ if is_settings => {
+                let outputs = random.choice(OUTPUTS).unwrap();
+                Some(format!("{{\"frames\": {}, \"fps\": 5{outputs}}}", random.u32(1..4)))
+            }
             // There are few contents, so that changes often restore a former state.
             _ => Some(frame(animation, f64::from(random.u32(1..4)) * 4.0)),
         };
@@ -152,28 +163,37 @@ fn expected(files: &[(&str, String)]) -> Status {
 /// Describes the remaining difference between an animation and its files. Returns `None` if there is none.
 pub(crate) async fn wrong(store: &S3Store, name: &str, files: &[(&str, String)]) -> Option<String> {
     let animation = Animation::new(name).unwrap();
-    let gif = store.get(&animation.gif()).await.ok();
+    let mut made = BTreeMap::new();
+    for output in Container::ALL {
+        if let Ok(file) = store.get(&animation.output(output)).await {
+            made.insert(output, file);
+        }
+    }
     let expected = expected(files);
     let Some(Manifest { head, frames }) = manifest(store, &animation).await else {
-        let is_nothing = expected == Status::Empty && gif.is_none();
+        let is_nothing = expected == Status::Empty && made.is_empty();
         return (!is_nothing).then(|| format!("{name}: no manifest of {files:?}"));
     };
     if head.status != expected {
         return Some(format!("{name}: {:?}, not {expected:?}: {frames:?}", head.status));
     }
-    let generation = generation_of(gif.as_ref().map(|gif| &gif.info)).map(str::to_owned);
-    match (expected, gif) {
-        // While files are missing, the last GIF stays.
-        (Status::Waiting, _) => None,
-        (Status::Done, Some(gif)) if gif.body == locally(files) => {
-            (generation.as_deref() != Some(head.generation.as_str())).then(|| format!("{name}: an old GIF"))
+    let wrong = |output: Container| {
+        let (file, kind) = (made.get(&output), output.name());
+        let is_wanted = expected == Status::Done && head.outputs().contains(&output);
+        let generation = generation_of(file.map(|file| &file.info));
+        match file {
+            // While frames are missing, the last files stay.
+            _ if expected == Status::Waiting => None,
+            Some(file) if is_wanted && file.body == locally_as(output, files) => {
+                (generation != Some(head.generation.as_str())).then(|| format!("{name}: an old {kind}"))
+            }
+            Some(_) if is_wanted => Some(format!("{name}: a {kind}, not the local one")),
+            None if is_wanted => Some(format!("{name}: no {kind}")),
+            Some(_) => Some(format!("{name}: a {kind} of what is {expected:?}, with {:?}", head.outputs())),
+            None => None,
         }
-        (Status::Done, gif) => {
-            Some(format!("{name}: {} GIF, not the local one", if gif.is_some() { "a" } else { "no" }))
-        }
-        (_, Some(_)) => Some(format!("{name}: a GIF of what is {expected:?}")),
-        (_, None) => None,
-    }
+    };
+    Container::ALL.into_iter().find_map(wrong)
 }
 
 async fn manifest(store: &S3Store, animation: &Animation) -> Option<Manifest> {

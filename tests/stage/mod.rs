@@ -18,12 +18,13 @@ use rayfold_local::invoker::{Invoker, Settings};
 use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
 use rayfold_local::{Functions, Plan, Platform, StoreKind};
+use rayfold_movie::{Encoding, Movie, Plays};
 use rayfold_pipeline::assemble::is_current;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Manifest, Status};
 use rayfold_pipeline::store::{ObjectInfo, PutOptions, S3Store, Store};
 use rayfold_scene::assets::{Library, MemoryFiles};
-use rayfold_scene::{AnimationSettings, Limits, natural_cmp, parse_settings, parse_with_files};
+use rayfold_scene::{AnimationSettings, Container, Limits, natural_cmp, parse_settings, parse_with_files};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// A value for `RAYFOLD_SPARE_FRAMES`: the time to keep free, in frames, so that an assembler adds one frame and leaves
@@ -134,7 +135,11 @@ impl Stage {
     }
 
     pub async fn gif_info(&self, animation: &str) -> Option<ObjectInfo> {
-        match self.store().head(&Animation::new(animation).unwrap().gif()).await {
+        self.file_info(animation, Container::Gif).await
+    }
+
+    pub async fn file_info(&self, animation: &str, output: Container) -> Option<ObjectInfo> {
+        match self.store().head(&Animation::new(animation).unwrap().output(output)).await {
             Ok(info) => Some(info),
             Err(error) => {
                 assert!(error.is_not_found(), "{error:?}");
@@ -167,8 +172,11 @@ impl Stage {
         loop {
             let manifest = self.manifest(animation).await;
             if let Some(manifest) = manifest {
-                let gif = self.gif_info(animation).await;
-                let is_there = wanted != Status::Done || is_current(&manifest.head, gif.as_ref());
+                let mut is_there = true;
+                for output in manifest.head.outputs().iter().filter(|_| wanted == Status::Done) {
+                    let file = self.file_info(animation, *output).await;
+                    is_there &= is_current(&manifest.head, *output, file.as_ref());
+                }
                 if manifest.head.status == wanted && is_there {
                     break;
                 }
@@ -185,10 +193,20 @@ impl Stage {
         manifest
     }
 
-    /// Waits until the animation is done. Checks that its GIF has exactly the bytes that these scripts give locally.
+    /// Waits until the animation is done. Checks that it has the files that its settings ask for and no others, each
+    /// with exactly the bytes that these scripts give locally.
     pub async fn until_gif_of(&mut self, animation: &str, files: &[(&str, String)]) -> Manifest {
         let manifest = self.until(animation, Status::Done).await;
-        assert!(self.gif(animation).await == locally(files), "the GIF of {animation} is not the local one");
+        for output in Container::ALL {
+            let key = Animation::new(animation).unwrap().output(output);
+            let file = self.store().get(&key).await.ok().map(|object| object.body);
+            let is_wanted = manifest.head.outputs().contains(&output);
+            let expected = is_wanted.then(|| locally_as(output, files));
+            assert!(
+                file.as_deref() == expected.as_deref(),
+                "{key} is not the local one, wanted: {is_wanted}"
+            );
+        }
         manifest
     }
 
@@ -285,6 +303,11 @@ pub fn frames(count: usize) -> (&'static str, String) {
 
 /// Returns the GIF that the scripts give without a bucket: parsed, traced and encoded in this process.
 pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
+    locally_as(Container::Gif, files)
+}
+
+/// Returns the file of a kind that the scripts give without a bucket.
+pub fn locally_as(output: Container, files: &[(&str, String)]) -> Vec<u8> {
     let limits = Limits::default();
     let mut settings = AnimationSettings::default();
     let mut beside = MemoryFiles::default();
@@ -302,16 +325,28 @@ pub fn locally(files: &[(&str, String)]) -> Vec<u8> {
         }
     }
     scripts.sort_by(|(a, _), (b, _)| natural_cmp(a, b));
-    let mut gif = Vec::new();
-    let settings = rayfold_gif::Settings::new(settings.fps(), settings.loops());
-    let mut encoder = rayfold_gif::Encoder::new(&mut gif, settings).unwrap();
-    for (_, script) in &scripts {
-        for scene in script.frames() {
-            let options = rayfold_tracer::RenderOptions::default();
-            let exposure = rayfold_tracer::Exposure::still(&scene);
-            encoder.push(rayfold_tracer::render_picture(exposure, &options).unwrap()).unwrap();
-        }
+    let scenes: Vec<_> = scripts.iter().flat_map(|(_, script)| script.frames()).collect();
+    let pictures = scenes.iter().map(|scene| {
+        let options = rayfold_tracer::RenderOptions::default();
+        rayfold_tracer::render_picture(rayfold_tracer::Exposure::still(scene), &options).unwrap()
+    });
+    let pictures: Vec<_> = pictures.collect();
+    let mut file = Vec::new();
+    let Some(first) = pictures.first() else { return file };
+    let movie = Movie {
+        size: (first.width(), first.height()),
+        frames: Some(settings.shown_count(pictures.len() as u64)),
+        fps: settings.fps(),
+        plays: Plays::repeated(settings.loops()),
+        last_delay_cs: None,
+        exact: false,
+        alpha: pictures.iter().any(|picture| picture.color().has_alpha()),
+    };
+    let durations = settings.shown_durations(pictures.len() as u64);
+    let mut encoding = Encoding::begin(&mut file, output, movie).unwrap();
+    for (place, picture) in (0..).zip(settings.shown(&pictures)) {
+        encoding.push(picture.clone(), durations.get(&place).copied()).unwrap();
     }
-    encoder.finish().unwrap();
-    gif
+    encoding.finish().unwrap().complete(&mut file);
+    file
 }

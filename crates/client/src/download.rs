@@ -1,4 +1,4 @@
-//! Destinations of a GIF: a file that appears once all of it is there, and memory.
+//! Destinations of a file of an animation: a file that appears once all of it is there, and memory.
 
 use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use rayfold_files::OutputFile;
 use rayfold_pipeline::Clock;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::store::{ObjectInfo, Store};
+use rayfold_scene::Container;
 
 use crate::client::Client;
 use crate::error::{Error, Result};
@@ -42,13 +43,18 @@ impl Output for Vec<u8> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Downloads the current GIF to a file, which appears once all of it is there.
+    /// Downloads the current file of a kind to a file, which appears once all of it is there.
     ///
     /// # Errors
-    /// The errors of [`fetch_gif`](Self::fetch_gif), and [`Error::Write`].
-    pub async fn download_gif(&self, animation: &Animation, path: &Path) -> Result<ObjectInfo> {
+    /// The errors of [`fetch`](Self::fetch), and [`Error::Write`].
+    pub async fn download(
+        &self,
+        animation: &Animation,
+        container: Container,
+        path: &Path,
+    ) -> Result<ObjectInfo> {
         let mut download = Download { path: path.to_path_buf(), file: None };
-        let info = self.fetch_gif(animation, &mut download).await?;
+        let info = self.fetch(animation, container, &mut download).await?;
         if let Some(file) = download.file {
             let file = file.into_inner().map_err(IntoInnerError::into_error);
             let written = |source| rayfold_files::Error::Io { path: path.to_path_buf(), source };
@@ -70,16 +76,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("film.gif");
         std::fs::write(&path, "before").unwrap();
-        assert!(world.client().download_gif(&world.film(), &path).await.is_err());
+        assert!(world.client().download(&world.film(), Container::Gif, &path).await.is_err());
         assert_eq!(std::fs::read(&path).unwrap(), b"before");
         world.store.put("animations/film.gif", "GIF89a".into(), PutOptions::always()).await.unwrap();
-        world.client().download_gif(&world.film(), &path).await.unwrap();
+        world.client().download(&world.film(), Container::Gif, &path).await.unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"GIF89a");
         let mut bytes = b"before".to_vec();
-        world.client().fetch_gif(&world.film(), &mut bytes).await.unwrap();
+        world.client().fetch(&world.film(), Container::Gif, &mut bytes).await.unwrap();
         assert_eq!(bytes, b"GIF89a");
         let missing = folder.path().join("none").join("film.gif");
-        let error = world.client().download_gif(&world.film(), &missing).await.unwrap_err();
+        let error = world.client().download(&world.film(), Container::Gif, &missing).await.unwrap_err();
         assert!(error.to_string().contains("none"), "{error}");
     }
 }

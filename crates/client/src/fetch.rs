@@ -1,4 +1,4 @@
-//! Downloads of an animation: its GIF, piece by piece, and its frames.
+//! Downloads of an animation: its files, piece by piece, and its frames.
 
 use std::io;
 
@@ -10,17 +10,18 @@ use rayfold_pipeline::found;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Frame, Manifest};
 use rayfold_pipeline::store::{ObjectInfo, Store};
+use rayfold_scene::Container;
 
 use crate::client::{Client, SIDE_BY_SIDE};
 use crate::error::{Error, Result};
 
-/// The size of the range of a GIF that one request asks for, in bytes.
+/// The size of the range of a file that one request asks for, in bytes.
 const PIECE: u64 = 8 << 20;
 
 /// The number of pieces that are requested at the same time.
 const PIECES: usize = 4;
 
-/// The number of times that a GIF is read if it is replaced during each read.
+/// The number of times that a file is read if it is replaced during each read.
 const ATTEMPTS: u32 = 5;
 
 /// The destination of a download.
@@ -80,13 +81,18 @@ pub fn frames(manifest: &Manifest) -> Frames<'_> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Downloads the current GIF.
+    /// Downloads the current file of a kind.
     ///
     /// # Errors
-    /// An error of the store or of the output, or [`Error::Restless`] if the GIF is
+    /// An error of the store or of the output, or [`Error::Restless`] if the file is
     /// replaced during each attempt.
-    pub async fn fetch_gif(&self, animation: &Animation, output: &mut impl Output) -> Result<ObjectInfo> {
-        let key = animation.gif();
+    pub async fn fetch(
+        &self,
+        animation: &Animation,
+        container: Container,
+        output: &mut impl Output,
+    ) -> Result<ObjectInfo> {
+        let key = animation.output(container);
         for _ in 0..ATTEMPTS {
             let info = self.store.head(&key).await?;
             output.begin(info.size).map_err(Error::Output)?;
@@ -172,7 +178,7 @@ mod tests {
             let body = gif(size, 1);
             world.store.put("animations/film.gif", body.clone().into(), PutOptions::always()).await.unwrap();
             let mut out = Memory::default();
-            let info = world.client().fetch_gif(&world.film(), &mut out).await.unwrap();
+            let info = world.client().fetch(&world.film(), Container::Gif, &mut out).await.unwrap();
             assert_eq!((info.size, out.size, out.begun), (size as u64, size as u64, 1));
             assert!(out.bytes == body, "{size} bytes");
         }
@@ -186,11 +192,12 @@ mod tests {
         // Replaced once, before the last piece is read.
         world.replace_before("get animations/film.gif", PIECES as u32, gif(9, 2), 1);
         let mut out = Memory::default();
-        world.client().fetch_gif(&world.film(), &mut out).await.unwrap();
+        world.client().fetch(&world.film(), Container::Gif, &mut out).await.unwrap();
         assert_eq!((out.begun, out.bytes), (2, [gif(9, 2), vec![0]].concat()));
         // Replaced at every attempt.
         world.replace_before("get animations/film.gif", 0, gif(9, 3), u8::MAX);
-        let error = world.client().fetch_gif(&world.film(), &mut Memory::default()).await.unwrap_err();
+        let error =
+            world.client().fetch(&world.film(), Container::Gif, &mut Memory::default()).await.unwrap_err();
         assert!(matches!(error, Error::Restless { key } if key == "animations/film.gif"));
     }
 

@@ -76,7 +76,7 @@ mod tests {
         let submitted = Submitted { versions: Default::default() };
         is_send(client.submit(&submission, |_| {}));
         is_send(client.wait(&film, &submitted, |_| {}));
-        is_send(client.fetch_gif(&film, &mut Nowhere));
+        is_send(client.fetch(&film, rayfold_scene::Container::Gif, &mut Nowhere));
         is_send(client.fetch_frames(&[], |_| Ok(())));
         is_send(client.retry(&film, Scope::All, 1, &random));
         is_send(client.remove(&film, |_| {}));

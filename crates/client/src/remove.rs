@@ -105,7 +105,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
             format!("assemblies/{animation}/"),
             animation.frames(),
             animation.checkpoint(),
-            animation.gif(),
+            format!("animations/{animation}."),
             animation.manifest(),
         ];
         self.keys_of(animation, &prefixes).await

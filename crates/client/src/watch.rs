@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use rayfold_pipeline::assemble::is_current;
 use rayfold_pipeline::keys::{Animation, Key, Uploaded};
-use rayfold_pipeline::manifest::{Manifest, Status};
+use rayfold_pipeline::manifest::{Head, Manifest, Status};
 use rayfold_pipeline::store::{ETag, ListRequest, ObjectInfo, Store};
 use rayfold_pipeline::{Clock, Timestamp, found, script_versions};
+use rayfold_scene::{AnimationSettings, Container};
 
 use crate::client::Client;
 use crate::error::{Error, Result};
@@ -22,7 +23,7 @@ const GRACE: Duration = Duration::from_secs(5);
 /// The time for which a store may be busy or unreachable.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
-/// The state of an animation as its manifest and its GIF show it.
+/// The state of an animation as its manifest and its files show it.
 #[derive(Debug)]
 pub struct Watch<'a, S, C> {
     client: Client<'a, S, C>,
@@ -30,7 +31,7 @@ pub struct Watch<'a, S, C> {
     version: Option<ETag>,
     manifest: Option<Manifest>,
     is_unreadable: bool,
-    gif: Option<ObjectInfo>,
+    files: BTreeMap<Container, ObjectInfo>,
     is_behind: bool,
     has_looked: bool,
     started: Timestamp,
@@ -53,9 +54,9 @@ pub enum Waiting {
 /// The outcome of a submission.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
-    /// The GIF is complete.
-    Gif(ObjectInfo),
-    /// There is no GIF; the manifest has the reasons.
+    /// The files that `animation.json` asks for are complete, in its order.
+    Files(Vec<(Container, ObjectInfo)>),
+    /// There are no files; the manifest has the reasons.
     Failed(Box<Manifest>),
 }
 
@@ -69,7 +70,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             version: None,
             manifest: None,
             is_unreadable: false,
-            gif: None,
+            files: BTreeMap::new(),
             is_behind: false,
             has_looked: false,
             started,
@@ -91,18 +92,24 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         self.is_unreadable
     }
 
-    /// Returns the GIF as of the last poll that read it.
-    pub fn gif(&self) -> Option<&ObjectInfo> {
-        self.gif.as_ref()
+    /// Returns the files that are to be made of the animation, in the order of `animation.json`.
+    pub fn outputs(&self) -> &[Container] {
+        let head = self.manifest.as_ref().map(|manifest| &manifest.head);
+        head.map_or(AnimationSettings::DEFAULT_OUTPUTS, Head::outputs)
     }
 
-    /// Returns the age of the GIF.
-    pub fn gif_age(&self) -> Option<Duration> {
-        Some(self.client.clock.now().since(self.gif.as_ref()?.modified))
+    /// Returns a file as of the last poll that read it.
+    pub fn file(&self, output: Container) -> Option<&ObjectInfo> {
+        self.files.get(&output)
+    }
+
+    /// Returns the age of a file.
+    pub fn age(&self, output: Container) -> Option<Duration> {
+        Some(self.client.clock.now().since(self.file(output)?.modified))
     }
 
     /// Polls once, and returns whether anything changed. Reads the manifest, which may be large, only if its entity
-    /// tag has changed. Reads the version of the GIF on the first call, and again once all frames are drawn.
+    /// tag has changed. Reads the versions of the files on the first call, and again once all frames are drawn.
     ///
     /// # Errors
     /// The errors of the store.
@@ -127,15 +134,20 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         let is_first = !std::mem::replace(&mut self.has_looked, true);
         let is_terminal = self.manifest.as_ref().is_some_and(|manifest| manifest.head.is_terminal());
         if is_terminal || (is_first && self.version.is_some()) {
-            let gif = found(store.head(&self.animation.gif()).await)?;
-            changed |= gif != self.gif;
-            self.gif = gif;
+            let mut files = BTreeMap::new();
+            for output in self.outputs() {
+                if let Some(file) = found(store.head(&self.animation.output(*output)).await)? {
+                    files.insert(*output, file);
+                }
+            }
+            changed |= files != self.files;
+            self.files = files;
         }
         Ok(changed)
     }
 
     /// Compares the manifest with the current scripts. Until the functions have seen an upload, the manifest and the
-    /// GIF are about older scripts.
+    /// files are about older scripts.
     ///
     /// # Errors
     /// The errors of the store.
@@ -183,10 +195,15 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         }
     }
 
-    /// Returns whether the GIF shows what the manifest says, and the manifest is about the newest scripts.
+    /// Returns whether all files show what the manifest says, and the manifest is about the newest scripts.
     pub fn is_current(&self) -> bool {
-        let manifest = self.manifest.as_ref();
-        !self.is_behind && manifest.is_some_and(|manifest| is_current(&manifest.head, self.gif.as_ref()))
+        self.outputs().iter().all(|output| self.has_current(*output))
+    }
+
+    /// Returns whether a file shows what the manifest says, and the manifest is about the newest scripts.
+    pub fn has_current(&self, output: Container) -> bool {
+        let shows = |manifest: &Manifest| is_current(&manifest.head, output, self.file(output));
+        !self.is_behind && self.manifest.as_ref().is_some_and(shows)
     }
 
     /// Returns whether nothing more will happen unless a script or an object is changed.
@@ -195,7 +212,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
             _ if self.is_behind => false,
             None | Some(Status::Waiting | Status::Rendering) => false,
             Some(Status::Done) => self.is_current(),
-            Some(Status::Empty) => self.gif.is_none(),
+            Some(Status::Empty) => self.files.is_empty(),
             Some(Status::Failed | Status::Refused) => true,
         }
     }
@@ -228,7 +245,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         Ok(versions.chain(settings).collect())
     }
 
-    /// Waits until the submission has become a GIF, or the manifest says why it will not. Reports
+    /// Waits until all files of the submission are made, or the manifest says why they will not be. Reports
     /// the progress to `report`.
     ///
     /// # Errors
@@ -256,10 +273,13 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
                 let is_whole = !head.is_terminal()
                     || !manifest.frames.iter().any(|frame| frame.version.has_files())
                     || stands_for(manifest, animation, &self.versions(animation).await?);
-                match (head.status, watch.gif()) {
+                match head.status {
                     _ if !is_whole => {}
-                    (Status::Done, Some(gif)) if watch.is_current() => return Ok(Ended::Gif(gif.clone())),
-                    (Status::Failed | Status::Refused, _) => {
+                    Status::Done if watch.is_current() => {
+                        let made = |output: &Container| Some((*output, watch.file(*output)?.clone()));
+                        return Ok(Ended::Files(watch.outputs().iter().filter_map(made).collect()));
+                    }
+                    Status::Failed | Status::Refused => {
                         return Ok(Ended::Failed(Box::new(manifest.clone())));
                     }
                     _ => {}
@@ -336,8 +356,9 @@ mod tests {
         let film = world.film();
         let ended = client.wait(&film, &submitted, |waiting| reports.push(waiting));
         let (ended, ()) = futures_util::future::join(ended, world.functions()).await;
-        let Ended::Gif(gif) = ended.unwrap() else { panic!("no GIF") };
-        assert_eq!(gif, world.store.head("animations/film.gif").await.unwrap());
+        let Ended::Files(files) = ended.unwrap() else { panic!("no GIF") };
+        let [(Container::Gif, gif)] = &files[..] else { panic!("{files:?}") };
+        assert_eq!(*gif, world.store.head("animations/film.gif").await.unwrap());
         assert_eq!(reports.last(), Some(&Waiting::Frames { done: 2, total: 2 }));
     }
 
@@ -415,8 +436,8 @@ mod tests {
         world.functions().await;
         let watch = world.client().look(&[world.film()]).await.unwrap().remove(0);
         assert_eq!(watch.manifest().unwrap().head.status, Status::Waiting);
-        assert_eq!(watch.gif(), Some(&gif));
-        assert!(!watch.is_current() && watch.gif_age().is_some());
+        assert_eq!(watch.file(Container::Gif), Some(&gif));
+        assert!(!watch.is_current() && watch.age(Container::Gif).is_some());
     }
 
     #[tokio::test]

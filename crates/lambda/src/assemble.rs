@@ -183,7 +183,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::animator::GifAnimator;
+    use crate::animator::MovieAnimator;
     use crate::logs::tests::Kept;
     use crate::raytracer::RayTracer;
 
@@ -238,7 +238,7 @@ mod tests {
             store: Faulty(store),
             bucket: "films".into(),
             renderer: RayTracer::default(),
-            animator: GifAnimator::default(),
+            animator: MovieAnimator::default(),
             policy: Policy { request_attempts: 1, ..Policy::new(1) },
             random: Randomness::seeded(1),
         }

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use rayfold_pipeline::store::{S3Store, Store};
 use rayfold_pipeline::{Invocation, Policy, Randomness, SystemClock, Timestamp};
 
-use crate::animator::GifAnimator;
+use crate::animator::MovieAnimator;
 use crate::limits::{capacity, limits, most_frames};
 use crate::raytracer::RayTracer;
 
@@ -22,7 +22,7 @@ pub struct Context<S> {
     /// The renderer of frames.
     pub renderer: RayTracer,
     /// The animator that makes the GIF.
-    pub animator: GifAnimator,
+    pub animator: MovieAnimator,
     /// The parameters of the protocol.
     pub policy: Policy,
     /// The random source that spreads invocations which would collide.
@@ -71,7 +71,7 @@ impl Context<S3Store> {
         };
         let variable = |name: &str| env::var(name).ok();
         let renderer = RayTracer::new(limits(variable)?, capacity(variable)?);
-        let animator = GifAnimator { most_pixels: renderer.limits.max_pixels };
+        let animator = MovieAnimator { most_pixels: renderer.limits.max_pixels };
         Ok(Self { store, bucket, renderer, animator, policy, random: Randomness::seeded(seed) })
     }
 }

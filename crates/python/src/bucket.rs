@@ -21,6 +21,7 @@ use rayfold_pipeline::SystemClock;
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::S3Store;
+use rayfold_scene::Container;
 
 use crate::error::{guarded, os_error, scene_error};
 use crate::place::quoted;
@@ -147,14 +148,16 @@ async fn deliver(
         Waiting::Quiet(quiet) => reports.warn(quiet),
     };
     match client.wait(&order.animation, &submitted, waiting).await.map_err(wrong)? {
-        Ended::Gif(_) => {}
+        Ended::Files(_) => {}
         Ended::Failed(manifest) => return Err(failed(&manifest)),
     }
     match &order.path {
-        Some(path) => client.download_gif(&order.animation, path).await.map(|_| None).map_err(wrong),
+        Some(path) => {
+            client.download(&order.animation, Container::Gif, path).await.map(|_| None).map_err(wrong)
+        }
         None => {
             let mut gif = Vec::new();
-            client.fetch_gif(&order.animation, &mut gif).await.map_err(wrong)?;
+            client.fetch(&order.animation, Container::Gif, &mut gif).await.map_err(wrong)?;
             Ok(Some(gif))
         }
     }

@@ -1,4 +1,4 @@
-//! `rayfold fetch`: downloads the frames or the GIF of an animation from the bucket.
+//! `rayfold fetch`: downloads the frames or a file of an animation from the bucket.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use crate::progress::Progress;
 use crate::render::target::{Format, Pattern, Place, Target};
 use crate::wording::{Size, number};
 
-/// Download the GIF of an animation, or its frames
+/// Download the GIF of an animation, another file that was made of it, or its frames
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -34,10 +34,11 @@ pub(crate) struct Args {
     animation: Animation,
     #[command(flatten)]
     bucket: BucketArgs,
-    /// File to write: .gif, or a pattern such as frames/%04d.png (or .tif) for the frames, whose folder is made
+    /// File to write: .gif, .webp, .apng or .y4m, or a pattern such as frames/%04d.png (or .tif) for the frames, whose folder
+    /// is made
     #[arg(long, short, value_name = "OUT")]
     output: PathBuf,
-    /// The GIF that there is, also when it does not show the scripts as they are now
+    /// The file that there is, also when it does not show the scripts as they are now
     #[arg(long)]
     last: bool,
     /// The frames that are drawn, also when others are not; each keeps its number
@@ -47,25 +48,27 @@ pub(crate) struct Args {
 
 /// The files to fetch.
 enum Wanted {
-    Gif(PathBuf),
+    File(Container, PathBuf),
     Frames(Pattern, Format),
 }
 
 /// # Errors
-/// When OUT is neither a GIF nor a pattern, or a flag does not go with it.
+/// When OUT is neither a file of an animation nor a pattern, or a flag does not go with it.
 fn wanted(args: &Args) -> Result<Wanted, Usage> {
     let shown = args.output.display();
     match Target::parse(&args.output, None) {
-        Ok(Target::Animation(Container::Gif, Place::File(path))) if !args.partial => Ok(Wanted::Gif(path)),
-        Ok(Target::Images(pattern, format)) if !args.last => Ok(Wanted::Frames(pattern, format)),
-        Ok(Target::Images(..)) => {
-            Err(Usage("--last is for the GIF: expected an output that ends in .gif".into()))
+        Ok(Target::Animation(container, Place::File(path))) if !args.partial => {
+            Ok(Wanted::File(container, path))
         }
-        Ok(Target::Animation(Container::Gif, _)) => {
+        Ok(Target::Images(pattern, format)) if !args.last => Ok(Wanted::Frames(pattern, format)),
+        Ok(Target::Images(..)) => Err(Usage(
+            "--last is for an animation: expected an output that ends in .gif, .webp, .apng or .y4m".into(),
+        )),
+        Ok(Target::Animation(_, Place::File(_))) => {
             Err(Usage("--partial is for frames: expected a pattern such as frames/%04d.png".into()))
         }
         Ok(_) | Err(_) => Err(Usage(format!(
-            "cannot write {shown}: expected .gif, or a pattern such as frames/%04d.png (or .tif)"
+            "cannot write {shown}: expected .gif, .webp, .apng or .y4m, or a pattern such as frames/%04d.png (or .tif)"
         ))),
     }
 }
@@ -73,7 +76,7 @@ fn wanted(args: &Args) -> Result<Wanted, Usage> {
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let wanted = wanted(args)?;
     match &wanted {
-        Wanted::Gif(path) => probe(path)?,
+        Wanted::File(_, path) => probe(path)?,
         Wanted::Frames(pattern, _) => pattern.probe(1)?,
     }
     let animation = &args.animation;
@@ -88,20 +91,24 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
             anyhow::bail!("no function has looked at {animation} yet");
         };
         match &wanted {
-            Wanted::Gif(path) => {
-                let is_of_use = watch.is_current() || (args.last && watch.gif().is_some());
-                if !is_of_use {
-                    return Err(not_there(&watch, manifest, console));
+            Wanted::File(container, path) => {
+                let (container, name) = (*container, container.name());
+                if !watch.outputs().contains(&container) {
+                    anyhow::bail!(not_asked_for(watch.outputs(), container, &animation.to_string()));
                 }
-                if let (false, Some(age)) = (watch.is_current(), watch.gif_age()) {
+                let is_current = watch.has_current(container);
+                if !is_current && !(args.last && watch.file(container).is_some()) {
+                    return Err(not_there(&watch, container, manifest, console));
+                }
+                if let (false, Some(age)) = (is_current, watch.age(container)) {
                     console.note(format_args!(
-                        "this GIF is {} old and shows older scripts: {animation} is {} ({})",
+                        "this {name} is {} old and shows older scripts: {animation} is {} ({})",
                         Age(age),
                         manifest.head.status,
                         report::count(manifest)
                     ));
                 }
-                gif(client, animation, path, &args.bucket, console).await?;
+                file(client, animation, (container, path), &args.bucket, console).await?;
             }
             Wanted::Frames(pattern, format) => {
                 fetch_frames(client, manifest, args.partial, pattern, *format, console).await?;
@@ -111,37 +118,54 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     })
 }
 
-fn not_there(watch: &Watch<'_>, manifest: &Manifest, console: &Console) -> anyhow::Error {
+/// Returns the error for a file that the settings do not ask for.
+pub(crate) fn not_asked_for(outputs: &[Container], container: Container, animation: &str) -> String {
+    let names: Vec<&str> = outputs.iter().map(|output| output.name()).collect();
+    let endings: Vec<&str> = outputs.iter().chain([&container]).map(|output| output.ending()).collect();
+    format!(
+        "no {} is made of {animation}, but {}: add \"outputs\": [\"{}\"] to its animation.json",
+        container.name(),
+        names.join(" and "),
+        endings.join("\", \"")
+    )
+}
+
+fn not_there(
+    watch: &Watch<'_>,
+    container: Container,
+    manifest: &Manifest,
+    console: &Console,
+) -> anyhow::Error {
     report::show_faults(manifest, console);
-    let head = &manifest.head;
+    let (head, name) = (&manifest.head, container.name());
     let why = match head.status {
-        Status::Done => "its GIF is being assembled",
-        other => &other.to_string(),
+        Status::Done => format!("its {name} is being assembled"),
+        other => other.to_string(),
     };
-    let last = match (watch.gif(), watch.gif_age()) {
-        (Some(gif), Some(age)) => {
-            format!("; --last fetches the one before, of {} and {} old", Size(gif.size), Age(age))
+    let last = match (watch.file(container), watch.age(container)) {
+        (Some(file), Some(age)) => {
+            format!("; --last fetches the one before, of {} and {} old", Size(file.size), Age(age))
         }
         _ => String::new(),
     };
     let count = report::count(manifest);
-    anyhow::anyhow!("there is no GIF of {} as it is now: {why} ({count}){last}", head.animation)
+    anyhow::anyhow!("there is no {name} of {} as it is now: {why} ({count}){last}", head.animation)
 }
 
-/// Downloads the GIF as it is now.
+/// Downloads a file as it is now.
 ///
 /// # Errors
 /// When there is none, it cannot be written, or it is replaced all the time.
-pub(crate) async fn gif(
+pub(crate) async fn file(
     client: Client<'_>,
     animation: &Animation,
-    path: &Path,
+    (container, path): (Container, &Path),
     bucket: &BucketArgs,
     console: &Console,
 ) -> anyhow::Result<()> {
     let shown = path.display();
-    let info = client.download_gif(animation, path).await?;
-    let from = address(&bucket.bucket, &animation.gif());
+    let info = client.download(animation, container, path).await?;
+    let from = address(&bucket.bucket, &animation.output(container));
     console.note(format_args!("{shown}: {}, from {from}", Size(info.size)));
     Ok(())
 }

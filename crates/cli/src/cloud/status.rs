@@ -1,9 +1,11 @@
 //! `rayfold status`: where the animations of a bucket stand.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::time::Duration;
 
 use rayfold_client::{Obstacle, Overview, obstacles};
+use rayfold_movie::Container;
 use rayfold_pipeline::keys::Animation;
 use rayfold_pipeline::manifest::{Head, Reason};
 use serde::Serialize;
@@ -73,7 +75,10 @@ struct Entry<'a> {
     known: Known<'a>,
     /// There are scripts, or versions of them, that the functions have not seen.
     behind: bool,
-    gif: Option<Gif<'a>>,
+    gif: Option<File<'a>>,
+    /// The other files, by their ending.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    outputs: BTreeMap<&'static str, File<'a>>,
     faults: Vec<FaultEntry<'a>>,
 }
 
@@ -90,13 +95,13 @@ enum Known<'a> {
 }
 
 #[derive(Serialize)]
-struct Gif<'a> {
+struct File<'a> {
     key: String,
     size: u64,
     version: &'a str,
     /// When it was written, in milliseconds since 1970.
     modified_ms: u64,
-    /// Whether the GIF shows the frames of the manifest.
+    /// Whether the file shows the frames of the manifest.
     current: bool,
 }
 
@@ -234,19 +239,26 @@ fn table(watches: &[Watch<'_>], with_age: bool) -> String {
             continue;
         };
         let status = manifest.head.status;
-        let age = watch.gif_age().filter(|_| with_age).map(|age| format!(", {} old", Age(age)));
-        let gif = match watch.gif() {
-            Some(gif) if watch.is_current() => format!("GIF of {}", Size(gif.size)),
-            Some(gif) => format!("last GIF of {}{}", Size(gif.size), age.unwrap_or_default()),
-            None => "no GIF".to_owned(),
+        let file = |output: &Container| {
+            let (output, name) = (*output, output.name());
+            let age = watch.age(output).filter(|_| with_age).map(|age| format!(", {} old", Age(age)));
+            match watch.file(output) {
+                Some(file) if watch.has_current(output) => format!("{name} of {}", Size(file.size)),
+                Some(file) => format!("last {name} of {}{}", Size(file.size), age.unwrap_or_default()),
+                None => format!("no {name}"),
+            }
         };
+        let files = watch.outputs().iter().map(file).collect::<Vec<_>>().join(", ");
         let warnings = match manifest.head.warnings.len() as u64 {
             0 => String::new(),
             n => format!("; {}", number(n, "warning")),
         };
         let behind = if watch.is_behind() { "; newer scripts wait to be seen" } else { "" };
-        let _ =
-            writeln!(text, "{name:width$}  {status:9}  {}, {gif}{warnings}{behind}", report::count(manifest));
+        let _ = writeln!(
+            text,
+            "{name:width$}  {status:9}  {}, {files}{warnings}{behind}",
+            report::count(manifest)
+        );
     }
     text
 }
@@ -260,21 +272,33 @@ fn unknown(watch: &Watch<'_>) -> (&'static str, &'static str) {
     }
 }
 
+fn entry_of<'w>(watch: &'w Watch<'_>, output: Container) -> Option<File<'w>> {
+    watch.file(output).map(|file| File {
+        key: watch.animation().output(output),
+        size: file.size,
+        version: file.etag.as_str(),
+        modified_ms: file.modified.0,
+        current: watch.has_current(output),
+    })
+}
+
 fn document(watches: &[Watch<'_>], overview: Option<&Overview>, one_line: bool) -> anyhow::Result<String> {
     let entries = watches.iter().map(|watch| Entry {
         known: match watch.manifest() {
-            // The manifest's own record of the GIF has the name of the field that says more of it.
-            Some(manifest) => Known::Seen(Box::new(Head { gif: None, ..manifest.head.clone() })),
+            // The manifest's own records have the names of the fields that say more of the files.
+            Some(manifest) => {
+                let outputs = BTreeMap::new();
+                Known::Seen(Box::new(Head { gif: None, outputs, ..manifest.head.clone() }))
+            }
             None => Known::New { animation: watch.animation(), status: unknown(watch).0 },
         },
         behind: watch.is_behind(),
-        gif: watch.gif().map(|gif| Gif {
-            key: watch.animation().gif(),
-            size: gif.size,
-            version: gif.etag.as_str(),
-            modified_ms: gif.modified.0,
-            current: watch.is_current(),
-        }),
+        gif: entry_of(watch, Container::Gif),
+        outputs: Container::ALL
+            .into_iter()
+            .filter(|output| *output != Container::Gif)
+            .filter_map(|output| Some((output.ending(), entry_of(watch, output)?)))
+            .collect(),
         faults: watch.manifest().map_or_else(Vec::new, |manifest| {
             let obstacles = obstacles(manifest).into_iter();
             obstacles.map(|Obstacle { what, reason }| FaultEntry { what, reason }).collect()

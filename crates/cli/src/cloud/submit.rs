@@ -9,6 +9,7 @@ use rayfold_client::{
     Content, Ended, Error, File, Preview, Sending, Submission, Submitted, Waiting, settings_with_frames,
 };
 use rayfold_files::{named_by_scripts, probe};
+use rayfold_movie::Container;
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_scene::{Limits, script_name};
 use rayon::prelude::*;
@@ -21,7 +22,7 @@ use crate::input::Input;
 use crate::outcome::{Outcome, Usage};
 use crate::plan::{Plan, Wishes};
 use crate::progress::Progress;
-use crate::render::target::must_be_gif;
+use crate::render::target::container_of;
 use crate::values;
 use crate::wording::number;
 
@@ -35,7 +36,7 @@ const LONGEST_NAME_WITH_FILES: usize = 110;
 /// Render a folder of scripts, or one script, in the cloud and download the animation
 ///
 /// Checks all scripts, makes scripts/ANIMATION/ in the bucket equal to the folder (uploading only what changed), waits,
-/// and downloads the GIF. A script alone is a folder that holds nothing else. Scripts in the bucket that the folder does not have, somebody else's perhaps, are deleted only
+/// and downloads the GIF, or whatever "outputs" of its animation.json says. A script alone is a folder that holds nothing else. Scripts in the bucket that the folder does not have, somebody else's perhaps, are deleted only
 /// with --delete, or after a yes at a terminal. Interrupting it loses nothing: the same command picks up where the bucket
 /// is.
 #[derive(Debug, clap::Args)]
@@ -57,8 +58,9 @@ pub(crate) struct Args {
     folder: PathBuf,
     #[command(flatten)]
     bucket: BucketArgs,
-    /// Where to write the GIF [default: the animation's name with .gif, in the current folder]
-    #[arg(long, short, value_name = "OUT.gif", conflicts_with = "no_wait")]
+    /// Where to write the animation: .gif, or .webp, .apng or .y4m if animation.json asks for it [default: all files that it
+    /// asks for, under the animation's name, in the current folder]
+    #[arg(long, short, value_name = "OUT", conflicts_with = "no_wait")]
     output: Option<PathBuf>,
     /// Upload and leave
     #[arg(long)]
@@ -84,7 +86,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Order::new(&args.folder, args.name.as_ref(), args.output.as_deref(), is_fetched, &limits, console)?;
     with_bucket(&args.bucket, async |client| {
         let bucket = &args.bucket.bucket;
-        let Order { animation, mut submission, output } = order;
+        let Order { animation, mut submission, outputs } = order;
         if args.dry_run {
             return preview(client, &submission, bucket, console).await;
         }
@@ -109,7 +111,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         if let Some(why) = wait(client, &animation, &submitted, console).await? {
             anyhow::bail!("{why}; rayfold retry {animation} tries again what is not the scripts' fault");
         }
-        fetch::gif(client, &animation, &output, &args.bucket, console).await?;
+        for (container, path) in &outputs {
+            fetch::file(client, &animation, (*container, path), &args.bucket, console).await?;
+        }
         Ok(Outcome::Done)
     })
 }
@@ -118,15 +122,17 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 pub(crate) struct Order {
     animation: Animation,
     submission: Submission,
-    /// The path of the GIF.
-    output: PathBuf,
+    /// The files to write.
+    outputs: Vec<(Container, PathBuf)>,
 }
 
 impl Order {
-    /// Without a name it has the folder's, without an output the name with .gif; the output is probed if it `is_fetched`.
+    /// Without a name it has the folder's, without an output all that its settings ask for, under its name; the outputs are
+    /// probed if they are fetched.
     ///
     /// # Errors
-    /// When a script is faulty, the frames are of unlike sizes, or the GIF cannot be written there.
+    /// When a script is faulty, the frames are of unlike sizes, the settings do not ask for the output, or it cannot be
+    /// written there.
     pub(crate) fn new(
         folder: &PathBuf,
         name: Option<&Animation>,
@@ -137,25 +143,37 @@ impl Order {
     ) -> anyhow::Result<Self> {
         let animation = name.cloned().map_or_else(|| name_of(folder), Ok)?;
         let last = animation.as_str().rsplit('/').next().unwrap_or_default();
-        let output = output.map_or_else(|| format!("{last}.gif").into(), Path::to_path_buf);
-        if is_fetched {
-            must_be_gif(&output)?;
-            probe(&output)?;
-        }
+        let output = output.map(|path| Ok::<_, Usage>((container_of(path)?, path))).transpose()?;
         let input = Input::animation(std::slice::from_ref(folder), limits)?;
         let plan = match Plan::new(&input, limits, &Wishes::default(), console)? {
             Ok(plan) => plan,
             Err(faults) => anyhow::bail!("nothing was uploaded: {}", faults.count()),
         };
         plan.one_size().map_err(|error| anyhow::anyhow!("{error}: give their scripts the same Screen"))?;
+        let asked_for = plan.settings.outputs();
+        let outputs: Vec<(Container, PathBuf)> = match output {
+            Some((container, path)) if asked_for.contains(&container) => {
+                vec![(container, path.to_path_buf())]
+            }
+            Some((container, _)) => {
+                anyhow::bail!("nothing was uploaded: {}", fetch::not_asked_for(asked_for, container, last))
+            }
+            None => {
+                let path = |output: &Container| (*output, format!("{last}.{}", output.ending()).into());
+                asked_for.iter().map(path).collect()
+            }
+        };
+        for (_, path) in outputs.iter().filter(|_| is_fetched) {
+            probe(path)?;
+        }
         let submission = submission(&input, &plan, &animation, console)?;
-        Ok(Self { animation, submission, output })
+        Ok(Self { animation, submission, outputs })
     }
 
-    /// Sends it to a bucket that has nothing yet, waits, and downloads the GIF.
+    /// Sends it to a bucket that has nothing yet, waits, and downloads the files.
     ///
     /// # Errors
-    /// When there is no GIF of it, or the bucket cannot be used.
+    /// When there are none, or the bucket cannot be used.
     pub(crate) async fn deliver(
         &self,
         client: Client<'_>,
@@ -166,7 +184,10 @@ impl Order {
         if let Some(why) = wait(client, &self.animation, &submitted, console).await? {
             anyhow::bail!("{why}");
         }
-        fetch::gif(client, &self.animation, &self.output, bucket, console).await
+        for (container, path) in &self.outputs {
+            fetch::file(client, &self.animation, (*container, path), bucket, console).await?;
+        }
+        Ok(())
     }
 }
 
@@ -295,8 +316,8 @@ async fn send(
     client.submit(submission, show).await
 }
 
-/// Waits until the uploaded scripts have become a GIF or cannot, and shows the progress. Returns the reason if
-/// there is no GIF.
+/// Waits until the files are made of the uploaded scripts or cannot be, and shows the progress. Returns the reason if
+/// there are none.
 async fn wait(
     client: Client<'_>,
     animation: &Animation,

@@ -146,6 +146,7 @@ fn at(place: &Place, error: rayfold_movie::Error) -> MovieError {
     match error {
         rayfold_movie::Error::Write(source) => error_at(place, source),
         rayfold_movie::Error::Gif(error) => MovieError::Gif(error),
+        error @ rayfold_movie::Error::State(_) => error_at(place, io::Error::other(error)),
     }
 }
 

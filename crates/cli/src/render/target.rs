@@ -96,17 +96,19 @@ impl Target {
     }
 }
 
-/// Checks the name of the output of a command that only writes a GIF.
+/// Returns the kind of file that a name stands for, for a command that writes files of animations and nothing else.
 ///
 /// # Errors
-/// When the name does not end in .gif, or stands for many files.
+/// When the name does not end as such a file's, or stands for many files.
 #[cfg(feature = "network")]
-pub(crate) fn must_be_gif(out: &Path) -> Result<(), Usage> {
-    let shown = out.display();
-    if ending(out).as_deref() != Some("gif") {
-        return Err(Usage(format!("cannot write {shown}: expected a name that ends in .gif")));
+pub(crate) fn container_of(out: &Path) -> Result<Container, Usage> {
+    match Target::parse(out, None)? {
+        Target::Animation(container, Place::File(_)) => Ok(container),
+        _ => {
+            let endings = Container::ALL.map(Container::ending).join(", .");
+            Err(Usage(format!("cannot write {}: expected a name that ends in .{endings}", out.display())))
+        }
     }
-    Target::parse(out, None).map(drop)
 }
 
 fn ending(out: &Path) -> Option<String> {
@@ -336,10 +338,13 @@ mod tests {
 
     #[test]
     #[cfg(feature = "network")]
-    fn only_a_gif_is_a_gif() {
-        assert!(must_be_gif(Path::new("a/b.gif")).is_ok());
-        for name in ["a.mp4", "a.png", "a", "%d.gif", "-"] {
-            assert!(must_be_gif(Path::new(name)).is_err(), "{name}");
+    fn an_animation_is_named_by_its_ending() {
+        for container in Container::ALL {
+            let name = format!("a/b.{}", container.ending());
+            assert_eq!(container_of(Path::new(&name)).unwrap(), container);
+        }
+        for name in ["a.mp4", "a.png", "a", "%d.gif", "%d.png", "-"] {
+            assert!(container_of(Path::new(name)).is_err(), "{name}");
         }
     }
 

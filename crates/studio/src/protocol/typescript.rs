@@ -156,7 +156,7 @@ fn written() -> String {
         LanguageParameter,
         CurveMode,
         updates::Summary,
-        updates::GifInfo,
+        updates::RunFile,
         updates::RunUpdate,
         updates::RunState,
         updates::FrameUpdate,

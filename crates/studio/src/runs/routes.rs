@@ -21,6 +21,7 @@ use rayfold_pipeline::keys::{Animation, Receipt, ScriptName, Tag};
 use rayfold_pipeline::retry::Scope;
 use rayfold_pipeline::store::{ETag, Store};
 use rayfold_pipeline::{Clock, Randomness, SystemClock};
+use rayfold_scene::Container;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::sync::{Semaphore, mpsc};
@@ -69,6 +70,12 @@ struct Refused(StatusCode, Refusal);
 #[derive(Deserialize)]
 struct Named {
     run: String,
+}
+
+#[derive(Deserialize)]
+struct FileNamed {
+    run: String,
+    output: Container,
 }
 
 #[derive(Deserialize)]
@@ -129,7 +136,7 @@ pub(super) fn with_bucket<S: Store + 'static>(
         .route("/retry", post(retry::<S>))
         .route("/events", get(events::<S>))
         .route("/frame.png", get(frame::<S>))
-        .route("/animation.gif", get(gif::<S>))
+        .route("/file", get(file::<S>))
         .route("/frames.zip", get(frames_zip::<S>))
         .layer(DefaultBodyLimit::max(BODY))
         .with_state(Arc::new(runs))
@@ -335,19 +342,19 @@ async fn frame<S: Store + 'static>(
     Ok(([(header::CONTENT_TYPE, "image/png")], png))
 }
 
-/// Returns the current GIF.
-async fn gif<S: Store + 'static>(
+/// Returns a current file.
+async fn file<S: Store + 'static>(
     State(runs): Shared<S>,
-    Query(named): Query<Named>,
+    Query(named): Query<FileNamed>,
 ) -> Answer<impl IntoResponse> {
     let animation = Animation::new(&named.run)?;
     let Ok(_one) = runs.fetched.acquire().await else { return Err(busy("the studio ends")) };
-    let mut gif = Bounded(Vec::new());
-    runs.client().fetch_gif(&animation, &mut gif).await.map_err(|error| match error {
+    let mut file = Bounded(Vec::new());
+    runs.client().fetch(&animation, named.output, &mut file).await.map_err(|error| match error {
         Error::Store(error) => Refused::from(error),
         error => Refused::from(error),
     })?;
-    Ok(([(header::CONTENT_TYPE, "image/gif")], Bytes::from(gif.0)))
+    Ok(([(header::CONTENT_TYPE, named.output.media_type())], Bytes::from(file.0)))
 }
 
 /// Returns the rendered frames as a zip file.

@@ -5,7 +5,7 @@ use rayfold_pipeline::Clock;
 use rayfold_pipeline::keys::{Part, ScriptName};
 use rayfold_pipeline::manifest::{Frame, FrameState, Manifest, Reason};
 use rayfold_pipeline::store::Store;
-use rayfold_scene::Diagnostic;
+use rayfold_scene::{Container, Diagnostic};
 use serde::Serialize;
 
 use super::sending::UploadProgress;
@@ -32,20 +32,24 @@ pub(crate) struct Summary {
     pub(crate) behind: bool,
     /// Nothing more will happen unless a script changes.
     pub(crate) settled: bool,
-    /// The existing GIF, if there is one.
-    pub(crate) gif: Option<GifInfo>,
+    /// The existing files, in the order in which the settings ask for them.
+    pub(crate) files: Vec<RunFile>,
 }
 
-/// A GIF in the bucket.
+/// A file in the bucket that was made of an animation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct GifInfo {
+pub(crate) struct RunFile {
+    /// The ending of its name, without a dot.
+    pub(crate) ending: String,
+    /// The name of its format.
+    pub(crate) format: String,
     /// The size of the file.
     pub(crate) bytes: u64,
-    /// The version, so that another GIF has another address.
+    /// The version, so that another file has another address.
     pub(crate) version: String,
-    /// The GIF shows the newest scripts.
+    /// The file shows the newest scripts.
     pub(crate) current: bool,
 }
 
@@ -145,11 +149,17 @@ pub(crate) struct FaultInfo {
 
 /// Returns the summary of a run as of the last poll.
 pub(crate) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
-    let gif = watch.gif().map(|gif| GifInfo {
-        bytes: gif.size,
-        version: gif.etag.to_string(),
-        current: watch.is_current(),
-    });
+    let file = |output: &Container| {
+        let file = watch.file(*output)?;
+        Some(RunFile {
+            ending: output.ending().to_owned(),
+            format: output.name().to_owned(),
+            bytes: file.size,
+            version: file.etag.to_string(),
+            current: watch.has_current(*output),
+        })
+    };
+    let files = watch.outputs().iter().filter_map(file).collect();
     let mut summary = Summary {
         run: watch.animation().to_string(),
         status: if watch.is_unreadable() { "unreadable" } else { "new" }.to_owned(),
@@ -158,7 +168,7 @@ pub(crate) fn summary<S: Store, C: Clock>(watch: &Watch<'_, S, C>) -> Summary {
         total: 0,
         behind: watch.is_behind(),
         settled: watch.is_settled(),
-        gif,
+        files,
     };
     if let Some(manifest) = watch.manifest() {
         let head = &manifest.head;
@@ -279,7 +289,7 @@ mod tests {
             total: 3,
             behind: false,
             settled: false,
-            gif: None,
+            files: Vec::new(),
         };
         RunState { summary, faults: vec![], more_faults: 0, sending: None, problem: None }
     }

@@ -14,6 +14,12 @@ const table = () => {
   return JSON.parse(String(checked.stdout)).language;
 };
 
+/** Writes a picture of a pixel beside the script. */
+const addPicture = (folder) => {
+  const png = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGOoLGoFAAJtAS9RtyNWAAAAAElFTkSuQmCC";
+  writeFileSync(join(folder, "dot.png"), Buffer.from(png, "base64"));
+};
+
 const SCENE = "Screen 64 36\nLook 0 2 9  0 0.5 0  40\nIlight 1 1 1  1 -1 -1\nTrace\n";
 
 /** The words of a line before its comment, a curve being one. */
@@ -48,6 +54,7 @@ test("every parameter of every command is reached on the page", async (t) => {
   assert.ok(language.commands.length > 20);
   const studio = await open(t, { text: SCENE, size: [1440, 900] });
   writeFileSync(join(studio.folder, "corner.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  addPicture(studio.folder);
   const { page } = studio;
   const inspector = page.locator(".panel.inspector");
   const line = async (command) => (await studio.saved()).split("\n").findLast((line) => words(line)[0] === command);
@@ -56,10 +63,9 @@ test("every parameter of every command is reached on the page", async (t) => {
     await page.locator(".viewport").focus();
     await page.keyboard.press("Escape");
     let within = inspector;
-    if (subject?.role === "quotes") {
-      // A mesh is made of a model beside the script, a text of letters.
-      await page.locator(".tile", { has: page.getByText(name, { exact: true }) }).click();
-    } else if (subject) {
+    const tile = page.locator(".tile", { has: page.getByText(name, { exact: true }) });
+    const isQuoted = subject?.role === "quotes";
+    if (subject && !isQuoted) {
       // What refers to a name is made with it: here a group, from an object.
       await page.locator(".tile", { hasText: "Sphere" }).click();
       await page.locator(".item.object[aria-selected=true]").waitFor();
@@ -70,13 +76,16 @@ test("every parameter of every command is reached on the page", async (t) => {
       await page.getByLabel("camera", { exact: true }).selectOption(name);
       await until(async () => (await line(name)) !== undefined);
       await page.getByRole("button", { name: "Edit", exact: true }).first().click();
-    } else if (await page.locator(".tile", { has: page.getByText(name, { exact: true }) }).count()) {
-      await page.locator(".tile", { has: page.getByText(name, { exact: true }) }).click();
-    } else if (await page.locator(`.tile[title^="${name}:"]`).count()) {
+    } else if (await tile.count()) {
+      // A mesh is made of a model beside the script, a text of letters.
+      await tile.click();
+    } else if (!isQuoted && (await page.locator(`.tile[title^="${name}:"]`).count())) {
       await page.locator(`.tile[title^="${name}:"]`).click();
     } else {
-      const chip = inspector.locator(`.chips button[title^="${name}:"]`);
-      within = inspector.locator(`section[title="${name}"]`);
+      // Of two settings with one name the page shows the word that one of them takes.
+      const title = isQuoted ? `${name} "FILE"` : name;
+      const chip = inspector.locator(`.chips button[title^='${title}:']`);
+      within = inspector.locator(`section[title='${title}']`);
       await until(async () => (await within.count()) > 0 || (await chip.click({ timeout: 2000 }).catch(() => {}), false));
     }
     await until(async () => (await line(name)) !== undefined);
@@ -108,24 +117,26 @@ test("every parameter of every command is reached on the page", async (t) => {
 test("every clause of a material is switched on and off, and a sphere shows it", async (t) => {
   const { clauses } = table();
   const studio = await open(t, { text: SCENE, size: [1440, 900] });
+  addPicture(studio.folder);
   const { page } = studio;
   await page.getByRole("button", { name: "New material" }).click();
   const switches = page.getByRole("group", { name: "Clauses" }).getByRole("button");
   await until(async () => (await switches.count()) === clauses.length);
   await until(async () => (await page.locator(".card img").count()) === 1);
   const material = async () => (await studio.saved()).split("\n").find((line) => line.startsWith("Material material-1 "));
-  for (const [at, { name, parameters, ends_with: other }] of clauses.entries()) {
+  for (const [at, { name, parameters, subject, ends_with: other }] of clauses.entries()) {
     const has = async () => words(await material()).includes(name);
     if (!(await has())) {
       await switches.nth(at).click();
       await until(has);
     }
     const text = words(await material());
-    const from = text.indexOf(name) + 1;
-    const numbers = parameters.flatMap(({ names }) => names).length;
+    const from = text.indexOf(name) + (subject ? 2 : 1);
+    const required = parameters.filter(({ presence }) => presence === "required");
+    const numbers = required.flatMap(({ names }) => names).length;
     assert.ok(text.slice(from, from + numbers).every((word) => Number.isFinite(Number(word))), `${text}`);
     const fields = page.locator(".panel.inspector .field");
-    await until(async () => (await fields.count()) >= parameters.length).catch(() => assert.fail(`${name} has no fields`));
+    await until(async () => (await fields.count()) >= required.length).catch(() => assert.fail(`${name} has no fields`));
     if (other) await page.getByLabel("other material").waitFor();
     if (name !== "diffuse") {
       await switches.nth(at).click();

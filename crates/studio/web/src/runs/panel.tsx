@@ -26,7 +26,7 @@ import {
   type Refusal,
   type Run,
 } from "./runs";
-import type { FaultInfo, FrameUpdate, Summary } from "../protocol";
+import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../protocol";
 import { openPlace } from "../script/panel";
 import { files } from "../store";
 
@@ -234,7 +234,12 @@ function All(): JSX.Element {
         {known?.runs.map((summary) => (
           <li key={summary.run}>
             <a href={address({ what: "run", run: summary.run })}>{summary.run}</a> <span>{stand(summary)}</span>{" "}
-            {summary.gif && <span>{summary.gif.current ? "GIF" : "last GIF"} of {size(summary.gif.bytes)}</span>}
+            {summary.files.map((file) => (
+              <span key={file.ending}>
+                {file.current ? "" : "last "}
+                {file.format} of {size(file.bytes)}{" "}
+              </span>
+            ))}
           </li>
         ))}
       </ul>
@@ -255,7 +260,7 @@ function One({ name }: { readonly name: string }): JSX.Element {
       {!now && <p>Loading</p>}
       {now && <Standing run={now} />}
       {now && (now.faults.length > 0 || now.failed > 0) && <Faults run={now} />}
-      {now?.gif && <Result run={now} gif={now.gif} />}
+      {now?.files[0] && <Result run={now} first={now.files[0]} />}
       {now && now.frames.length > 0 && <Grid run={now} />}
     </>
   );
@@ -275,18 +280,23 @@ function Standing({ run: now }: { readonly run: Run }): JSX.Element {
   );
 }
 
-function Result({ run: now, gif }: { readonly run: Run; readonly gif: NonNullable<Run["gif"]> }): JSX.Element {
-  const file = `${now.run.split("/").at(-1) ?? "animation"}`;
-  const source = resource("animation.gif", { run: now.run, version: gif.version });
+function Result({ run: now, first }: { readonly run: Run; readonly first: RunFile }): JSX.Element {
+  const name = `${now.run.split("/").at(-1) ?? "animation"}`;
+  // A browser shows no raw video.
+  const shown = now.files.find((file) => file.ending !== "y4m");
+  const source = (file: RunFile): string =>
+    resource("file", { run: now.run, output: file.ending, version: file.version });
   return (
     <figure class="gif">
-      <img src={source} alt={`The animation ${now.run}`} />
+      {shown && <img src={source(shown)} alt={`The animation ${now.run}`} />}
       <figcaption>
-        {gif.current ? "The finished GIF" : "The previous GIF; a newer one is being made"}
+        {first.current ? `The finished ${first.format}` : `The previous ${first.format}; a newer one is being made`}
         <span class="buttons">
-          <a class="button" href={source} download={`${file}.gif`}>
-            Download GIF ({size(gif.bytes)})
-          </a>
+          {now.files.map((file) => (
+            <a key={file.ending} class="button" href={source(file)} download={`${name}.${file.ending}`}>
+              Download {file.format} ({size(file.bytes)})
+            </a>
+          ))}
           <a class="button" href={resource("frames.zip", { run: now.run })} download={`${file}-frames.zip`}>
             Download frames
           </a>
