@@ -39,6 +39,8 @@ const BIG_FRAMES: u64 = 0x0062_6967;
 const FILES: u64 = 0x0066_696c_6573;
 /// Sets apart how little time the assembler has.
 const HURRY: u64 = 0x0068_7572_7279;
+/// Likewise of the files that are asked for.
+const OUTPUTS: u64 = 0x006f_7574_7075_7473;
 
 /// The number of sweeps that a run may need.
 const MAX_SWEEPS: u32 = 24;
@@ -63,7 +65,8 @@ pub(super) fn run(
 ) -> Result<Run, String> {
     let random = Randomness::seeded(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5eed);
     let files = Randomness::seeded(seed ^ FILES);
-    let judge = begin(&random, &Randomness::seeded(seed ^ HURRY), mutation, log.is_some())?;
+    let outputs = Randomness::seeded(seed ^ OUTPUTS);
+    let judge = begin(&random, (&Randomness::seeded(seed ^ HURRY), &outputs), mutation, log.is_some())?;
     if files.one_in(3) {
         *lock(&judge.env.files) = Some(files.bits());
         write_acts_on_files(&files, &judge.env, &judge.animation);
@@ -92,7 +95,7 @@ pub(super) fn run(
 /// A world with its story, before anything has happened.
 fn begin(
     random: &Randomness,
-    hurry: &Randomness,
+    (hurry, outputs): (&Randomness, &Randomness),
     mutation: Option<Mutation>,
     is_logged: bool,
 ) -> Result<Judge, String> {
@@ -116,7 +119,7 @@ fn begin(
     }
     let animation = Animation::new("an/im").map_err(|error| error.to_string())?;
     let watch = watch(&env, &platform);
-    write_story((random, hurry), &env, &platform, &animation);
+    write_story((random, outputs), &env, &platform, &animation);
     if random.one_in(2) {
         *lock(&env.moments) = Some(awkward_user(random, &env));
     }
@@ -185,13 +188,14 @@ fn pick(random: &Randomness, of: usize) -> usize {
 
 /// Writes the acts of users and their times.
 fn write_story(
-    (random, hurry): (&Randomness, &Randomness),
+    (random, outputs): (&Randomness, &Randomness),
     env: &Arc<SimEnvironment>,
     platform: &Arc<Platform>,
     animation: &Animation,
 ) {
     let count = 1 + pick(random, 4).min(1 + pick(random, 3));
     let span_ms = [50, 500, 4_000, 20_000][pick(random, 4)];
+    let has_outputs = outputs.one_in(4);
     let settings_text = |random: &Randomness, scripts: usize| {
         let settings = match random.below(8) {
             0 => r#""frames": 0.5"#.to_owned(),
@@ -199,10 +203,10 @@ fn write_story(
             3 => format!(r#""frames": {}"#, scripts + 1),
             _ => format!(r#""frames": {scripts}"#),
         };
-        let outputs = match hurry.below(8) {
-            0 => r#", "outputs": ["gif", "webp"]"#,
-            1 => r#", "outputs": ["webp", "apng", "gif"]"#,
-            2 => r#", "outputs": ["y4m"]"#,
+        let outputs = match outputs.below(4) {
+            0 if has_outputs => r#", "outputs": ["gif", "webp"]"#,
+            1 if has_outputs => r#", "outputs": ["webp", "apng", "gif"]"#,
+            2 if has_outputs => r#", "outputs": ["y4m"]"#,
             _ => "",
         };
         format!("{{{settings}{outputs}}}")

@@ -6,7 +6,7 @@ use super::*;
 const SMALL: u64 = 15_000;
 
 /// Worlds of no more states than that.
-const SMALL_WORLDS: usize = 29;
+const SMALL_WORLDS: usize = 33;
 
 fn world(name: &str) -> World {
     worlds().into_iter().find(|world| world.name == name).expect(name)
