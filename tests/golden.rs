@@ -95,6 +95,11 @@ fn package() {
     check_curves("package", &[9]);
 }
 
+#[test]
+fn pendulum() {
+    check_curves("pendulum", &[1, 9]);
+}
+
 // Of the scenes of indirect light one ray per pixel shows what suns, glow and smooth mirrors do.
 
 #[test]
@@ -131,7 +136,7 @@ fn every_scene_is_shown_and_has_golden_frames() {
         let size = fs::metadata(picture).unwrap().len();
         assert!(size < 1_000_000, "{} has {size} bytes", picture.display());
     }
-    assert_eq!(count, 18);
+    assert_eq!(count, 19);
 }
 
 /// Checks some frames of a folder with a script per frame.

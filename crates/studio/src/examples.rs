@@ -5,7 +5,7 @@ type Example = (&'static str, &'static str);
 
 /// All examples without files of their own: the script with curves if the animation has one, else the script of its first
 /// frame.
-const ALL: [Example; 12] = [
+const ALL: [Example; 13] = [
     ("hello", include_str!("../../../scenes/hello/frame01.txt")),
     ("marbles", include_str!("../../../scenes/marbles/marbles.txt")),
     ("glass", include_str!("../../../scenes/glass/glass.txt")),
@@ -13,6 +13,7 @@ const ALL: [Example; 12] = [
     ("planets", include_str!("../../../scenes/planets/planets.txt")),
     ("lamp", include_str!("../../../scenes/lamp/lamp.txt")),
     ("logo", include_str!("../../../scenes/logo/logo.txt")),
+    ("pendulum", include_str!("../../../scenes/pendulum/pendulum.txt")),
     ("room", include_str!("../../../scenes/room/room.txt")),
     ("sphere_light", include_str!("../../../scenes/sphere_light/frame01.txt")),
     ("moving_up", include_str!("../../../scenes/moving_up/frame01.txt")),
