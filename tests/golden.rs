@@ -81,6 +81,43 @@ fn grove() {
 }
 
 #[test]
+fn globe() {
+    check_curves("globe", &[1, 18]);
+}
+
+#[test]
+fn chess() {
+    check_curves("chess", &[5]);
+}
+
+#[test]
+fn package() {
+    check_curves("package", &[9]);
+}
+
+#[test]
+fn pendulum() {
+    check_curves("pendulum", &[1, 9]);
+}
+
+// Of the scenes of indirect light one ray per pixel shows what suns, glow and smooth mirrors do.
+
+#[test]
+fn room() {
+    check_curves("room", &[1]);
+}
+
+#[test]
+fn still() {
+    check_curves("still", &[1]);
+}
+
+#[test]
+fn neon() {
+    check_curves("neon", &[1]);
+}
+
+#[test]
 fn every_scene_is_shown_and_has_golden_frames() {
     let readme = fs::read_to_string(root().join("scenes/README.md")).unwrap();
     let mut count = 0;
@@ -93,11 +130,13 @@ fn every_scene_is_shown_and_has_golden_frames() {
         let name = entry.file_name().into_string().unwrap();
         assert!(root().join("tests/golden").join(&name).is_dir(), "{name} has no golden frames");
         assert!(readme.contains(&format!("| `{name}`")), "scenes/README.md does not tell of {name}");
-        let picture = root().join(format!("docs/images/{name}.gif"));
-        let size = fs::metadata(&picture).unwrap_or_else(|e| panic!("{}: {e}", picture.display())).len();
+        let pictures = ["gif", "png"].map(|ending| root().join(format!("docs/images/{name}.{ending}")));
+        let picture =
+            pictures.iter().find(|path| path.exists()).unwrap_or_else(|| panic!("no picture of {name}"));
+        let size = fs::metadata(picture).unwrap().len();
         assert!(size < 1_000_000, "{} has {size} bytes", picture.display());
     }
-    assert_eq!(count, 12);
+    assert_eq!(count, 19);
 }
 
 /// Checks some frames of a folder with a script per frame.
@@ -136,12 +175,15 @@ fn by_reference(scene: &Scene) -> RgbImage {
     reference::render(scene, &RenderOptions::default()).unwrap()
 }
 
-/// Loads frame `k`, counted from 0, of a script, at the size of golden frames.
+/// Loads frame `k`, counted from 0, of a script and the files beside it, at the size of golden frames.
 fn load(script: &str, k: usize) -> Scene {
     let text = fs::read(root().join(script)).unwrap_or_else(|e| panic!("{script}: {e}"));
-    let rabbit = fs::read(root().join("scenes/grove/rabbit.ply")).unwrap();
-    let files = Library::new(MemoryFiles::from([("rabbit.ply", rabbit)]));
-    let parsed = parse_with_files(script, &text, &Limits::default(), &files);
+    let mut files = MemoryFiles::default();
+    for entry in fs::read_dir(root().join(script).parent().unwrap()).unwrap() {
+        let entry = entry.unwrap();
+        files.insert(&entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap());
+    }
+    let parsed = parse_with_files(script, &text, &Limits::default(), &Library::new(files));
     let parsed_script = parsed.script.unwrap_or_else(|| panic!("{script}: {:?}", parsed.diagnostics));
     let mut scene = parsed_script.frame(k).unwrap();
     scene.screen = Screen::new(SIDE, SIDE).unwrap();

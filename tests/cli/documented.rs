@@ -4,7 +4,7 @@
 //! it, so the beginning of the file must be the same, byte for byte, up to the last of these frames. Then the rest
 //! of the file can only differ if a later frame does; the last frame of the file is compared as a picture, within
 //! the error that a GIF has. `RAYFOLD_PICTURES=overwrite cargo test -p rayfold --test cli documented` renders them
-//! again as a whole.
+//! again as a whole. A picture of a single frame is a PNG and is compared as a whole.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The animations of the page: the folder of each, and the flags of its command.
+/// The animations and pictures of the page: the file in `docs/images` of each, and the flags of its command.
 fn documented() -> Vec<(String, String)> {
     let page = std::fs::read_to_string(root().join("scenes/README.md")).unwrap();
     // Above this heading pictures are whole, below it they are made by the command that is there.
@@ -31,12 +31,12 @@ fn documented() -> Vec<(String, String)> {
     let (flags, _) = command.split_once("`)").unwrap();
     let names = |text: &str| -> Vec<String> {
         let images = text.split("(../docs/images/").skip(1);
-        images.filter_map(|image| Some(image.split_once(".gif)")?.0.to_owned())).collect()
+        images.filter_map(|image| Some(image.split_once(')')?.0.to_owned())).collect()
     };
     let mut all: Vec<_> = names(whole).into_iter().map(|name| (name, String::new())).collect();
     all.extend(names(small).into_iter().map(|name| (name, flags.to_owned())));
     // The one of the project's own page.
-    all.push(("hello".into(), String::new()));
+    all.push(("hello.gif".into(), String::new()));
     all
 }
 
@@ -81,19 +81,28 @@ fn frames_of(gif: &[u8]) -> Vec<usize> {
 fn documented_pictures_are_what_their_commands_write() {
     let folder = Folder::new();
     let documented = documented();
-    assert_eq!(documented.len(), 12, "{documented:?}");
+    assert_eq!(documented.len(), 19, "{documented:?}");
     let mut stale = Vec::new();
-    for (name, flags) in documented {
-        let path = root().join(format!("docs/images/{name}.gif"));
+    for (file, flags) in documented {
+        let (name, ending) = file.split_once('.').unwrap();
+        let path = root().join("docs/images").join(&file);
         if std::env::var_os("RAYFOLD_PICTURES").is_some() {
-            render(&folder, &name, &flags, &path);
+            render(&folder, name, &flags, &path);
             continue;
         }
         let whole = std::fs::read(&path).unwrap();
+        if ending == "png" {
+            let single = folder.join("single.png");
+            render(&folder, name, &flags, &single);
+            if std::fs::read(single).unwrap() != whole {
+                stale.push(name.to_owned());
+            }
+            continue;
+        }
         let starts = frames_of(&whole);
         assert!(starts.len() >= 10, "{name}: {} frames", starts.len());
         let first = folder.join("first.gif");
-        render(&folder, &name, &format!("{flags} --frame 1..{FRAMES}"), &first);
+        render(&folder, name, &format!("{flags} --frame 1..{FRAMES}"), &first);
         let first = std::fs::read(first).unwrap();
         // The last of these frames is drawn as that of an animation that ends.
         let end = frames_of(&first)[FRAMES - 1];
@@ -101,7 +110,7 @@ fn documented_pictures_are_what_their_commands_write() {
             stale.push(format!("{name}: its first {} frames", FRAMES - 1));
         }
         let last = folder.join("last.png");
-        render(&folder, &name, &format!("{flags} --frame {}", starts.len()), &last);
+        render(&folder, name, &format!("{flags} --frame {}", starts.len()), &last);
         let (shown, _) = decode_gif(&whole).pop().unwrap();
         let drawn = folder.image("last.png");
         let off: f64 = shown.iter().zip(drawn.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();

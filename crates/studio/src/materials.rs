@@ -42,8 +42,13 @@ const PRESETS: &[Preset] = &[
         "steel",
         "ambient 0.02 0.02 0.025   diffuse 0.16 0.17 0.19   mirror 0.5 0.5 0.52   shine 0.9 0.9 0.9 120",
     ),
+    plain("brushed-steel", "mirror 0.64 0.65 0.68   rough 0.25"),
     plain("mirror", "diffuse 0.03 0.03 0.03   mirror 0.88 0.88 0.88   shine 1 1 1 400"),
+    plain("satin", "ambient 0.08 0.01 0.02   diffuse 0.4 0.04 0.08   mirror 0.22 0.1 0.12   rough 0.4"),
+    plain("plaster", "ambient 0.16 0.15 0.13   diffuse 0.8 0.75 0.66   mirror 0.04 0.04 0.04   rough 0.5"),
+    plain("neon", "glow 1 0.35 0.6"),
     plain("glass", "glass 0.97 0.985 0.98 1.5   shine 1 1 1 400"),
+    plain("frosted-glass", "glass 0.92 0.96 0.95 1.5   rough 0.2"),
     Preset {
         name: "checks",
         says: "ambient 0.08 0.08 0.07   diffuse 0.75 0.72 0.66   checker 0.4 checks-dark",
@@ -70,7 +75,7 @@ fn is_light(name: &str) -> bool {
 pub(crate) const SIDE: u32 = 96;
 
 /// The scene of a sphere. The names of its own materials cannot occur in a user's script.
-const STUDIO: &str = "Samples 8 1.5\nLook 0 1.35 4.1  0 0.98 0  34\nBackground 0.9 0.9 0.88  0.5 0.6 0.72\n\
+const STUDIO: &str = "Samples 32 1.5\nLook 0 1.35 4.1  0 0.98 0  34\nBackground 0.9 0.9 0.88  0.5 0.6 0.72\n\
                       Ilight 0.8 0.8 0.77  -0.6 -1 -0.7\nIlight 0.25 0.27 0.3  0.8 -0.4 -0.6\n\
                       Material studio-dark-tile ambient 0.3 0.3 0.3 diffuse 0.2 0.2 0.2\n\
                       Material studio-tile ambient 0.4 0.4 0.4 diffuse 0.3 0.3 0.3 checker 0.5 studio-dark-tile\n\
@@ -347,10 +352,9 @@ mod tests {
     fn every_preset_is_in_order_and_has_a_sphere_of_its_own() {
         let mut seen = HashSet::new();
         for name in presets() {
-            let text =
-                "Screen 4 3\nSphere 1  0 0 -5  .1 .1 .1  1 1 1   # ball\nIlight 1 1 1  0 -1 0\nTrace\n";
+            let text = "Screen 4 3\nSamples 2\nSphere 1  0 0 -5  .1 .1 .1  1 1 1   # ball\nIlight 1 1 1  0 -1 0\nTrace\n";
             let lines = Line::split(text.as_bytes());
-            let text = after(text, give_preset(&lines, &[1], name));
+            let text = after(text, give_preset(&lines, &[2], name));
             let parsed = parse("a", text.as_bytes(), &Default::default());
             assert!(parsed.diagnostics.is_empty(), "{text}\n{:?}", parsed.diagnostics);
             assert!(text.contains(&format!("\nSphere 1  0 0 -5  {name}   # ball\n")), "{text}");
