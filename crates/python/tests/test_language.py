@@ -10,7 +10,10 @@ import pytest
 import rayfold as rf
 from rayfold import _rayfold
 
-METHODS = {name: (doc, parameters, clauses) for name, doc, parameters, clauses in _rayfold.methods()}
+METHODS = {
+    name: (_rayfold.method_doc(index), parameters, clauses)
+    for index, (name, parameters, clauses) in enumerate(_rayfold.methods())
+}
 CLAUSES = dict(_rayfold.clauses())
 
 
