@@ -26,12 +26,13 @@ def heights(side: int = SIDE, seed: int = 7) -> NDArray[np.float64]:
     return mountains
 
 
-def grid(height: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def grid(height: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The vertices of a height map, and its cells as the indices of their corners, counterclockwise seen from above."""
     rows, columns = height.shape
     x, z = np.meshgrid(np.linspace(-1.4, 1.4, rows), np.linspace(-1.4, 1.4, columns), indexing="ij")
     vertices = np.column_stack([x.ravel(), height.ravel(), z.ravel()])
-    first = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].ravel()
+    row, column = np.indices((rows - 1, columns - 1)).reshape(2, -1)
+    first: NDArray[np.int64] = row * columns + column
     faces = np.column_stack([first, first + 1, first + columns + 1, first + columns])
     return vertices, faces
 

@@ -37,7 +37,7 @@ def arguments(parameters, doc, next_number):
             values[name] = rf.Material(diffuse=0.5)
         elif words := re.findall(r'"(.*?)"', kind):
             values[name] = words[-1]
-        elif kind == "str":
+        elif kind.split(" | ")[0] == "str":
             values[name] = "thing"
         elif kind == "bool":
             values[name] = False

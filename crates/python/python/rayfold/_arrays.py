@@ -110,7 +110,7 @@ def check_sequence(place, value, what):
     width = len(first)
     for row, item in enumerate(value):
         if not hasattr(item, "__len__") or len(item) != width:
-            raise ValueError(f"{place}[{row}] is {shown(item)}, but {place}[0] has {width} numbers: expected {what} in each row")
+            raise ValueError(f"{place}[{row}] is {shown(item)}, but row 0 has {width} numbers: expected {what} in each row")
 
 
 def rows_of(name, value, what, widths, most):
