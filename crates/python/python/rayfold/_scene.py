@@ -137,18 +137,19 @@ def _is_first_argument(name, value):
     )
 
 
-def _signature(parameters, has_clauses):
-    import inspect
-
-    kind = inspect.Parameter
-    listed = [kind("self", kind.POSITIONAL_ONLY)]
+def _signature(name, parameters, has_clauses):
+    """A function with the parameters of a method, which `help` shows. The method itself hands over all at once."""
+    listed = ["self", "/"]
     is_optional = False
-    for name, is_required, _ in parameters:
+    for parameter, is_required, _ in parameters:
         is_optional |= not is_required
-        listed.append(kind(name, kind.POSITIONAL_OR_KEYWORD, default=None if is_optional else kind.empty))
+        listed.append(f"{parameter}=None" if is_optional else parameter)
     if has_clauses:
-        listed.extend(kind(name, kind.KEYWORD_ONLY, default=None) for name, _ in _rayfold.clauses())
-    return inspect.Signature(listed)
+        listed += ["*", *(f"{clause}=None" for clause, _ in _rayfold.clauses())]
+    # To make a signature takes the module `inspect`, which is imported as long as all of this package.
+    made = {}
+    exec(f"def {name}({', '.join(listed)}): ...", made)
+    return made[name]
 
 
 def _method(index, name, parameters, has_clauses):
@@ -179,7 +180,7 @@ def _method(index, name, parameters, has_clauses):
     method.__qualname__ = f"Scene.{name}"
     method.__doc__ = _rayfold.method_doc(index)
     method.__module__ = "rayfold"
-    method.__signature__ = _signature(parameters, has_clauses)
+    method.__wrapped__ = _signature(name, parameters, has_clauses)
     return method
 
 
