@@ -18,6 +18,7 @@ use pyo3::types::PyBytes;
 use rayfold_client::{Content as Sent, File};
 use rayfold_files::{OutputFile, files_beside};
 use rayfold_scene::assets::{FileInfo, Files, Library, file_name};
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use crate::error::{guarded, os_error};
@@ -29,6 +30,9 @@ const LATEST_BYTES: usize = 64 << 20;
 
 /// The bytes of a hash that are part of a name.
 const BYTES_OF_HASH: usize = 10;
+
+/// The bytes that are hashed in one piece. Another number gives other names.
+const PIECE: usize = 1 << 20;
 
 /// A file that was made of arrays.
 #[pyclass(frozen, from_py_object, module = "rayfold._rayfold")]
@@ -131,10 +135,14 @@ impl Given {
     }
 }
 
-/// Returns the digits that stand for a content in its name.
+/// Returns the digits that stand for a content in its name: those of the hash of the hashes of its pieces, which are made side
+/// by side.
 fn hash(bytes: &[u8]) -> String {
+    let pieces: Vec<_> = bytes.par_chunks(PIECE).map(Sha256::digest).collect();
+    let mut whole = Sha256::new();
+    pieces.iter().for_each(|piece| whole.update(piece));
     let mut digits = String::with_capacity(2 * BYTES_OF_HASH);
-    for byte in &Sha256::digest(bytes)[..BYTES_OF_HASH] {
+    for byte in &whole.finalize()[..BYTES_OF_HASH] {
         let _ = write!(digits, "{byte:02x}");
     }
     digits
