@@ -206,6 +206,12 @@ impl Library {
         sources.unwrap_or_default().iter().map(|source| (source.name.clone(), source.path.clone())).collect()
     }
 
+    /// Drops the model and the picture of this name, as far as no script uses them. For files that are gone for good.
+    pub fn forget(&self, name: &str) {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
+        self.pictures.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
+    }
+
     fn decode(&self, name: &str) -> Result<(Model, Vec<Source>), AssetError> {
         let info = self.look(name)?.ok_or_else(|| absent(&*self.files, name))?;
         let bytes = content(&*self.files, name)?;
@@ -331,6 +337,20 @@ mod tests {
         assert_eq!(reads.load(Ordering::Relaxed), 3);
         let names: Vec<_> = library.sources("c.obj").into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["c.obj", "c.mtl"]);
+    }
+
+    #[test]
+    fn what_is_forgotten_is_freed_and_decoded_anew() {
+        let files = Arc::new(Mutex::new(MemoryFiles::from([("c.obj", CORNER.to_vec())])));
+        let reads = Arc::new(AtomicUsize::new(0));
+        let library = Library::new(Counted(files, reads.clone()));
+        let model = Arc::downgrade(&library.model("c.obj", Smoothing::Flat).unwrap());
+        library.forget("other.obj");
+        assert!(model.upgrade().is_some());
+        library.forget("c.obj");
+        assert!(model.upgrade().is_none());
+        assert_eq!(library.model("c.obj", Smoothing::Flat).unwrap().triangle_count(), 1);
+        assert_eq!(reads.load(Ordering::Relaxed), 2);
     }
 
     #[test]

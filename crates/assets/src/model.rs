@@ -359,6 +359,12 @@ fn has_area(positions: &[DVec3], triangle: [u32; 3]) -> bool {
         return false;
     }
     let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
+    // Most triangles are neither needles nor of odd sizes. The bound is four times the one below, at most.
+    let (p, q) = (b - a, c - a);
+    let product = p.abs().max_element() * q.abs().max_element();
+    if largest < 1e100 && product > 1e-200 && p.cross(q).abs().max_element() > 16.0 * f64::EPSILON * product {
+        return true;
+    }
     // Powers of two round nothing.
     let scale = power_below_inverse(largest);
     let [a, b, c] = [a, b, c].map(|p| p * scale);

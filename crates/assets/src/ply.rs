@@ -99,22 +99,7 @@ impl Values<'_> {
         }
         let (bytes, rest) = self.rest.split_at_checked(of.bytes()).ok_or_else(ends)?;
         self.rest = rest;
-        let mut whole = [0; 8];
-        let little = self.format == Format::Little;
-        for (k, byte) in bytes.iter().enumerate() {
-            whole[if little { k } else { bytes.len() - 1 - k }] = *byte;
-        }
-        let four = [whole[0], whole[1], whole[2], whole[3]];
-        Ok(match of {
-            Type::I8 => f64::from(whole[0].cast_signed()),
-            Type::U8 => f64::from(whole[0]),
-            Type::I16 => f64::from(i16::from_le_bytes([whole[0], whole[1]])),
-            Type::U16 => f64::from(u16::from_le_bytes([whole[0], whole[1]])),
-            Type::I32 => f64::from(i32::from_le_bytes(four)),
-            Type::U32 => f64::from(u32::from_le_bytes(four)),
-            Type::F32 => f64::from(f32::from_le_bytes(four)),
-            Type::F64 => f64::from_le_bytes(whole),
-        })
+        Ok(number(of, bytes, self.format))
     }
 
     fn count(&mut self, of: Type) -> Result<usize, Fault> {
@@ -124,6 +109,30 @@ impl Values<'_> {
             return Err(Fault::new(format!("a list of {count} numbers")));
         }
         Ok(count as usize)
+    }
+}
+
+/// Returns the number of a type in the first bytes of a binary file's rest.
+#[inline]
+fn number(of: Type, bytes: &[u8], format: Format) -> f64 {
+    /// Returns the bytes of a number in the order of little-endian files.
+    fn ordered<const N: usize>(bytes: &[u8], format: Format) -> [u8; N] {
+        let mut own = [0; N];
+        own.copy_from_slice(&bytes[..N]);
+        if format == Format::Big {
+            own.reverse();
+        }
+        own
+    }
+    match of {
+        Type::I8 => f64::from(bytes[0].cast_signed()),
+        Type::U8 => f64::from(bytes[0]),
+        Type::I16 => f64::from(i16::from_le_bytes(ordered(bytes, format))),
+        Type::U16 => f64::from(u16::from_le_bytes(ordered(bytes, format))),
+        Type::I32 => f64::from(i32::from_le_bytes(ordered(bytes, format))),
+        Type::U32 => f64::from(u32::from_le_bytes(ordered(bytes, format))),
+        Type::F32 => f64::from(f32::from_le_bytes(ordered(bytes, format))),
+        Type::F64 => f64::from_le_bytes(ordered(bytes, format)),
     }
 }
 
@@ -259,19 +268,33 @@ fn vertices(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Re
         return Err(Fault::new("its vertices have no x, y and z"));
     }
     let (normals, colors, uvs) = (has(3..6), has(6..9), has(9..11));
+    // Without lists the rows of a binary file are of one length.
+    let row: usize = element.properties.iter().map(|property| property.of.bytes()).sum();
+    let is_even = values.format != Format::Text && element.properties.iter().all(|p| p.count.is_none());
     for _ in 0..element.count {
         let mut of = [0.0; SLOTS.len()];
-        for (property, slot) in element.properties.iter().zip(&slots) {
-            if let Some(count) = property.count {
-                for _ in 0..values.count(count)? {
-                    values.next(property.of)?;
-                }
-                continue;
-            }
-            let value = values.next(property.of)?;
+        let mut put = |property: &Property, slot: &Option<usize>, value: f64| {
             if let Some(slot) = slot {
                 let is_color = (6..9).contains(slot);
                 of[*slot] = if is_color { value / property.of.largest() } else { value };
+            }
+        };
+        if is_even && let Some((mut bytes, rest)) = values.rest.split_at_checked(row) {
+            values.rest = rest;
+            for (property, slot) in element.properties.iter().zip(&slots) {
+                put(property, slot, number(property.of, bytes, values.format));
+                bytes = &bytes[property.of.bytes()..];
+            }
+        } else {
+            for (property, slot) in element.properties.iter().zip(&slots) {
+                if let Some(count) = property.count {
+                    for _ in 0..values.count(count)? {
+                        values.next(property.of)?;
+                    }
+                    continue;
+                }
+                let value = values.next(property.of)?;
+                put(property, slot, value);
             }
         }
         parts.positions.push(DVec3::new(of[0], of[1], of[2]));
@@ -288,6 +311,31 @@ fn vertices(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Re
     Ok(())
 }
 
+/// Takes the triangles with which the faces of a binary file begin, as nearly all programs write them, and returns their
+/// number. What is another face, or faulty, is left.
+fn triangles(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> u64 {
+    const ROW: usize = 13;
+    let is_plain = values.format != Format::Text
+        && matches!(
+            &element.properties[..],
+            [Property { of: Type::I32 | Type::U32, count: Some(Type::I8 | Type::U8), .. }]
+        );
+    let most = if is_plain { element.count } else { 0 };
+    let room = limits::TRIANGLES - parts.triangles.len();
+    let before = parts.triangles.len();
+    for row in values.rest.as_chunks::<ROW>().0.iter().take(room.min(most as usize)) {
+        let corner = |k: usize| number(Type::U32, &row[1 + 4 * k..], values.format) as u32;
+        let corners = [corner(0), corner(1), corner(2)];
+        if row[0] != 3 || corners.iter().any(|corner| *corner > i32::MAX.cast_unsigned()) {
+            break;
+        }
+        parts.triangles.push(corners);
+    }
+    let taken = parts.triangles.len() - before;
+    values.rest = &values.rest[ROW * taken..];
+    taken as u64
+}
+
 fn faces(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Result<(), Fault> {
     let is_corners = |property: &Property| {
         property.count.is_some() && matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
@@ -296,8 +344,9 @@ fn faces(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Resul
         return Err(Fault::new(format!("its `{}` has no list `vertex_indices`", element.name)));
     }
     let is_strip = element.name == "tristrips";
+    let taken = if is_strip { 0 } else { triangles(element, values, parts) };
     let mut corners: Vec<u32> = Vec::new();
-    for _ in 0..element.count {
+    for _ in taken..element.count {
         for property in &element.properties {
             let count = property.count.map_or(Ok(1), |of| values.count(of))?;
             if !is_corners(property) {

@@ -246,3 +246,57 @@ fn what_is_wrong_is_said() {
         assert_eq!(fault(bytes), message);
     }
 }
+
+/// Returns a binary PLY of the tetrahedron whose faces are lists of `kind`, each with its corners.
+fn ply_with_faces(little: bool, kind: &str, faces: &[Vec<u32>]) -> Vec<u8> {
+    let order = if little { "little" } else { "big" };
+    let mut bytes = format!(
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float \
+         z\nelement face {}\nproperty list uchar {kind} vertex_indices\nend_header\n",
+        faces.len()
+    )
+    .into_bytes();
+    let mut put = |number: [u8; 4]| {
+        bytes.extend(if little { number } else { [number[3], number[2], number[1], number[0]] });
+    };
+    CORNERS.as_flattened().iter().for_each(|x| put(x.to_le_bytes()));
+    for face in faces {
+        bytes.push(face.len() as u8);
+        for corner in face {
+            let number = corner.to_le_bytes();
+            bytes.extend(if little { number } else { corner.to_be_bytes() });
+        }
+    }
+    bytes
+}
+
+#[test]
+fn triangles_of_a_binary_ply_may_be_among_other_faces() {
+    let of = |faces: &[Vec<u32>]| faces.to_vec();
+    let [a, b, c, d] = FACES.map(|face| face.to_vec());
+    let cases = [
+        (of(&[a.clone(), b.clone(), c.clone(), d.clone()]), 4),
+        (of(&[a.clone(), vec![0, 1, 3, 2], d.clone()]), 4),
+        (of(&[vec![0, 1, 3, 2], a.clone(), d.clone()]), 4),
+        (of(&[a.clone(), b, c, vec![1, 2]]), 3),
+    ];
+    for (faces, count) in cases {
+        let expected = triangles(&model("x.ply", ply_with_faces(true, "int", &faces)));
+        assert_eq!(expected.len(), count);
+        assert_eq!(expected[0], corners_of(&faces[0]));
+        for (little, kind) in [(false, "int"), (true, "uint"), (false, "uint")] {
+            assert_eq!(triangles(&model("x.ply", ply_with_faces(little, kind, &faces))), expected);
+        }
+    }
+    let negative = of(&[a.clone(), vec![0, 1, u32::MAX]]);
+    assert_eq!(fault(ply_with_faces(true, "int", &negative)), "`x`: a face has the corner -1");
+    let outside = of(&[a.clone(), vec![0, 1, 4]]);
+    assert_eq!(fault(ply_with_faces(true, "int", &outside)), "`x`: an index is out of range");
+    let mut cut = ply_with_faces(true, "int", &of(&[a.clone(), a.clone()]));
+    cut.truncate(cut.len() - 1);
+    assert_eq!(fault(cut), "`x`: it ends before the numbers that its header promises");
+}
+
+fn corners_of(face: &[u32]) -> [DVec3; 3] {
+    [0, 1, 2].map(|k| DVec3::from(CORNERS[face[k] as usize].map(f64::from)))
+}

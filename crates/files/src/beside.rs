@@ -30,16 +30,26 @@ fn libraries() -> std::sync::MutexGuard<'static, Libraries> {
 
 /// Returns the models in the folder of a script, each decoded once in a process until its file changes.
 pub fn library_beside(script: &Path) -> Arc<Library> {
-    let folder = match script.parent() {
-        Some(folder) if folder != Path::new("") => folder.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
+    let folder = folder_of(script);
     let mut all = libraries();
     let (library, _) = all.entry(folder.clone()).or_insert_with(|| {
         let files = Beside { folder, asked: Arc::default() };
         (Arc::new(Library::new(files.clone())), files)
     });
     library.clone()
+}
+
+/// Returns the files in the folder of a script, for a library that has others besides. [`named_by_scripts`] does not know
+/// what is asked of them.
+pub fn files_beside(script: &Path) -> impl Files + use<> {
+    Beside { folder: folder_of(script), asked: Arc::default() }
+}
+
+fn folder_of(script: &Path) -> PathBuf {
+    match script.parent() {
+        Some(folder) if folder != Path::new("") => folder.to_path_buf(),
+        _ => PathBuf::from("."),
+    }
 }
 
 /// Returns the paths of all files that scripts have named in this process, whether they are there or not.

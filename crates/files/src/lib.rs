@@ -27,7 +27,7 @@ mod input;
 mod leftover;
 mod output;
 
-pub use beside::{library_beside, named_by_scripts};
+pub use beside::{files_beside, library_beside, named_by_scripts};
 pub use folder::{Folder, NotRead};
 pub use input::{NotAFile, open};
 pub use output::{Error, OutputFile, probe, remove_unfinished};

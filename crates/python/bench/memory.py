@@ -4,6 +4,8 @@ import gc
 import os
 import tempfile
 
+import numpy as np
+
 import rayfold as rf
 
 FRAMES = 10_000
@@ -18,6 +20,35 @@ def frame(t):
     return scene
 
 
+def grid(side=20):
+    x, z = np.meshgrid(np.linspace(-3, 3, side + 1), np.linspace(-3, 3, side + 1), indexing="ij")
+    first = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)[:-1, :-1].ravel()
+    faces = np.column_stack([first, first + 1, first + side + 2, first + side + 1])
+    return np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()]), faces
+
+
+PLACES, CELLS = grid()
+PICTURE = np.random.default_rng(1).integers(0, 256, (32, 32, 3), np.uint8)
+
+
+def of_a_mesh(t):
+    """The same arrays in each frame."""
+    scene = frame(t)
+    scene.mesh(PLACES, CELLS, diffuse=0.5)
+    scene.box((-1, 0, -1), (1, 1, 1), image=(PICTURE, "flat", 1), diffuse=1)
+    return scene
+
+
+def of_meshes(t):
+    """A mesh and a picture of its own in each frame."""
+    scene = frame(t)
+    places = PLACES.copy()
+    places[:, 1] = np.sin(places[:, 0] + t)
+    scene.mesh(places, CELLS, diffuse=0.5)
+    scene.box((-1, 0, -1), (1, 1, 1), image=(PICTURE + np.uint8(100 * t % 251), "flat", 1), diffuse=1)
+    return scene
+
+
 def resident():
     """The memory in use, in KiB."""
     gc.collect()
@@ -25,7 +56,7 @@ def resident():
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-def drawn():
+def drawn(frame=frame):
     for number, _ in enumerate(rf.animation(frame, frames=FRAMES, fps=100).frames(progress=False), 1):
         yield number
 
@@ -53,7 +84,13 @@ def run():
     print("| KiB in use after frames | " + " | ".join(map(str, marks)) + " |")
     print("| --- |" + " ---: |" * len(marks))
     grown = []
-    for name, work in (("drawn", drawn), ("encoded as GIF", encoded)):
+    kinds = {
+        "drawn": drawn,
+        "encoded as GIF": encoded,
+        "drawn, with a mesh and a picture from arrays": lambda: drawn(of_a_mesh),
+        "drawn, with others in each frame": lambda: drawn(of_meshes),
+    }
+    for name, work in kinds.items():
         used = [resident() for number in work() if number in marks]
         grown.append(used[-1] - used[1])
         print(f"| {name} | " + " | ".join(f"{kib:,}" for kib in used) + " |")

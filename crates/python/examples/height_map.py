@@ -1,4 +1,4 @@
-"""A height map from an array: two triangles for each cell, coloured by height."""
+"""A height map from an array: a grid of quadrilaterals, coloured by height."""
 
 import sys
 
@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 import rayfold as rf
 
-SIDE = 48
-# Heights up to which a colour is used, and the colour.
-BANDS = [(0.04, "#d8c890"), (0.3, "#5a8f3c"), (0.55, "#7a6a50"), (0.75, "#8c8880"), (9.0, "#f4f6f8")]
+SIDE = 240
+# Heights, and the colours there, as levels from 0 to 255.
+HEIGHTS = [0.0, 0.04, 0.12, 0.32, 0.5, 0.66, 0.8]
+COLORS = [(216, 200, 144), (216, 200, 144), (90, 143, 60), (80, 124, 56), (122, 106, 80), (140, 136, 128), (244, 246, 248)]
 
 
 def heights(side: int = SIDE, seed: int = 7) -> NDArray[np.float64]:
@@ -25,21 +26,25 @@ def heights(side: int = SIDE, seed: int = 7) -> NDArray[np.float64]:
     return mountains
 
 
+def grid(height: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The vertices of a height map, and its cells as the indices of their corners, counterclockwise seen from above."""
+    rows, columns = height.shape
+    x, z = np.meshgrid(np.linspace(-1.4, 1.4, rows), np.linspace(-1.4, 1.4, columns), indexing="ij")
+    vertices = np.column_stack([x.ravel(), height.ravel(), z.ravel()])
+    row, column = np.indices((rows - 1, columns - 1)).reshape(2, -1)
+    first: NDArray[np.int64] = row * columns + column
+    faces = np.column_stack([first, first + 1, first + columns + 1, first + columns])
+    return vertices, faces
+
+
 def terrain(height: NDArray[np.float64], samples: int = 16) -> rf.Scene:
     scene = rf.Scene(400, 260, samples=samples, background=("#dfe9f2", "#6fa0d8"))
     scene.look(eye=(1.9, 1.5, 2.6), at=(0, 0.1, 0), fov=36)
     scene.ilight("#fff0d8", (-1, -0.9, -0.35), angle=1)
     scene.plane((0, 0.02, 0), (0, 1, 0), diffuse="#2a5a88", ambient="#0a1826", mirror=0.25)
-    surfaces = [rf.Material(diffuse=color, ambient=0.04) for _, color in BANDS]
-    rows, columns = height.shape
-    x, z = np.linspace(-1.4, 1.4, rows), np.linspace(-1.4, 1.4, columns)
-    for i in range(rows - 1):
-        for j in range(columns - 1):
-            corners = [(x[i + k], height[i + k, j + m], z[j + m]) for k, m in [(0, 0), (0, 1), (1, 1), (1, 0)]]
-            for u, v, w in [corners[:3], [corners[0], *corners[2:]]]:
-                middle = (u[1] + v[1] + w[1]) / 3
-                band = next(k for k, (top, _) in enumerate(BANDS) if middle < top)
-                scene.triangle(u, v, w, surfaces[band])
+    vertices, faces = grid(height)
+    channels = [np.interp(height.ravel(), HEIGHTS, [color[k] / 255 for color in COLORS]) for k in range(3)]
+    scene.mesh(vertices, faces, colors=np.column_stack(channels), smooth=30)
     return scene
 
 

@@ -24,6 +24,7 @@ use rayfold_pipeline::store::S3Store;
 use rayfold_scene::Container;
 
 use crate::error::{guarded, os_error, scene_error};
+use crate::given::Given;
 use crate::place::quoted;
 
 /// The time between two looks for Ctrl-C.
@@ -58,6 +59,7 @@ pub(crate) fn submit<'py>(
     place: &str,
     scripts: Vec<(String, String)>,
     files: Vec<(String, PathBuf)>,
+    given: Vec<Given>,
     settings: String,
     path: Option<PathBuf>,
     delete: bool,
@@ -72,7 +74,8 @@ pub(crate) fn submit<'py>(
     let scripts: Vec<_> = scripts.collect::<Result<_, rayfold_pipeline::Error>>().map_err(value_error)?;
     let submission =
         Submission::new(animation.clone(), scripts, File::of_text(settings)).map_err(value_error)?;
-    let submission = submission.with_files(py.detach(|| read(files))?).map_err(|error| match error {
+    let files = py.detach(|| read(files, &given))?;
+    let submission = submission.with_files(files).map_err(|error| match error {
         Error::Store(error) => value_error(error),
         other => PyOSError::new_err(other.to_string()),
     })?;
@@ -82,12 +85,14 @@ pub(crate) fn submit<'py>(
     Ok(gif.map(|gif| PyBytes::new(py, &gif)))
 }
 
-/// Reads the files for their digests.
-fn read(files: Vec<(String, PathBuf)>) -> PyResult<Vec<(String, File)>> {
+/// Reads the files for their digests, those on disk and those in memory.
+fn read(files: Vec<(String, PathBuf)>, given: &[Given]) -> PyResult<Vec<(String, File)>> {
     let file = |(name, path)| Ok((name, File::new(Content::Path(path))?));
+    let in_memory = given.iter().map(|given| Ok((given.name_of().to_owned(), given.file()?)));
     files
         .into_iter()
         .map(file)
+        .chain(in_memory)
         .collect::<Result<_, Error>>()
         .map_err(|error| PyOSError::new_err(error.to_string()))
 }

@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use rayfold_scene::{Clause, Curve, Field, Form, Kind, Mode, Names, Quotes, Subject, Unit, Values};
+use rayfold_scene::{Clause, Command, Curve, Field, Form, Kind, Mode, Names, Quotes, Subject, Unit, Values};
 
 use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, aligns, is_color};
 
@@ -57,7 +57,10 @@ pub(crate) fn method_doc(method: &Signature) -> String {
             Role::Name(Subject::Defines(names)) => format!("the name of the new {}", names.noun()),
             Role::Name(Subject::Refers(names)) => format!("the name of a {}", names.noun()),
             Role::Name(Subject::Quotes(Quotes::File)) => {
-                "the name of a file in the script's folder; of a scene that has none, in the current folder".to_owned()
+                let file = "the name of a file in the script's folder; of a scene that has none, in the current folder";
+                let array = "; or an array of pixels, of height x width, with 1, 3 or 4 channels: `uint8` or `uint16` are \
+                             levels, floats are light from 0";
+                format!("{file}{}", if takes_pixels(form) { array } else { "" })
             }
             Role::Name(Subject::Quotes(Quotes::Words)) => {
                 "the words; a line feed begins a line".to_owned()
@@ -98,6 +101,9 @@ pub(crate) fn method_doc(method: &Signature) -> String {
         let _ =
             writeln!(text, "{}\n    the clauses of a material, as those of `Material`.", names.join(", "));
     }
+    if method.command == Command::Mesh {
+        text += OF_ARRAYS_DOC;
+    }
     if let Some(word) = form.word {
         let _ = writeln!(text, "\n`{}({word:?})` in place of all arguments.", method.method);
     }
@@ -118,7 +124,8 @@ pub(crate) fn material_doc() -> String {
         let _ = writeln!(text, "{} : {}, optional", keyword.name, keyword_type(keyword));
         let _ = writeln!(text, "    {}", keyword.clause.summary());
         if keyword.clause == Clause::Image {
-            text += "    the name of the file, then \"uv\", \"ball\", or \"flat\", its width and the axes along which it goes right \
+            text += "    the name of the file, or an array of levels (height x width, with 1, 3 or 4 channels of `uint8`, \
+                     `uint16` or floats from 0 to 1), then \"uv\", \"ball\", or \"flat\", its width and the axes along which it goes right \
                      and up.\n";
             continue;
         }
@@ -155,6 +162,35 @@ pub(crate) fn keys_doc() -> String {
     )
 }
 
+/// The documentation of a mesh from arrays.
+const OF_ARRAYS_DOC: &str = "
+From arrays: `mesh(vertices, faces, normals, colors, uv, material, smooth, flat)`, of which the first two are needed. NumPy's \
+arrays are taken, and what NumPy makes arrays of, such as lists of rows. The scene names them as a file, which is written \
+where the script is saved.
+
+Parameters
+----------
+vertices : Array
+    (n, 3) places, of `float32`, `float64` or integers.
+faces : Array
+    (m, 3) triangles or (m, 4) convex quadrilaterals: the indices of their vertices from 0, counterclockwise seen from
+    outside.
+normals : Array, optional
+    (n, 3) directions at the vertices, with which the mesh looks smooth.
+colors : Array, optional
+    (n, 3) or opaque (n, 4) levels of the vertices: `uint8` from 0 to 255, `uint16` or floats from 0 to 1. Under \
+`tone(\"srgb\")` they are decoded, as `\"#c04020\"` is.
+uv : Array, optional
+    (n, 2) texture coordinates of the vertices. (0, 0) is the lower left corner of a picture.
+material, smooth, flat and the clauses
+    as those of a file.
+";
+
+/// Returns whether the file of a command may be an array of pixels.
+fn takes_pixels(form: &Form) -> bool {
+    form.subject == Some(Subject::Quotes(Quotes::File)) && form.surface().is_none()
+}
+
 fn field_doc(field: &Field) -> String {
     let unit = match (field.kind, field.kind.unit()) {
         (Kind::Word, _) | (_, Unit::One) => String::new(),
@@ -170,10 +206,33 @@ fn field_doc(field: &Field) -> String {
 }
 
 fn write_method(text: &mut String, method: &Signature) {
+    if method.command == Command::Mesh {
+        text.push_str("    @overload\n");
+        write_signature(text, method, &[]);
+        text.push_str("    @overload\n");
+        write_signature(text, method, &OF_ARRAYS);
+    } else {
+        write_signature(text, method, &[]);
+    }
+}
+
+/// The parameters of a mesh from arrays, in place of its file.
+const OF_ARRAYS: [&str; 5] = [
+    "vertices: Array",
+    "faces: Array",
+    "normals: Array | None = None",
+    "colors: Array | None = None",
+    "uv: Array | None = None",
+];
+
+/// Writes a signature with its documentation. `others` are parameters in place of the file.
+fn write_signature(text: &mut String, method: &Signature, others: &[&str]) {
     let form = method.command.form();
     let mut parameters = vec!["self".to_owned()];
+    parameters.extend(others.iter().map(|parameter| (*parameter).to_owned()));
     let mut is_optional = false;
-    for parameter in &method.parameters {
+    let replaced = usize::from(!others.is_empty());
+    for parameter in &method.parameters[replaced..] {
         let type_name = parameter_type(form, parameter);
         let type_name = match form.word.filter(|_| parameters.len() == 1) {
             Some(word) => format!("{type_name} | Literal[\"{word}\"]"),
@@ -209,6 +268,7 @@ fn write_method(text: &mut String, method: &Signature) {
 
 fn parameter_type(form: &Form, parameter: &Parameter) -> String {
     match parameter.role {
+        Role::Name(_) if takes_pixels(form) => "str | Pixels".to_owned(),
         Role::Name(_) => "str".to_owned(),
         Role::Field(i) => field_type(form, i),
         Role::Material(_) => "Material | str".to_owned(),
@@ -239,9 +299,9 @@ fn field_type(form: &Form, place: usize) -> String {
 fn keyword_type(keyword: &Keyword) -> String {
     let form: &Form = Clause::form(keyword.clause);
     if keyword.clause == Clause::Image {
-        let flat = "tuple[str, Literal[\"flat\"], Number";
+        let flat = "tuple[str | Pixels, Literal[\"flat\"], Number";
         return format!(
-            "tuple[str, Literal[\"uv\", \"ball\"]] | {flat}] | {flat}, Literal[\"xy\", \"xz\", \"zy\"]]"
+            "tuple[str | Pixels, Literal[\"uv\", \"ball\"]] | {flat}] | {flat}, Literal[\"xy\", \"xz\", \"zy\"]]"
         );
     }
     let mut types: Vec<String> = (0..form.fields.len()).map(|i| field_type(form, i)).collect();

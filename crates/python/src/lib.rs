@@ -11,6 +11,7 @@
 //! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. No panic leaves the module as one. The
 //! library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
 
+mod arrays;
 mod bucket;
 mod curve;
 mod describe;
@@ -18,6 +19,7 @@ mod drawing;
 mod encoder;
 mod error;
 mod folder;
+mod given;
 mod material;
 mod place;
 mod script;
@@ -26,9 +28,10 @@ mod value;
 
 use pyo3::prelude::*;
 use pyo3::types::PyModule;
+use rayfold_scene::assets::limits as bounds;
 
-/// A method of `Scene`: its name, its documentation, its parameters, and whether it takes the clauses of a material.
-type Method = (String, String, Vec<Parameter>, bool);
+/// A method of `Scene`: its name, its parameters, and whether it takes the clauses of a material.
+type Method = (String, Vec<Parameter>, bool);
 /// The name of a parameter, whether it is required, and the count of its numbers.
 type Parameter = (String, bool, usize);
 
@@ -49,9 +52,21 @@ fn methods() -> Vec<Method> {
     };
     let method = |method: &signature::Signature| {
         let parameters = method.parameters.iter().map(|p| parameter(method, p)).collect();
-        (method.method.clone(), describe::method_doc(method), parameters, method.has_clauses())
+        (method.method.clone(), parameters, method.has_clauses())
     };
     signature::METHODS.iter().map(method).collect()
+}
+
+/// The documentation of the method with this index.
+#[pyfunction]
+fn method_doc(index: usize) -> String {
+    describe::method_doc(&signature::METHODS[index])
+}
+
+/// The most triangles of a mesh, pixels of a picture, and bytes of a file.
+#[pyfunction]
+fn limits() -> (usize, u64, u64) {
+    (bounds::TRIANGLES, bounds::PIXELS, bounds::FILE_BYTES)
 }
 
 /// The keywords of a material, each with the entries of its value.
@@ -82,12 +97,18 @@ fn _rayfold(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<drawing::Image>()?;
     module.add_class::<encoder::Encoder>()?;
     module.add_class::<error::Diagnostic>()?;
+    module.add_class::<given::Given>()?;
     module.add_class::<material::Material>()?;
     module.add_class::<script::Script>()?;
     module.add_function(wrap_pyfunction!(methods, module)?)?;
+    module.add_function(wrap_pyfunction!(method_doc, module)?)?;
+    module.add_function(wrap_pyfunction!(limits, module)?)?;
     module.add_function(wrap_pyfunction!(clauses, module)?)?;
     module.add_function(wrap_pyfunction!(settings, module)?)?;
     module.add_function(wrap_pyfunction!(stub, module)?)?;
+    module.add_function(wrap_pyfunction!(arrays::mesh_file, module)?)?;
+    module.add_function(wrap_pyfunction!(arrays::levels_file, module)?)?;
+    module.add_function(wrap_pyfunction!(arrays::light_file, module)?)?;
     module.add_function(wrap_pyfunction!(bucket::submit, module)?)?;
     module.add_function(wrap_pyfunction!(curve::keys, module)?)?;
     module.add_function(wrap_pyfunction!(encoder::write_file, module)?)?;

@@ -8,6 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use rayfold_scene::{Clause, is_name, quoted_word};
 
+use crate::arrays::picture_of;
+use crate::given::Given;
 use crate::place::{Place, color_text, flag_of, quoted, shown};
 use crate::signature::{CLAUSES, Keyword};
 use crate::value::{Numbers, check_alone, refused};
@@ -32,6 +34,8 @@ struct Clauses {
     other: Option<(usize, Other)>,
     /// Whether the material may be the other one of a pattern.
     is_plain: bool,
+    /// The picture that was handed over as an array.
+    given: Option<Given>,
 }
 
 /// The other material of a pattern.
@@ -43,7 +47,14 @@ enum Other {
 }
 
 /// A keyword of a call, by its index in [`CLAUSES`], and its value.
-pub(crate) type Given<'py> = (usize, Bound<'py, PyAny>);
+pub(crate) type Value<'py> = (usize, Bound<'py, PyAny>);
+
+impl Surface {
+    /// Returns the picture of its pattern, if it was handed over. The other material of a pattern has none.
+    pub(crate) fn given(&self) -> Option<&Given> {
+        self.clauses.given.as_ref()
+    }
+}
 
 #[pymethods]
 impl Material {
@@ -123,7 +134,7 @@ impl Materials {
             *line += name;
             return Ok(());
         }
-        let Clauses { text, other, is_plain } = &surface.clauses;
+        let Clauses { text, other, is_plain, .. } = &surface.clauses;
         let whole;
         let text = match other {
             None if text.is_empty() => " diffuse 0 0 0",
@@ -228,7 +239,7 @@ impl Materials {
 pub(crate) fn surface_of(
     method: &str,
     name: Option<String>,
-    given: Vec<Given<'_>>,
+    given: Vec<Value<'_>>,
 ) -> PyResult<Arc<Surface>> {
     Ok(Arc::new(Surface { name, clauses: read_clauses(method, given)? }))
 }
@@ -239,7 +250,7 @@ pub(crate) fn surface_of(
 /// Fails if `color` is none.
 pub(crate) fn surface_of_color(color: &Bound<'_, PyString>, place: Place<'_>) -> PyResult<Arc<Surface>> {
     let color = color_text(color, place)?;
-    let clauses = Clauses { text: format!(" diffuse {color}"), other: None, is_plain: true };
+    let clauses = Clauses { text: format!(" diffuse {color}"), other: None, is_plain: true, given: None };
     Ok(Arc::new(Surface { name: None, clauses }))
 }
 
@@ -276,9 +287,9 @@ pub(crate) fn name_from(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<
     )))
 }
 
-fn read_clauses(method: &str, mut given: Vec<Given<'_>>) -> PyResult<Clauses> {
+fn read_clauses(method: &str, mut given: Vec<Value<'_>>) -> PyResult<Clauses> {
     given.sort_unstable_by_key(|(index, _)| *index);
-    let mut clauses = Clauses { text: String::with_capacity(64), other: None, is_plain: true };
+    let mut clauses = Clauses { text: String::with_capacity(64), other: None, is_plain: true, given: None };
     let mut pattern: Option<&Keyword> = None;
     for (index, value) in &given {
         let keyword = &CLAUSES[*index];
@@ -293,20 +304,21 @@ fn read_clauses(method: &str, mut given: Vec<Given<'_>>) -> PyResult<Clauses> {
             pattern = Some(keyword);
         }
         clauses.is_plain &= matches!(keyword.clause, Clause::Ambient | Clause::Diffuse | Clause::Mirror);
-        if let Some(other) = read_clause(method, keyword, value, &mut clauses.text)? {
+        if let Some(other) = read_clause(method, keyword, value, &mut clauses)? {
             clauses.other = Some((clauses.text.len(), other));
         }
     }
     Ok(clauses)
 }
 
-/// Adds a clause to `text`. Returns the other material of a pattern.
+/// Adds a clause to the text of others. Returns the other material of a pattern.
 fn read_clause(
     method: &str,
     keyword: &'static Keyword,
     value: &Bound<'_, PyAny>,
-    text: &mut String,
+    clauses: &mut Clauses,
 ) -> PyResult<Option<Other>> {
+    let Clauses { text, given, .. } = clauses;
     let form = keyword.clause.form();
     let place = Place { method, parameter: &keyword.name };
     // One without numbers is there or left out.
@@ -322,7 +334,7 @@ fn read_clause(
         None => read_other(value, place, &keyword.name).map(|found| other = Some(found)),
     };
     match keyword.entries.len() {
-        _ if keyword.clause == Clause::Image => read_image(value, text, &mut numbers, place)?,
+        _ if keyword.clause == Clause::Image => *given = read_image(value, text, &mut numbers, place)?,
         0 => {}
         1 => entry(0, value)?,
         count => {
@@ -346,15 +358,17 @@ fn read_clause(
     Ok(other)
 }
 
-/// Adds a picture to `text`: its file, the way in which it lies, and the width and axes of a flat one.
+/// Adds a picture to `text`: its file, the way in which it lies, and the width and axes of a flat one. Returns a file that was
+/// made of an array.
 fn read_image(
     value: &Bound<'_, PyAny>,
     text: &mut String,
     numbers: &mut Numbers,
     place: Place<'_>,
-) -> PyResult<()> {
+) -> PyResult<Option<Given>> {
     let wrong = || {
-        let forms = "(file, \"uv\"), (file, \"ball\") or (file, \"flat\", size, \"xy\", \"xz\" or \"zy\")";
+        let forms = "(file, \"uv\"), (file, \"ball\") or (file, \"flat\", size, \"xy\", \"xz\" or \"zy\"), the file by its \
+                     name or as an array";
         PyTypeError::new_err(format!("{place} takes a tuple {forms}, not {}", shown(value)))
     };
     let tuple = value.cast::<PyTuple>().map_err(|_| wrong())?;
@@ -362,13 +376,20 @@ fn read_image(
         let item = tuple.get_item(i).ok()?;
         Some(item.cast::<PyString>().ok()?.to_string_lossy().into_owned())
     };
-    let (Some(file), Some(map)) = (word(0), word(1)) else { return Err(wrong()) };
+    let Some(map) = word(1) else { return Err(wrong()) };
+    let (file, given) = match word(0) {
+        Some(file) => (file, None),
+        None => {
+            let given = picture_of(&tuple.get_item(0)?, place, "picture")?.ok_or_else(wrong)?;
+            (given.name_of().to_owned(), Some(given))
+        }
+    };
     text.push(' ');
     *text += &quoted_word(&file);
     text.push(' ');
     *text += &map;
     match (map.as_str(), tuple.len()) {
-        ("uv" | "ball", 2) => Ok(()),
+        ("uv" | "ball", 2) => Ok(given),
         ("flat", 3 | 4) => {
             let form = Clause::Image.form();
             numbers.field(text, &tuple.get_item(2)?, form, &form.fields[0], place)?;
@@ -378,7 +399,7 @@ fn read_image(
                 text.push(' ');
                 *text += &axes;
             }
-            Ok(())
+            Ok(given)
         }
         _ => Err(wrong()),
     }

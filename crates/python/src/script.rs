@@ -13,15 +13,17 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use rayfold_files::library_beside;
-use rayfold_scene::assets::file_name;
+use rayfold_scene::assets::{file_name, limits::FILES};
 use rayfold_scene::{
     Command, Diagnostic as SceneDiagnostic, Form, Limits, Names, Quotes, Script as Parsed, Subject,
     parse_with_files, quoted_word,
 };
 
+use crate::arrays::picture_of;
 use crate::error::{Diagnostic, guarded, scene_error};
+use crate::given::{Given as Handed, Givens, library_with_given};
 use crate::material::{
-    Given as Clause, Material, Materials, clause_of, name_from, surface_of, surface_of_color,
+    Material, Materials, Value as Clause, clause_of, name_from, surface_of, surface_of_color,
 };
 use crate::place::{Place, flag_of, quoted, shown};
 use crate::signature::{METHODS, Role, Signature, aligns};
@@ -44,6 +46,8 @@ pub(crate) struct Script {
     is_open: bool,
     /// The first byte of the `Trace` that ends a text that was parsed. The next line takes its place.
     last_trace: Option<usize>,
+    /// The files that were handed over as arrays, among those that the script names.
+    given: Givens,
     parsed: Option<Arc<Parsed>>,
     /// The lines before they are added; kept for their memory.
     line: String,
@@ -60,6 +64,7 @@ impl Script {
             materials: Materials::default(),
             is_open: true,
             last_trace: None,
+            given: Givens::new(),
             parsed: None,
             line: String::new(),
             definitions: String::new(),
@@ -90,10 +95,11 @@ impl Script {
         }
     }
 
-    /// Parses a text, with the models of the script's folder.
+    /// Parses a text, with the files of the script's folder and those that were handed over.
     fn parse(&self, py: Python<'_>, text: &str) -> PyResult<rayfold_scene::Parsed> {
         let name = &self.name;
-        let library = library_beside(Path::new(name));
+        let of_script = if self.given.is_empty() { library_beside } else { library_with_given };
+        let library = of_script(Path::new(name));
         py.detach(|| guarded(|| parse_with_files(name, text.as_bytes(), &Limits::default(), &library)))
     }
 
@@ -175,6 +181,14 @@ impl Script {
         for (i, parameter) in method.parameters.iter().enumerate() {
             let place = Place { method: &method.method, parameter: &parameter.name };
             match (parameter.role, &given.values[i]) {
+                (Role::Name(_), Some(value))
+                    if method.command == Command::SkyPicture
+                        && !value.is_instance_of::<PyString>()
+                        && let Some(file) = picture_of(value, place, "sky")? =>
+                {
+                    line.push(' ');
+                    line += &self.take(&file, place)?;
+                }
                 (Role::Name(kind), Some(value)) => {
                     let name = self.name_of(kind, value, place)?;
                     line.push(' ');
@@ -233,8 +247,11 @@ impl Script {
     ///
     /// # Errors
     /// Fails for a name that is not valid, is there already, or is not there yet.
-    fn name_of(&self, kind: Subject, value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
+    fn name_of(&mut self, kind: Subject, value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
         if matches!(kind, Subject::Quotes(Quotes::File)) {
+            if let Ok(file) = value.cast::<Handed>() {
+                return self.take(file.get(), place);
+            }
             let name = value
                 .extract::<String>()
                 .map_err(|_| PyTypeError::new_err(format!("{place} is a str, not {}", shown(value))))?;
@@ -270,6 +287,21 @@ impl Script {
             }
             _ => Ok(name),
         }
+    }
+
+    /// Takes a file that was handed over, and returns its name as a script has it.
+    ///
+    /// # Errors
+    /// Fails if a script may have no more.
+    fn take(&mut self, file: &Handed, place: Place<'_>) -> PyResult<String> {
+        let name = file.name_of();
+        if self.given.len() >= FILES && !self.given.contains_key(name) {
+            return Err(PyValueError::new_err(format!(
+                "{place}: a scene has at most {FILES} meshes and pictures from arrays: join the meshes that have one material"
+            )));
+        }
+        self.given.insert(name.to_owned(), file.clone());
+        Ok(quoted_word(name))
     }
 
     /// Adds the name of an object's material to `line`. The material is defined if it is new.
@@ -319,6 +351,9 @@ impl Script {
                 }
             }
         };
+        if let Some(file) = surface.given() {
+            self.take(file, Place { method, parameter: "image" })?;
+        }
         self.materials.define(method, surface, line, &mut self.definitions)
     }
 }
@@ -424,6 +459,7 @@ impl Script {
     fn _read(&mut self, py: Python<'_>, text: &str, name: &str) -> PyResult<()> {
         let mut read = Self::empty(name);
         text.clone_into(&mut read.text);
+        read.given = Handed::in_text(text, Path::new(name));
         read.is_open = false;
         read.parsed(py)?;
         let mut offset = 0;
@@ -446,11 +482,20 @@ impl Script {
         Ok(())
     }
 
-    /// Returns the folder of the script, and the names of the files in it that the script names.
-    fn _files(&self, py: Python<'_>) -> PyResult<(String, Vec<String>)> {
+    /// Returns the folder of the script, the names of the files in it that the script names, and those of its files that were
+    /// handed over.
+    fn _files(&self, py: Python<'_>) -> PyResult<(String, Vec<String>, Vec<Handed>)> {
         let folder = Path::new(&self.name).parent().unwrap_or(Path::new("")).display().to_string();
-        let files = if self.text.contains('"') { self.parse(py, &self.whole())?.files } else { Vec::new() };
-        Ok((folder, files))
+        let named = if self.text.contains('"') { self.parse(py, &self.whole())?.files } else { Vec::new() };
+        let (given, files): (Vec<_>, Vec<_>) =
+            named.into_iter().partition(|name| self.given.contains_key(name));
+        Ok((folder, files, given.iter().filter_map(|name| self.given.get(name).cloned()).collect()))
+    }
+
+    /// Returns the files that were handed over.
+    #[getter]
+    fn _given(&self) -> Vec<Handed> {
+        self.given.values().cloned().collect()
     }
 
     fn _assign(&mut self, other: &Self) {
@@ -533,6 +578,9 @@ impl Script {
         let name = self.name_of(Subject::Defines(Names::Materials), name, place)?;
         let surface = surface_of("material", Some(name), given.clauses)?;
         let mut name = String::new();
+        if let Some(file) = surface.given() {
+            self.take(file, Place { method: "material", parameter: "image" })?;
+        }
         let defined = self.materials.define("material", &surface, &mut name, &mut self.definitions);
         self.commit_definitions();
         self.is_open = true;

@@ -23,6 +23,10 @@ Vector: TypeAlias = Sequence[Number] | NDArray[Any]
 #: Red, green and blue, each from 0 to 1; one number for a grey; or a text such as `"#c04020"`.
 FixedColor: TypeAlias = str | FixedNumber | FixedVector
 Color: TypeAlias = str | Number | Vector
+#: Rows of numbers: an array of NumPy, or what NumPy makes one of.
+Array: TypeAlias = NDArray[Any] | memoryview | Sequence[Sequence[FixedNumber] | NDArray[Any]]
+#: Pixels from the top: height x width, or height x width x 1, 3 or 4.
+Pixels: TypeAlias = NDArray[Any] | memoryview | Sequence[Sequence[FixedNumber | Sequence[FixedNumber]]]
 # modes
 
 class Diagnostic:

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rayfold as rf
@@ -85,6 +86,24 @@ def test_the_files_that_scenes_name_go_with_them(bucket, tmp_path, monkeypatch):
     assert moving.submit(f"{bucket}/model", progress=False) == moving.gif(progress=False)
     (tmp_path / "corner.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
     assert moving.submit(f"{bucket}/model", progress=False) == moving.gif(progress=False)
+
+
+def test_meshes_and_pictures_from_arrays_go_with_them(bucket, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    pixels = np.random.default_rng(2).integers(0, 256, (4, 8, 3), np.uint8)
+
+    def of_arrays(t):
+        scene = frame(t)
+        scene.mesh([(0, 0, 0), (1, 0, 0), (0, 1 + t, 0)], [(0, 1, 2)], diffuse="#c04020")
+        scene.sphere(0.5, (1, 1, 0), diffuse=1, image=(pixels, "ball"))
+        return scene
+
+    moving = rf.animation(of_arrays, frames=3, fps=20)
+    assert moving.submit(f"{bucket}/arrays", progress=False) == moving.gif(progress=False)
+    assert list(tmp_path.iterdir()) == []
+    # What is saved is what was sent.
+    moving.save("arrays/")
+    assert rf.load("arrays").submit(f"{bucket}/arrays", progress=False) == moving.gif(progress=False)
 
 
 def test_the_command_goes_on_with_what_python_has_sent(bucket, rayfold, tmp_path):

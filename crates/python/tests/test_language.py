@@ -10,7 +10,10 @@ import pytest
 import rayfold as rf
 from rayfold import _rayfold
 
-METHODS = {name: (doc, parameters, clauses) for name, doc, parameters, clauses in _rayfold.methods()}
+METHODS = {
+    name: (_rayfold.method_doc(index), parameters, clauses)
+    for index, (name, parameters, clauses) in enumerate(_rayfold.methods())
+}
 CLAUSES = dict(_rayfold.clauses())
 
 
@@ -34,7 +37,7 @@ def arguments(parameters, doc, next_number):
             values[name] = rf.Material(diffuse=0.5)
         elif words := re.findall(r'"(.*?)"', kind):
             values[name] = words[-1]
-        elif kind == "str":
+        elif kind.split(" | ")[0] == "str":
             values[name] = "thing"
         elif kind == "bool":
             values[name] = False

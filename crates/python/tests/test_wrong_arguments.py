@@ -103,6 +103,29 @@ WRONG = {
     "array of objects": lambda: np.array([None, None, None]),
     "array of complex": lambda: np.array([1j, 0, 0]),
     "scalar array": lambda: np.array(np.nan),
+    "array of ones": lambda: np.ones(3, np.int64),
+    "array of bools": lambda: np.ones((3, 3), bool),
+    "array of bytes": lambda: np.zeros((2, 2, 3), np.uint8),
+    "array of levels": lambda: np.full((4, 4), 0.5),
+    "array of two channels": lambda: np.zeros((2, 2, 2), np.uint8),
+    "array of four dimensions": lambda: np.zeros((1, 2, 2, 3), np.uint8),
+    "array of negatives": lambda: np.full((3, 3), -1),
+    "array of large": lambda: np.full((3, 3), 2**62),
+    "array of huge rows": lambda: np.broadcast_to(0.5, (10**9, 3)),
+    "array of huge pixels": lambda: np.broadcast_to(np.uint8(1), (10**5, 10**5)),
+    "array of no rows": lambda: np.zeros((0, 3)),
+    "array of no columns": lambda: np.zeros((3, 0)),
+    "array of gaps": lambda: np.ma.masked_array(np.ones((3, 3)), np.eye(3)),
+    "array of fields": lambda: np.zeros(3, [("x", "f4"), ("y", "f4")]),
+    "array of dates": lambda: np.zeros((3, 3), "datetime64[s]"),
+    "array of rows of objects": lambda: np.array([[1, None, 2]] * 3, object),
+    "array of big endian nans": lambda: np.full((3, 3), np.nan, ">f8"),
+    "array of strides": lambda: np.ones((9, 9))[::3, ::3],
+    "read only": lambda: np.frombuffer(bytes(72)).reshape(3, 3),
+    "ragged": lambda: [(1, 2, 3), (1, 2), (1,)],
+    "rows of texts": lambda: [("a", "b", "c")] * 3,
+    "rows of nones": lambda: [(None, None, None)] * 3,
+    "rows of hostiles": lambda: [(Hostile(), 0, 0)] * 3,
     "date": lambda: datetime.date(2026, 1, 1),
     "date of numpy": lambda: np.datetime64("2026-01-01"),
     "function": lambda: len,
@@ -216,6 +239,62 @@ def test_wrong_values_of_clauses(name):
                 # A name that is not there yet is refused by the scene, which an object adds it to.
                 refused = check_answer(action, "", name, f"{call} {about}")
                 check_scene(scene, before, refused, about + "(" * ("curve" in kind))
+
+
+#: A mesh of arrays that are right.
+MESH = {
+    "vertices": np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)]),
+    "faces": np.array([(0, 1, 2)]),
+    "normals": np.ones((3, 3)),
+    "colors": np.ones((3, 3)),
+    "uv": np.zeros((3, 2)),
+}
+
+
+@pytest.mark.parametrize("parameter", MESH)
+def test_wrong_arrays_of_a_mesh(parameter):
+    for (kind, make), in_order in itertools.product(WRONG.items(), (False, True)):
+        scene = rf.Scene(8, 6)
+        before = str(scene)
+        given = {**MESH, parameter: make()}
+        about = f"mesh({parameter}={kind})"
+        if in_order and parameter == "vertices" and (given[parameter] is None or isinstance(given[parameter], (str, bytes))):
+            # That is a file.
+            continue
+        action = (lambda: scene.mesh(*given.values())) if in_order else (lambda: scene.mesh(**given))
+        refused = check_answer(action, "mesh", parameter, about)
+        check_scene(scene, before, refused, about.replace("(", " "))
+
+
+def test_wrong_pictures():
+    for (kind, make), map in itertools.product(WRONG.items(), ("ball", "flat")):
+        scene = rf.Scene(8, 6)
+        before = str(scene)
+        image = (make(), map) if map == "ball" else (make(), map, 1.5, "xz")
+        about = f"image={kind}, {map}"
+        refused = check_answer(lambda: scene.sphere(1, (0, 0, -5), image=image, diffuse=1), "sphere", "image", about)
+        check_scene(scene, before, refused, about)
+
+
+def test_random_combinations_of_wrong_arrays():
+    from_seed = seed()
+    dice = random.Random(from_seed)
+    kinds = list(WRONG.items())
+    for k in range(2000):
+        scene = rf.Scene(8, 6)
+        before = str(scene)
+        given = dict(MESH)
+        for parameter in dice.sample(list(MESH), dice.randint(1, 3)):
+            given[parameter] = dice.choice(kinds)[1]()
+        about = f"RAYFOLD_SEED={from_seed}, call {k}"
+        try:
+            scene.mesh(**given)
+        except (TypeError, ValueError, ZeroDivisionError):
+            assert str(scene) == before, about
+        except BaseException as error:
+            pytest.fail(f"{about}: {type(error).__name__}: {error}")
+        else:
+            assert not [d for d in scene.check() if d.severity == "error"], about
 
 
 def film():

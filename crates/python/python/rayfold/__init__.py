@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from . import _arguments, _rayfold
 from ._animation import Animation, animation, gif, load
 from ._errors import SceneError, SceneWarning
-from ._picture import Picture
 from ._rayfold import Curve, Diagnostic, Material, __version__
 from ._scene import Scene, parse
 
@@ -39,6 +38,20 @@ __all__ = [
 
 
 Material.__doc__ = _rayfold.material_doc
+
+
+def __getattr__(name):
+    if name == "Picture":
+        # It imports NumPy, which takes longer than all else.
+        from ._picture import Picture
+
+        globals()[name] = Picture
+        return Picture
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})
 
 
 def keys(keys, mode="linear", cycle=False):

@@ -23,6 +23,10 @@ Vector: TypeAlias = Sequence[Number] | NDArray[Any]
 #: Red, green and blue, each from 0 to 1; one number for a grey; or a text such as `"#c04020"`.
 FixedColor: TypeAlias = str | FixedNumber | FixedVector
 Color: TypeAlias = str | Number | Vector
+#: Rows of numbers: an array of NumPy, or what NumPy makes one of.
+Array: TypeAlias = NDArray[Any] | memoryview | Sequence[Sequence[FixedNumber] | NDArray[Any]]
+#: Pixels from the top: height x width, or height x width x 1, 3 or 4.
+Pixels: TypeAlias = NDArray[Any] | memoryview | Sequence[Sequence[FixedNumber | Sequence[FixedNumber]]]
 Mode: TypeAlias = Literal["linear", "smooth", "step", "in", "out", "inout", "back", "elastic", "bounce", "bezier"]
 
 class Diagnostic:
@@ -91,7 +95,7 @@ class Material:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -265,7 +269,7 @@ class Scene:
         """
     def sky_picture(
         self,
-        file: str,
+        file: str | Pixels,
         strength: Number | None = None,
         turn: Number | None = None,
     ) -> None:
@@ -275,8 +279,8 @@ class Scene:
 
         Parameters
         ----------
-        file : str
-            the name of a file in the script's folder; of a scene that has none, in the current folder.
+        file : str | Pixels
+            the name of a file in the script's folder; of a scene that has none, in the current folder; or an array of pixels, of height x width, with 1, 3 or 4 channels: `uint8` or `uint16` are levels, floats are light from 0.
         strength : Number, optional
             the sky's strength (`strength`): number, at least 0; by default 1.
         turn : Number, optional
@@ -383,7 +387,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -419,7 +423,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -456,7 +460,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -491,7 +495,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -527,7 +531,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -565,7 +569,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -606,7 +610,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -649,7 +653,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -691,7 +695,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -713,6 +717,7 @@ class Scene:
         ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
+    @overload
     def mesh(
         self,
         file: str,
@@ -729,7 +734,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -750,6 +755,85 @@ class Scene:
             whether the normals of the file are left out.
         ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
+
+        From arrays: `mesh(vertices, faces, normals, colors, uv, material, smooth, flat)`, of which the first two are needed. NumPy's arrays are taken, and what NumPy makes arrays of, such as lists of rows. The scene names them as a file, which is written where the script is saved.
+
+        Parameters
+        ----------
+        vertices : Array
+            (n, 3) places, of `float32`, `float64` or integers.
+        faces : Array
+            (m, 3) triangles or (m, 4) convex quadrilaterals: the indices of their vertices from 0, counterclockwise seen from
+            outside.
+        normals : Array, optional
+            (n, 3) directions at the vertices, with which the mesh looks smooth.
+        colors : Array, optional
+            (n, 3) or opaque (n, 4) levels of the vertices: `uint8` from 0 to 255, `uint16` or floats from 0 to 1. Under `tone("srgb")` they are decoded, as `"#c04020"` is.
+        uv : Array, optional
+            (n, 2) texture coordinates of the vertices. (0, 0) is the lower left corner of a picture.
+        material, smooth, flat and the clauses
+            as those of a file.
+        """
+    @overload
+    def mesh(
+        self,
+        vertices: Array,
+        faces: Array,
+        normals: Array | None = None,
+        colors: Array | None = None,
+        uv: Array | None = None,
+        material: Material | str | None = None,
+        smooth: FixedNumber | None = None,
+        flat: bool | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
+    ) -> None:
+        """The triangles of a model in a file.
+
+        In a script: `Mesh "FILE" [M] [smooth a or flat]`.
+
+        Parameters
+        ----------
+        file : str
+            the name of a file in the script's folder; of a scene that has none, in the current folder.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. By default that of the file.
+        smooth : FixedNumber, optional
+            faces that meet at less than this angle in degrees, 0 to 180, look smooth.
+        flat : bool, optional
+            whether the normals of the file are left out.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
+            the clauses of a material, as those of `Material`.
+
+        From arrays: `mesh(vertices, faces, normals, colors, uv, material, smooth, flat)`, of which the first two are needed. NumPy's arrays are taken, and what NumPy makes arrays of, such as lists of rows. The scene names them as a file, which is written where the script is saved.
+
+        Parameters
+        ----------
+        vertices : Array
+            (n, 3) places, of `float32`, `float64` or integers.
+        faces : Array
+            (m, 3) triangles or (m, 4) convex quadrilaterals: the indices of their vertices from 0, counterclockwise seen from
+            outside.
+        normals : Array, optional
+            (n, 3) directions at the vertices, with which the mesh looks smooth.
+        colors : Array, optional
+            (n, 3) or opaque (n, 4) levels of the vertices: `uint8` from 0 to 255, `uint16` or floats from 0 to 1. Under `tone("srgb")` they are decoded, as `"#c04020"` is.
+        uv : Array, optional
+            (n, 2) texture coordinates of the vertices. (0, 0) is the lower left corner of a picture.
+        material, smooth, flat and the clauses
+            as those of a file.
         """
     def text(
         self,
@@ -769,7 +853,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
@@ -808,7 +892,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,

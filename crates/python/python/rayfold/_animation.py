@@ -1,17 +1,13 @@
 """Animations: scenes in order, drawn ahead and encoded one by one."""
 
-import base64
 import math
 import os
-import re
 from collections.abc import Sequence
 
 from . import _arguments, _rayfold
-from ._picture import image_of, picture_of
-from ._scene import Scene, copy_files, parse
+from ._scene import Scene, parse, put_files
 
 FORMATS = ("gif", "apng", "webp")
-PATTERN = re.compile(r"%(\d*)d")
 
 
 class Animation:
@@ -51,6 +47,8 @@ class Animation:
         """Draws the frames, ahead within a bound on memory, and yields them in order."""
         progress = _arguments.flag("frames", "progress", progress)
         linear = _arguments.flag("frames", "linear", linear)
+        from ._picture import picture_of
+
         return (picture_of(image, linear) for image in self._drawn(progress, linear))
 
     def gif(self, *, progress=True, exact=False):
@@ -70,7 +68,7 @@ class Animation:
             self._save_scripts(path)
         elif ending in FORMATS:
             self._encode("save", path, ending, progress, exact)
-        elif ending == "png" and len(PATTERN.findall(os.path.basename(path))) == 1:
+        elif ending == "png" and len(_numbers_in(os.path.basename(path))) == 1:
             self._save_pictures(path, progress)
         elif ending == "png":
             raise ValueError(f"save(): path {_arguments.shown(path)} is one file: expected a number in its name, such as frames/%04d.png")
@@ -113,8 +111,9 @@ class Animation:
                 raise ValueError("submit(): there is no file without waiting: expected either path or wait=False")
         scripts, settings = self._folder(has_one_size=True)
         texts = [(name, text) for name, text, _ in scripts]
-        files = {}
-        for folder, names in (named for _, _, named in scripts):
+        files, given = {}, {}
+        for folder, names, in_memory in (named for _, _, named in scripts):
+            given.update({file.name: file for file in in_memory})
             for name in names:
                 file = os.path.join(folder, name)
                 # What a model refers to may be absent.
@@ -122,11 +121,14 @@ class Animation:
                     raise ValueError(f"submit(): {files[name]} and {file} would be one file of the animation: rename one")
         with _Progress(progress) as bar:
             report = bar.at if progress else None
-            return _rayfold.submit(address, texts, list(files.items()), settings, path, delete, wait, report)
+            files = [(name, path) for name, path in files.items() if name not in given]
+            return _rayfold.submit(address, texts, files, list(given.values()), settings, path, delete, wait, report)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         if self._shown is None:
             self._shown = self._encode("gif", None, "gif", True, False)
+        import base64
+
         data = base64.b64encode(self._shown).decode()
         return {"text/html": f'<img src="data:image/gif;base64,{data}">', "text/plain": repr(self)}
 
@@ -257,7 +259,7 @@ class Animation:
         if folder:
             os.makedirs(folder, exist_ok=True)
         name = os.path.basename(path)
-        digits = PATTERN.search(name)
+        [digits] = _numbers_in(name)
         # Frames are written once, also if the animation shows them again on its way back.
         once = Animation(self._scenes, self._count, self.fps, self.loop, False, None)
         once._used, self._used = self._used, True
@@ -301,11 +303,17 @@ class Animation:
             raise FileExistsError(
                 f"{folder} holds other scripts, which would be frames too: {', '.join(sorted(others)[:5])}"
             )
-        for files in dict.fromkeys((own, *names) for _, _, (own, names) in scripts):
-            copy_files(files, folder)
+        put_files((files for _, _, files in scripts), folder)
         for name, text, *_ in scripts:
             _rayfold.write_file(os.path.join(folder, f"{name}.txt"), text.encode())
         _rayfold.write_file(os.path.join(folder, "animation.json"), settings.encode())
+
+
+def _numbers_in(name):
+    """The places for numbers in the name of a file, such as `%04d`."""
+    import re
+
+    return list(re.finditer(r"%(\d*)d", name))
 
 
 class _Progress:
@@ -388,6 +396,8 @@ def gif(images, fps=10, path=None, *, loop=0, exact=False):
     Arrays of height x width x 4 have alpha, of which a GIF shows a pixel or does not: of pixels that are covered in part, a
     pattern is shown. Arrays of height x width are greys. Frames are taken one by one: memory does not grow with their number.
     """
+    from ._picture import image_of
+
     images = _arguments.iterable("gif", "images", images, "a list or an iterator of arrays")
     fps = _arguments.number("gif", "fps", fps)
     path = None if path is None else _arguments.path("gif", "path", path)

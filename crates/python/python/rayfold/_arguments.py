@@ -4,9 +4,8 @@ import math
 import operator
 import os
 import reprlib
+import sys
 from collections.abc import Mapping
-
-import numpy as np
 
 from . import _rayfold
 
@@ -43,8 +42,15 @@ def path(call, name, value):
     return place
 
 
+def is_bool(value):
+    """Whether a value is True or False, of Python or NumPy."""
+    # Who has one of NumPy has imported it.
+    numpy = sys.modules.get("numpy")
+    return isinstance(value, bool) or numpy is not None and isinstance(value, numpy.bool_)
+
+
 def flag(call, name, value):
-    if isinstance(value, (bool, np.bool_)):
+    if is_bool(value):
         return bool(value)
     raise TypeError(f"{call}(): {name} is True or False, not {shown(value)}")
 
@@ -55,7 +61,7 @@ def whole(call, name, value, low, high=2**63 - 1):
         number = operator.index(value)
     except TypeError:
         raise TypeError(f"{call}(): {name} is a whole number from {low}, not {shown(value)}") from None
-    if isinstance(value, (bool, np.bool_)):
+    if is_bool(value):
         raise TypeError(f"{call}(): {name} is a whole number from {low}, not {value}")
     if not low <= number <= high:
         bounds = f"from {low}" if high == 2**63 - 1 else f"from {low} to {high}"

@@ -1,11 +1,8 @@
 """Scenes: a method for each command of the language, made from its table."""
 
-import inspect
 import os
-import shutil
 
 from . import _arguments, _rayfold
-from ._picture import picture_of
 
 METHODS = _rayfold.methods()
 SETTINGS = frozenset(_rayfold.settings())
@@ -48,8 +45,8 @@ class Scene(_rayfold.Script):
         return self.copy()
 
     def __reduce__(self):
-        # Text and name are all that there is.
-        return _read, (str(self), self._name)
+        # Text, name and files in memory are all that there is.
+        return _read, (str(self), self._name, self._given)
 
     def render(self, frame=1, *, linear=False):
         """Draws a frame, counted from 1.
@@ -58,6 +55,8 @@ class Scene(_rayfold.Script):
         rounding, from 0 to 1, as `float32`. A scene with `background("none")` has a fourth channel, alpha; `linear` light is
         premultiplied by it.
         """
+        from ._picture import picture_of
+
         linear = _arguments.flag("render", "linear", linear)
         return picture_of(self._draw("render", frame, linear), linear)
 
@@ -65,8 +64,7 @@ class Scene(_rayfold.Script):
         """Draws a frame and writes it as PNG; or writes the script, for a path that ends in `.txt`."""
         path = _arguments.path("save", "path", path)
         if path.lower().endswith(".txt"):
-            own, names = self._files()
-            copy_files((own, *names), os.path.dirname(path) or ".")
+            put_files([self._files()], os.path.dirname(path) or ".")
             _rayfold.write_file(path, str(self).encode())
         elif path.lower().endswith(".png"):
             _rayfold.write_file(path, self._draw("save", frame).png())
@@ -100,16 +98,25 @@ class Group:
         return False
 
 
-def copy_files(files, folder):
-    """Copies files into a folder: `files` is their own folder, then their names."""
-    own, *names = files
-    for name in names:
+def put_files(files_of_scenes, folder):
+    """Copies and writes the files of scenes into a folder: for each scene its own folder, the names of the files in it, and
+    the files in memory."""
+    copied, written = {}, {}
+    for own, names, given in files_of_scenes:
+        copied.update(dict.fromkeys((own, name) for name in names))
+        written.update({file.name: file for file in given})
+    for own, name in copied:
         source, target = os.path.join(own, name), os.path.join(folder, name)
         if os.path.exists(source) and not (os.path.exists(target) and os.path.samefile(source, target)):
+            import shutil
+
             shutil.copyfile(source, target)
+    for file in written.values():
+        file.write(folder)
 
 
-def _read(text, name):
+def _read(text, name, given=()):
+    # While the text is read, `given` holds the files that it names.
     scene = Scene()
     scene._read(text, name)
     return scene
@@ -124,25 +131,28 @@ def parse(text, name="scene"):
 
 def _is_first_argument(name, value):
     """Whether a tuple is a vector, the first argument of a command, rather than all of its arguments."""
-    _, _, parameters, _ = METHODS[INDEX[name]]
+    _, parameters, _ = METHODS[INDEX[name]]
     return len(value) == parameters[0][2] > 1 and not any(
         isinstance(number, (str, tuple, list)) or hasattr(number, "__len__") for number in value
     )
 
 
-def _signature(parameters, has_clauses):
-    kind = inspect.Parameter
-    listed = [kind("self", kind.POSITIONAL_ONLY)]
+def _signature(name, parameters, has_clauses):
+    """A function with the parameters of a method, which `help` shows. The method itself hands over all at once."""
+    listed = ["self", "/"]
     is_optional = False
-    for name, is_required, _ in parameters:
+    for parameter, is_required, _ in parameters:
         is_optional |= not is_required
-        listed.append(kind(name, kind.POSITIONAL_OR_KEYWORD, default=None if is_optional else kind.empty))
+        listed.append(f"{parameter}=None" if is_optional else parameter)
     if has_clauses:
-        listed.extend(kind(name, kind.KEYWORD_ONLY, default=None) for name, _ in _rayfold.clauses())
-    return inspect.Signature(listed)
+        listed += ["*", *(f"{clause}=None" for clause, _ in _rayfold.clauses())]
+    # To make a signature takes the module `inspect`, which is imported as long as all of this package.
+    made = {}
+    exec(f"def {name}({', '.join(listed)}): ...", made)
+    return made[name]
 
 
-def _method(index, name, doc, parameters, has_clauses):
+def _method(index, name, parameters, has_clauses):
     add = _rayfold.Script._add
 
     if name == "group":
@@ -151,6 +161,16 @@ def _method(index, name, doc, parameters, has_clauses):
             add(self, index, args, kwargs)
             return Group(self)
 
+    elif name == "mesh":
+
+        def method(self, *args, **kwargs):
+            from . import _arrays
+
+            if _arrays.is_of_arrays(args, kwargs):
+                file, kwargs = _arrays.mesh_of(args, kwargs)
+                args = (file,)
+            return add(self, index, args, kwargs)
+
     else:
 
         def method(self, *args, **kwargs):
@@ -158,14 +178,27 @@ def _method(index, name, doc, parameters, has_clauses):
 
     method.__name__ = name
     method.__qualname__ = f"Scene.{name}"
-    method.__doc__ = doc
+    method.__doc__ = _rayfold.method_doc(index)
     method.__module__ = "rayfold"
-    method.__signature__ = _signature(parameters, has_clauses)
+    method.__wrapped__ = _signature(name, parameters, has_clauses)
     return method
+
+
+class _Unmade:
+    """A method that is made when it is first asked for, so that the package is imported soon."""
+
+    def __init__(self, index):
+        self._index = index
+
+    def __get__(self, scene, owner):
+        name, *rest = METHODS[self._index]
+        method = _method(self._index, name, *rest)
+        setattr(Scene, name, method)
+        return method.__get__(scene, owner)
 
 
 INDEX = {}
 for _index, (_name, *_rest) in enumerate(METHODS):
     INDEX[_name] = _index
-    setattr(Scene, _name, _method(_index, _name, *_rest))
+    setattr(Scene, _name, _Unmade(_index))
 Scene.__module__ = "rayfold"
