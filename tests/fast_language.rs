@@ -391,9 +391,9 @@ const EDGES: [(&str, &str, &str); 24] = [
     (
         "a row of boxes whose edges are hardly round",
         FROM_THE_FRONT,
-        "Roundbox -2 -1 -1  -1 1 0  1e-9  0.1 0.1 0.1  0.6 0.5 0.4  0.3 0.3 0.3\n\
-         Roundbox -1 -1 -1  0 1 0  1e-15  0.1 0.1 0.1  0.5 0.6 0.4  0.3 0.3 0.3\n\
-         Roundbox 0 -1 -1  1 1 0  1e-300  0.1 0.1 0.1  0.5 0.5 0.6  0.3 0.3 0.3",
+        "Roundbox -2.03 -1 -1  -1.03 1 0  1e-9  0.1 0.1 0.1  0.6 0.5 0.4  0.3 0.3 0.3\n\
+         Roundbox -1.03 -1 -1  -0.03 1 0  1e-15  0.1 0.1 0.1  0.5 0.6 0.4  0.3 0.3 0.3\n\
+         Roundbox -0.03 -1 -1  0.97 1 0  1e-300  0.1 0.1 0.1  0.5 0.5 0.6  0.3 0.3 0.3",
     ),
     (
         "eye in the tube of a torus",

@@ -394,7 +394,8 @@ mod tests {
     #[test]
     fn a_new_object_of_each_shape_is_valid() {
         for &command in Command::ALL {
-            if role(command) != Role::Object || command.form().subject == Some(Subject::Quotes(Quotes::File)) {
+            if role(command) != Role::Object || command.form().subject == Some(Subject::Quotes(Quotes::File))
+            {
                 continue;
             }
             for size in [1e-6, 1.0, 300.0] {
