@@ -60,7 +60,7 @@ fn parts() -> impl Iterator<Item = Part> {
 fn core(roundbox: &Roundbox, axis: usize) -> (Real, Real) {
     let (low, high) = (Real::from(roundbox.min()[axis]), Real::from(roundbox.max()[axis]));
     let half = &(&high - &low).shifted(-1) - &Real::from(roundbox.radius());
-    (((&low + &high).shifted(-1)), if half.sign() < 0 { Real::zero() } else { half })
+    ((&low + &high).shifted(-1), if half.sign() < 0 { Real::zero() } else { half })
 }
 
 /// Returns the places where the line is as far from the faces of the core on which the part is as the radius.
