@@ -129,7 +129,7 @@ const FROM_THE_FRONT: &str = "Screen 41 41\nLook 0.13 0.21 9  0.02 0.03 0  50\nB
                               Material blue diffuse 0.2 0.2 0.6\nMaterial floor diffuse 0.7 0.7 0.7 noise 0.5 blue";
 
 /// Cases in which an almost correct formula fails.
-const EDGES: [(&str, &str); 20] = [
+const EDGES: [(&str, &str); 21] = [
     ("glass in glass", "Sphere 2  0 0 0  clear\nSphere 1  0.3 0 0  dark\nSphere 0.5  0.3 0.1 0  matte"),
     ("air in glass", "Sphere 2  0 0 0  clear\nMaterial air glass 1 1 1  0.667\nSphere 1.9  0 0 0  air"),
     ("the same ball twice", "Sphere 2  0 0 0  clear\nSphere 2  0 0 0  dark\nPlane 0 -2 0  0 1 0  floor"),
@@ -152,6 +152,10 @@ const EDGES: [(&str, &str); 20] = [
     (
         "eye in the tube of a torus",
         "Torus 9 1  0 0 0  0 1 0  dark\nSphere 1  0 0 0  matte\nPlane 0 -2 0  0 1 0  floor",
+    ),
+    (
+        "a box with round edges",
+        "Roundbox -1.5 -1 -0.8  1 1.5 0.9  0.5  clear\nPlane 0 -3 0  0 1 0  floor\nPlight 0.6 0.5 0.4  1 4 2",
     ),
     (
         "a capsule",

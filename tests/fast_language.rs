@@ -11,8 +11,8 @@ mod hold;
 use glam::DVec3;
 use rayfold_scene::model::{Finish, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Camera, Capsule, Cone, Cylinder, Disc, Fog, Lamp, Lens, Light, Look, Material, Object, Plane, Samples,
-    Scene, Torus,
+    Camera, Capsule, Cone, Cylinder, Disc, Fog, Lamp, Lens, Light, Look, Material, Object, Plane, Roundbox,
+    Samples, Scene, Torus,
 };
 use rayfold_tracer::{Precision, RenderOptions, reference};
 
@@ -243,6 +243,35 @@ fn capsules_are_the_references() {
 }
 
 #[test]
+fn boxes_with_round_edges_are_the_references() {
+    let mut dice = Dice::new("boxes with round edges", SEED);
+    let mut scenes: Vec<Scene> = vec![];
+    for count in [1, 3, 10, 30, 90] {
+        scenes.extend([(); 3].map(|()| {
+            let objects = (0..count)
+                .map(|_| {
+                    let (at, material) = (dice.point(3.0), dice.finished());
+                    let half = DVec3::from([(); 3].map(|()| dice.within(0.05, 0.9)));
+                    let half = if dice.0.u8(0..5) == 0 { DVec3::splat(half.x) } else { half };
+                    let share = [1.0, 1e-9, 1e-3, dice.within(0.0, 1.0)][dice.0.usize(0..4)];
+                    let radius = share * half.min_element();
+                    let roundbox = Roundbox::new([at - half, at + half], radius, material).unwrap().into();
+                    match dice.0.u8(0..4) {
+                        0 => placed(&mut dice, roundbox),
+                        1 => dice.body(6),
+                        _ => roundbox,
+                    }
+                })
+                .collect();
+            let mut scene = dice.scene(objects);
+            dice.add_lamps(&mut scene);
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+#[test]
 fn fog_is_the_references() {
     let mut dice = Dice::new("fog", SEED);
     let mut scenes: Vec<Scene> = vec![];
@@ -315,7 +344,7 @@ const PARALLEL: &str =
     "Screen 41 41\nOrthocamera\nIlight 0.6 0.6 0.6  -1 -2 -3\nPlight 0.3 0.2 0.1  20 30 -10";
 
 /// Cases in which an almost correct formula fails.
-const EDGES: [(&str, &str, &str); 20] = [
+const EDGES: [(&str, &str, &str); 24] = [
     (
         "eye in a cylinder",
         FROM_THE_FRONT,
@@ -341,6 +370,30 @@ const EDGES: [(&str, &str, &str); 20] = [
         PARALLEL,
         "Capsule 8  20 20 -60  20 20 -20  0.1 0.2 0.3  0.5 0.5 0.5\nSphere 5  6 30 -40  0.3 0.2 0.1  0.5 0.5 0.5\n\
          Capsule 5  6 30 -40  6 12 -40  0.1 0.1 0.3  0.5 0.5 0.5\nCylinder 5  6 25 -40  6 8 -40  0.1 0.3 0.1  0.5 0.5 0.5",
+    ),
+    (
+        "eye in a box with round edges",
+        FROM_THE_FRONT,
+        "Roundbox -3 -2 -4  3 2.5 9.5  1.2  0.2 0.1 0.1  0.5 0.5 0.5\nPlight 1 1 1  1 1 8",
+    ),
+    (
+        "eye on a box with round edges",
+        FROM_THE_FRONT,
+        "Roundbox -0.5 -2 9  0.5 2 9.4  0.2  1 0 0  0 0 0\nSphere 1  0 0 0  0.1 0.1 0.1  0.7 0.7 0.7",
+    ),
+    (
+        "boxes with round edges along the rays, and one on a box, a ball and a cylinder of its own",
+        PARALLEL,
+        "Roundbox 2 2 -60  18 14 -20  4  0.1 0.2 0.3  0.5 0.5 0.5\nBox 22 2 -50  38 14 -20  0.3 0.2 0.1  0.5 0.5 0.5\n\
+         Roundbox 22 2 -50  38 14 -20  4  0.1 0.3 0.1  0.5 0.5 0.5\nRoundbox 4 20 -50  20 36 -20  5  0.1 0.1 0.3  0.5 0.5 0.5\n\
+         Sphere 5  9 25 -25  0.3 0.1 0.3  0.5 0.5 0.5\nCylinder 5  15 26 -25  15 30 -25  0.3 0.3 0.1  0.5 0.5 0.5",
+    ),
+    (
+        "a row of boxes whose edges are hardly round",
+        FROM_THE_FRONT,
+        "Roundbox -2.03 -1 -1  -1.03 1 0  1e-9  0.1 0.1 0.1  0.6 0.5 0.4  0.3 0.3 0.3\n\
+         Roundbox -1.03 -1 -1  -0.03 1 0  1e-15  0.1 0.1 0.1  0.5 0.6 0.4  0.3 0.3 0.3\n\
+         Roundbox -0.03 -1 -1  0.97 1 0  1e-300  0.1 0.1 0.1  0.5 0.5 0.6  0.3 0.3 0.3",
     ),
     (
         "eye in the tube of a torus",

@@ -93,7 +93,7 @@ fn a_wire_has_no_gap_where_samples_are_enough() {
 }
 
 /// Each shape with a thickness of a tenth of a pixel, in a picture of 160 x 120 that shows 4 x 3 at the origin.
-const THIN: [(&str, &str); 13] = [
+const THIN: [(&str, &str); 15] = [
     (
         "balls",
         "Sphere .0025 -.4 .3 0 M\nSphere .0025 .5 -.2 0 M\nSphere .0025 .1 .6 0 M\nSphere .0025 1 .8 0 M",
@@ -111,6 +111,11 @@ const THIN: [(&str, &str); 13] = [
     ),
     ("a torus", "Torus 1 .00125 0 0 0 .2 .3 1 M"),
     ("a capsule", "Capsule .00125 -1 .2 0 1 .3 .4 M"),
+    ("a box with round edges", "Roundbox -1.5 -.301 -.00125 1.5 -.2985 .00125 .0008 M"),
+    (
+        "such a box, turned",
+        "Group rod\nRoundbox -1.5 -.00125 -.00125 1.5 .00125 .00125 .001 M\nEnd\nUse rod 0 0 0 10 20 33",
+    ),
     ("a disc from its edge", "Disc 1 0 0 0 .3 1 .0015 M"),
     ("a hoop in a group", "Group hoop\nTorus .5 .0006 0 0 0 .2 .3 1 M\nEnd\nUse hoop .1 0 0 10 20 30 2"),
 ];

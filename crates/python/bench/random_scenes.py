@@ -114,7 +114,7 @@ class Pair:
     def shape(self, at):
         dice = self.dice
         near = dice.vector()
-        kind = dice.randrange(9)
+        kind = dice.randrange(10)
         if kind == 0:
             self.both("Sphere", self.moving(dice.positive()), near, at)
         elif kind == 1:
@@ -131,6 +131,9 @@ class Pair:
             self.both("Cone", dice.positive(), dice.positive() + 0.1, near, dice.apart(near), at)
         elif kind == 7:
             self.both("Capsule", dice.positive(), near, dice.apart(near), at)
+        elif kind == 8:
+            far = tuple(place + 0.5 + dice.positive() for place in near)
+            self.both("Roundbox", near, far, 0.25 * dice.random(), at)
         else:
             self.both("Plane", (0.0, -3.0 - dice.random(), 0.0), (0.0, 1.0, 0.1), at)
 

@@ -108,6 +108,11 @@ impl Row {
                 is_left_out || provably_cross(&gaze, field(up))
             }
             Constraint::Greater(a, b) => field(a)[0].0 > field(b)[0].1,
+            Constraint::FitsTwice(a, u, v) => {
+                let most = 2.0 * field(a)[0].1;
+                let sides = field(u).iter().zip(field(v)).map(|(u, v)| (u.0 - v.1).max(v.0 - u.1));
+                most == 0.0 || sides.into_iter().all(|side| most <= side)
+            }
             Constraint::InOrder(a, b) => field(a)[0].1 <= field(b)[0].0,
         }
     }

@@ -35,7 +35,7 @@ fn a_word_that_is_like_no_command() {
             2 | Rotate 90 0 1 0
               | ^^^^^^ expected a command
               |
-              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Roundbox`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 
@@ -58,7 +58,7 @@ fn a_command_that_cannot_be_seen_to_be_misspelt() {
             3 | Trace␛[31m
               | ^^^^^^^^^^ expected a command
               |
-              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Roundbox`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`
 
             error: nothing is rendered: there is no `Trace`
              --> a.txt:3:11
@@ -633,7 +633,7 @@ fn a_place_counts_in_characters() {
             3 |     ÄÖÜ 日本
               |     ^^^ expected a command
               |
-              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Roundbox`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 

@@ -192,7 +192,7 @@ fn a_scene_without_light() {
             3 | Ilite 1 1 1 0 -1 0
               | ^^^^^ expected a command
               |
-              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
+              = help: the commands are `Screen`, `Orthocamera`, `Camera`, `Look`, `Lens`, `Background`, `Sky`, `Fog`, `Samples`, `Shutter`, `Tone`, `Depth`, `Indirect`, `Sphere`, `Triangle`, `Box`, `Plane`, `Disc`, `Cylinder`, `Cone`, `Torus`, `Capsule`, `Roundbox`, `Mesh`, `Text`, `Material`, `Group`, `End`, `Use`, `Ilight`, `Plight`, `Frames`, `Clear`, `Trace`"#]],
     );
 }
 
@@ -206,13 +206,13 @@ fn bodies_of_triangles_of_glass() {
     check(
         script("glass 1 1 1 1.5", 5),
         expect![[r#"
-        warning: triangles of glass do not refract: each is a thin pane, also where they close a body
-         --> a.txt:3:1
-          |
-        3 | Triangle 0 0 1 1 0 0 0 1 0 g
-          | ^^^^^^^^ expected a shape with an inside
-          |
-          = help: `Sphere`, `Box`, `Cylinder`, `Cone` and `Torus` refract; the index 1 says that panes are meant"#]],
+            warning: triangles of glass do not refract: each is a thin pane, also where they close a body
+             --> a.txt:3:1
+              |
+            3 | Triangle 0 0 1 1 0 0 0 1 0 g
+              | ^^^^^^^^ expected a shape with an inside
+              |
+              = help: bodies refract, such as `Sphere`, `Box`, `Cylinder` and closed meshes; the index 1 says that panes are meant"#]],
     );
     check(script("glass 1 1 1 1.5", 3), expect![[""]]);
     check(script("glass 1 1 1 1", 5), expect![[""]]);

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use rayfold_scene::{
     Background, Camera, Capsule, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Finish,
     Glass, Indirect, Lamp, Lens, Light, Limits, Look, Material, Object, Pattern, Pinhole, Plane, Rough,
-    Samples, Scene, Screen, Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
+    Roundbox, Samples, Scene, Screen, Script, Shine, Shutter, Sphere, Tone, Torus, Triangle, Weight, parse,
 };
 
 fn script(text: &str) -> Script {
@@ -98,6 +98,10 @@ fn object() -> BoxedStrategy<Object> {
             Torus::new(a.max(b), a.min(b), c, n, m).ok().map(Object::from)
         }),
         (size(), ends(), material()).prop_map(|(r, e, m)| Capsule::new(r, e, m).unwrap().into()),
+        (0.0..=0.5, ends(), material()).prop_map(|(share, e, m)| {
+            let radius = share * (e[1] - e[0]).abs().min_element().min(1e300);
+            Roundbox::new(e, radius, m).unwrap().into()
+        }),
     ]
     .boxed()
 }

@@ -53,6 +53,7 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     let places = all().filter(|field| field.kind == Kind::Position).count();
     let has_length = all().any(|field| field.kind == Kind::Length);
     let is_round = has_length && places == 1;
+    let is_box = all().any(|field| field.parameter == Parameter::Corner);
     let color = if command == Command::Plane { FLOOR } else { COLORS[count % COLORS.len()] };
     let (mut place, mut length) = (0u8, 0);
     let mut text = command.name().to_owned();
@@ -63,7 +64,7 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
         let values: Vec<f64> = match field.kind {
             Kind::Position => {
                 let off = match (places, place) {
-                    (2, _) if has_length => DVec3::Y * (1.6 * f64::from(place)),
+                    (2, _) if has_length && !is_box => DVec3::Y * (1.6 * f64::from(place)),
                     (1, _) => DVec3::Y * if is_round { 1.0 } else { 0.0 },
                     (2, 0) => DVec3::new(-0.8, 0.0, -0.8),
                     (2, _) => DVec3::new(0.8, 1.6, 0.8),
@@ -76,7 +77,8 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
             }
             Kind::Length => {
                 length += 1;
-                vec![round(if length == 1 { size } else { 0.35 * size })]
+                let share = if is_box { 0.2 } else { 0.35 };
+                vec![round(if length == 1 && !is_box { size } else { share * size })]
             }
             Kind::Direction if role(command) == Role::Light => vec![0.5, -1.0, -0.4],
             Kind::Direction => vec![0.0, 1.0, 0.0],
@@ -387,6 +389,22 @@ mod tests {
         assert_eq!(set(two, 0, 5), "Screen 4 3\nFrames 5\nTrace\nFrames 1\nClear\nTrace");
         assert_eq!(set(two, 1, 5), "Screen 4 3\nTrace\nClear\nFrames 5\nTrace");
         assert_eq!(set("", 0, 5), "Frames 5\n");
+    }
+
+    #[test]
+    fn a_new_object_of_each_shape_is_valid() {
+        for &command in Command::ALL {
+            if role(command) != Role::Object || command.form().subject == Some(Subject::Quotes(Quotes::File))
+            {
+                continue;
+            }
+            for size in [1e-6, 1.0, 300.0] {
+                let line = new_line(command, DVec3::new(1.0, 0.0, -2.0), size, 0);
+                let text = format!("Screen 4 3\n{}\nTrace", line.text());
+                let parsed = rayfold_scene::parse("a.txt", text.as_bytes(), &Default::default());
+                assert!(parsed.script.is_some(), "{text}: {:?}", parsed.diagnostics);
+            }
+        }
     }
 
     #[test]

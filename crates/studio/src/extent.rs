@@ -30,6 +30,7 @@ mod tests {
             "Torus 0.7 0.2  0.1 0 0  0.2 1 0.3",
             "Capsule 0.3  -0.6 0 0  0.5 0.9 0.2",
             "Capsule 0.3  -0.6 0 0  -0.6 0 0",
+            "Roundbox -0.5 0 0.2  1 0.7 -0.4  0.2",
         ];
         for shape in shapes {
             for place in ["Use a", "Use a  0.3 -0.2 0.5  30 50 -70  1.5"] {

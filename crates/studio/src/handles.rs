@@ -391,7 +391,8 @@ impl Drag {
                 }
                 self.first(|line, values| {
                     let length = values.number(first)?;
-                    changed(line, first, &[rounded((length + now - before).max(step), step)], keying)
+                    let longer = rounded((length + now - before).max(step), step);
+                    changed(line, first, &[longer.min(values.most(first))], keying)
                 })
             }
             HandleKind::Direction { first } => {
@@ -636,6 +637,18 @@ mod tests {
             drag(HandleKind::Length { first: 0 }, BALL, one, DVec2::new(-38.0, 0.0), DragOptions::default());
         let radius: f64 = text.split_whitespace().nth(1).unwrap().parse().unwrap();
         assert!(radius > 0.0 && radius < 1.0, "{text}");
+    }
+
+    #[test]
+    fn edges_are_made_no_rounder_than_they_can_be() {
+        let scene = scene();
+        let projection = Projection::new(&scene);
+        let (soap, grip) = ("Roundbox 0 0 0  2 .5 3  .1  1 0 0  0 0 0", HandleKind::Length { first: 6 });
+        let all = handles(0, &Line::new(soap), &projection, DVec3::ZERO);
+        let at = DVec2::from(all.iter().find(|handle| handle.grip == grip).unwrap().at);
+        let corner = projection.point(DVec3::ZERO).unwrap();
+        let text = drag(grip, soap, at, 400.0 * (at - corner).normalize(), DragOptions::default());
+        assert_eq!(text, soap.replace(" .1 ", " 0.25 "));
     }
 
     #[test]

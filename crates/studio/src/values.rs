@@ -3,7 +3,7 @@
 //! Knows commands only by the forms of their parameters. Invariant: an unchanged number keeps its notation.
 
 use glam::DVec3;
-use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, Parameter, Presence, parse_curve};
+use rayfold_scene::{Command, Constraint, Curve, Field, Key, Kind, Mode, Parameter, Presence, parse_curve};
 
 use crate::line::{Line, Words, written};
 use crate::tables::{fields, of_kind};
@@ -74,6 +74,20 @@ impl Values {
     /// Returns the positions of the line, each with the index of its first number.
     pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, DVec3)> {
         of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
+    }
+
+    /// Returns the most that number `first` may be beside the other numbers: the radius of a box with round edges has a
+    /// bound.
+    pub(crate) fn most(&self, first: usize) -> f64 {
+        let starts: Vec<usize> = fields(self.command).map(|(start, _)| start).collect();
+        let of = |constraint: &Constraint| match *constraint {
+            Constraint::FitsTwice(number, u, v) if starts[number] == first => {
+                let side = (self.vector(starts[v])? - self.vector(starts[u])?).abs();
+                Some(0.5 * side.min_element())
+            }
+            _ => None,
+        };
+        self.command.form().constraints.iter().filter_map(of).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the largest of the line's lengths.

@@ -43,6 +43,7 @@ parts! {
     cones, "cones", |scene| has(scene, |o| matches!(o, Object::Cylinder(_) | Object::Cone(_)));
     tori, "tori", |scene| has(scene, |o| matches!(o, Object::Torus(_)));
     capsules, "capsules", |scene| has(scene, |o| matches!(o, Object::Capsule(_)));
+    roundboxes, "roundboxes", |scene| has(scene, |o| matches!(o, Object::Roundbox(_)));
     // Boxes in groups that are rotated by other than right angles.
     turned_boxes, "turned-boxes", |scene| scene.objects.iter().any(is_turned_box);
     groups, "groups", |scene| scene.objects.iter().any(|o| matches!(o, Object::Instance(_)));

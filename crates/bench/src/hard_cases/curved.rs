@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use glam::DVec3;
-use rayfold_scene::{Capsule, Cone, Cylinder, Disc, Material, Object, Plane, Torus};
+use rayfold_scene::{Capsule, Cone, Cylinder, Disc, Material, Object, Plane, Roundbox, Torus};
 
 use super::figures::{Figures, Size, unless_single, worse};
 use super::setup::{direction, from_eyes, random, truths};
@@ -39,6 +39,11 @@ fn capsule(axis: DVec3, grown: f64) -> Result<Object> {
     Ok(Capsule::new(0.75 + grown, [CENTER, CENTER + 0.5 * axis], surface())?.into())
 }
 
+fn roundbox(half: DVec3, radius: f64, grown: f64) -> Result<Object> {
+    let half = half + grown;
+    Ok(Roundbox::new([CENTER - half, CENTER + half], radius + grown, surface())?.into())
+}
+
 const BODIES: &[(&str, Grown)] = &[
     ("disc", |grown| Ok(Disc::new(1.25 + grown, CENTER, ALONG, surface())?.into())),
     ("disc aslant", |grown| Ok(Disc::new(1.25 + grown, CENTER, ASLANT, surface())?.into())),
@@ -50,6 +55,9 @@ const BODIES: &[(&str, Grown)] = &[
     ("torus aslant", |grown| Ok(Torus::new(1.0, 0.625 + grown, CENTER, ASLANT, surface())?.into())),
     ("capsule", |grown| capsule(ALONG, grown)),
     ("capsule aslant", |grown| capsule(ASLANT, grown)),
+    ("box with round edges", |grown| roundbox(DVec3::new(1.25, 0.75, 1.0), 0.25, grown)),
+    ("box that is a ball", |grown| roundbox(DVec3::ONE, 1.0, grown)),
+    ("box with hardly round edges", |grown| roundbox(DVec3::new(1.0, 0.75, 0.5), 1e-3, grown)),
 ];
 
 /// Returns rays that pass a body at all distances from its outline, on all sides of it.
@@ -140,6 +148,8 @@ pub(super) fn exact(backends: &[Backend], _: Size, figures: &mut Figures) -> Res
     let tip: Object = Cone::new([2.0, 0.0], [DVec3::ZERO, 4.0 * up], surface())?.into();
     let ring: Object = Torus::new(3.0, 1.0, DVec3::ZERO, up, surface())?.into();
     let pill: Object = Capsule::new(2.0, [DVec3::ZERO, 4.0 * up], surface())?.into();
+    let soap: Object =
+        Roundbox::new([DVec3::new(-4.0, 0.0, -5.0), DVec3::new(4.0, 6.0, 5.0)], 2.0, surface())?.into();
     let plate: Object = Disc::new(5.0, DVec3::ZERO, up, surface())?.into();
     let ground: Object = Plane::new(DVec3::ZERO, up, surface())?.into();
     let cases: &[Exact] = &[
@@ -170,6 +180,14 @@ pub(super) fn exact(backends: &[Backend], _: Size, figures: &mut Figures) -> Res
         ("from a capsule outwards", &pill, [2.0, 1.0, 0.0], [1.0, 0.0, 0.0], None),
         ("from a capsule inwards", &pill, [2.0, 1.0, 0.0], [-1.0, 0.0, 0.0], Some(4.0)),
         ("from its end inwards", &pill, [0.0, 6.0, 0.0], [0.0, -1.0, 0.0], Some(8.0)),
+        ("onto a face of a round box", &soap, [1.0, 9.0, 1.0], [0.0, -1.0, 0.0], Some(3.0)),
+        ("onto the seam of a face", &soap, [2.0, 9.0, 3.0], [0.0, -1.0, 0.0], Some(3.0)),
+        ("beside an edge", &soap, [4.0, 1.0, 9.0], [0.0, 0.0, -1.0], None),
+        ("along a face", &soap, [4.0, 3.0, 9.0], [0.0, 0.0, -1.0], Some(6.0)),
+        ("above a face", &soap, [4.0 + 1e-5, 3.0, 9.0], [0.0, 0.0, -1.0], None),
+        ("onto an edge", &soap, [9.0, 5.6, 0.0], [-1.0, 0.0, 0.0], Some(5.8)),
+        ("from a round box outwards", &soap, [4.0, 3.0, 0.0], [1.0, 0.0, 0.0], None),
+        ("from a round box inwards", &soap, [4.0, 3.0, 0.0], [-1.0, 0.0, 0.0], Some(8.0)),
         ("onto a rim", &plate, [3.0, 7.0, 4.0], [0.0, -1.0, 0.0], Some(7.0)),
         ("beside a rim", &plate, [3.0, 7.0, 4.0 + 1e-5], [0.0, -1.0, 0.0], None),
         ("edge on", &plate, [9.0, 0.0, 0.0], [-1.0, 0.0, 0.0], None),

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3, Vec3Swizzles};
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
     Background, Camera, Capsule, Coefficients, Cone, Cuboid, Cylinder, Depth, Disc, Fog, Instance, Lamp,
-    Light, Look, Material, Object, Placement, Plane, Scene, Screen, Sphere, Tone, Torus, Triangle,
+    Light, Look, Material, Object, Placement, Plane, Roundbox, Scene, Screen, Sphere, Tone, Torus, Triangle,
 };
 
 use super::figures::{Figures, Size};
@@ -178,7 +178,7 @@ fn some(rng: &mut Rng) -> Result<Material> {
 fn any(rng: &mut Rng, at: DVec3, size: f64, material: Material) -> Result<Object> {
     // By dice of its own, so that a seed keeps its other numbers.
     let mut dice = rng.clone();
-    let rare = dice.u8(0..8) == 0;
+    let rare = dice.u8(0..8);
     let object: Object = match rng.u32(0..8) {
         0 => Sphere::new(0.5 * size, at, material)?.into(),
         1 => Cuboid::new([at, at + point(rng, 0.7 * size)], material)?.into(),
@@ -198,7 +198,13 @@ fn any(rng: &mut Rng, at: DVec3, size: f64, material: Material) -> Result<Object
             Torus::new(radius, within(rng, 0.05, 0.95) * radius, at, direction(rng), material)?.into()
         }
     };
-    if !rare {
+    if rare == 1 {
+        let half = 0.5 * size * DVec3::new(dice.f64(), dice.f64(), dice.f64()).max(DVec3::splat(0.05));
+        let share = [0.0, 1e-9, 1.0, within(&mut dice, 0.01, 1.0)][dice.usize(0..4)];
+        let radius = share * half.min_element();
+        return Ok(Roundbox::new([at - half, at + half], radius, object.material().clone())?.into());
+    }
+    if rare != 0 {
         return Ok(object);
     }
     let (radius, end) = (within(&mut dice, 0.05, 0.5) * size, at + size * direction(&mut dice));
@@ -391,6 +397,7 @@ fn lamps(rng: &mut Rng) -> Result<Scene> {
                 Object::Cone(cone) => cone.ends()[1],
                 Object::Torus(torus) => torus.center(),
                 Object::Capsule(capsule) => capsule.ends()[0],
+                Object::Roundbox(roundbox) => roundbox.min(),
                 _ => DVec3::ZERO,
             },
             _ => point(rng, 1.5),

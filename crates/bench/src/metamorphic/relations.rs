@@ -114,6 +114,7 @@ fn lengths(scene: &Scene) -> Vec<f64> {
         Object::Cylinder(o) => [o.ends().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
         Object::Cone(o) => o.ends().to_vec(),
         Object::Torus(o) => vec![o.center(), DVec3::splat(o.thickness())],
+        Object::Roundbox(o) => [o.corners().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
         Object::Capsule(o) => [o.ends().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
         Object::Mesh(o) => o.model().positions().to_vec(),
         Object::Instance(o) => vec![o.placement().translation(), DVec3::splat(o.placement().scale())],

@@ -37,6 +37,7 @@ pub(super) const VERSION_2: &[&str] = &[
     "cones",
     "tori",
     "capsules",
+    "roundboxes",
     "turned-boxes",
     "groups",
     "meshes",
@@ -64,9 +65,9 @@ const OF_VERSION_2: [&[&str]; 10] = [
     &["planes", "groups", "meshes", "pictures"],
     &["planes", "discs", "capsules", "lenses"],
     &["highlights"],
-    &["tori", "capsules", "turned-boxes", "groups", "meshes", "srgb", "glows", "paths"],
+    &["tori", "capsules", "roundboxes", "turned-boxes", "groups", "meshes", "srgb", "glows", "paths"],
     &["highlights", "patterns", "fogs", "covers", "paths"],
-    &["glass", "skies", "pictures", "extents", "covers", "glows"],
+    &["roundboxes", "glass", "skies", "pictures", "extents", "covers", "glows"],
     &[
         "capsules",
         "turned-boxes",
@@ -92,7 +93,7 @@ const OF_VERSION_2: [&[&str]; 10] = [
         "fogs",
         "covers",
     ],
-    &["discs", "cones", "tori", "highlights", "patterns", "lamps", "skies", "extents"],
+    &["discs", "cones", "tori", "roundboxes", "highlights", "patterns", "lamps", "skies", "extents"],
     &[
         "planes", "discs", "cones", "meshes", "glass", "srgb", "samples", "lenses", "shutters", "glows",
         "paths",

@@ -54,7 +54,7 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
 ";
 
 /// The scenes of version 2. Each has as little as possible besides the feature that its name mentions.
-const OF_VERSION_2: [(&str, &str); 24] = [
+const OF_VERSION_2: [(&str, &str); 25] = [
     (
         "a plane and balls",
         "Plane 0 -1 0  0 1 0  .1 .1 .1  .6 .6 .6
@@ -84,6 +84,12 @@ Torus 1.2 .2   1 1 -2  -.2 .5 1  .1 .1 .1  .2 .6 .2
         "capsules",
         "Capsule .8  -1.5 -1 0  -1 1.5 0  .1 .1 .1  .6 .2 .2
 Capsule .5   1.5 -1 -1  1.5 2 -1  .1 .1 .1  .2 .6 .2
+",
+    ),
+    (
+        "boxes with round edges",
+        "Roundbox -2 -1 -1  -.5 1 .5  .3  .1 .1 .1  .6 .2 .2
+Roundbox .5 -1 -1.5  2 2 .5  .6  .1 .1 .1  .2 .6 .2
 ",
     ),
     (

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use glam::{DMat3, DVec3};
 use image::RgbImage;
 use rayfold_scene::model::Weight;
-use rayfold_scene::{Camera, Light, Material, Object, Scene};
+use rayfold_scene::{Camera, Light, Material, Object, Roundbox, Scene};
 use rayfold_tracer::MAX_BOUNCES;
 
 use crate::cpu_time;
@@ -153,6 +153,7 @@ fn shape(object: &Object) -> Result<String> {
                 "merge {{ sphere {{ {a}, {r:e} }} sphere {{ {b}, {r:e} }} cylinder {{ {a}, {b}, {r:e} open }}"
             )
         }
+        Object::Roundbox(r) => roundbox(r),
         Object::Torus(t) => {
             // POV-Ray's tori are around the second axis.
             let y = t.normal().normalize();
@@ -163,6 +164,30 @@ fn shape(object: &Object) -> Result<String> {
         Object::Mesh(_) => anyhow::bail!("a mesh is not translated"),
         Object::Instance(_) => anyhow::bail!("an object of a group in a group"),
     })
+}
+
+/// Returns three boxes, the cylinders of the edges and the spheres of the corners, as POV-Ray's `Round_Box_Union` does;
+/// where the inside is seen, those that `Round_Box_Merge` joins.
+fn roundbox(roundbox: &Roundbox) -> String {
+    let (min, max, radius) = (roundbox.min(), roundbox.max(), roundbox.radius());
+    let (low, high) = (min + radius, (max - radius).max(min + radius));
+    let has_glass = roundbox.material().finish().is_some_and(|finish| finish.glass.is_some());
+    let mut text = String::from(if has_glass { "merge {" } else { "union {" });
+    for axis in DVec3::AXES {
+        let _ = write!(text, " box {{ {}, {} }}", vector(low - radius * axis), vector(high + radius * axis));
+    }
+    let corner = |k: usize| {
+        let ends = [low, high];
+        DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z)
+    };
+    for k in 0..8 {
+        let _ = write!(text, " sphere {{ {}, {radius:e} }}", vector(corner(k)));
+        for other in [k | 1, k | 2, k | 4].into_iter().filter(|&other| corner(other) != corner(k)) {
+            let ends = [corner(k), corner(other)].map(vector);
+            let _ = write!(text, " cylinder {{ {}, {}, {radius:e} open }}", ends[0], ends[1]);
+        }
+    }
+    text
 }
 
 fn matrix(axes: DMat3, origin: DVec3) -> String {

@@ -12,8 +12,8 @@ use image::RgbImage;
 use rayfold_files::OutputFile;
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
-    Coefficients, Cone, Cuboid, Cylinder, Disc, Instance, Lamp, Material, Object, Placement, Plane, Scene,
-    Screen, Sphere, Torus, Triangle,
+    Capsule, Coefficients, Cone, Cuboid, Cylinder, Disc, Instance, Lamp, Material, Object, Placement, Plane,
+    Roundbox, Scene, Screen, Sphere, Torus, Triangle,
 };
 use rayfold_tracer::{MAX_BOUNCES, RenderOptions};
 
@@ -67,7 +67,7 @@ const GRID: (u32, u32) = (6, 4);
 
 type Subject = (&'static str, Asked, fn(&mut Rng) -> Result<Vec<Object>>);
 
-const SUBJECTS: [Subject; 16] = [
+const SUBJECTS: [Subject; 18] = [
     ("spheres", Asked::Shape, |rng| scattered(rng, plain, sphere)),
     ("boxes", Asked::Shape, |rng| scattered(rng, plain, cuboid)),
     ("boxes askew", Asked::Shape, |rng| scattered(rng, plain, askew)),
@@ -77,6 +77,8 @@ const SUBJECTS: [Subject; 16] = [
     ("cylinders", Asked::Shape, |rng| scattered(rng, plain, cylinder)),
     ("cones", Asked::Shape, |rng| scattered(rng, plain, cone)),
     ("tori", Asked::Torus, |rng| scattered(rng, plain, torus)),
+    ("capsules", Asked::Shape, |rng| scattered(rng, plain, capsule)),
+    ("boxes with round edges", Asked::Shape, |rng| scattered(rng, plain, roundbox)),
     ("spheres of glass", Asked::Surface, |rng| scattered(rng, glass, sphere)),
     ("boxes of glass", Asked::Surface, |rng| scattered(rng, glass, cuboid)),
     ("spheres in cells", Asked::Surface, |rng| scattered(rng, checkered, sphere)),
@@ -379,6 +381,16 @@ fn torus(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
 }
 
 /// Returns a floor and two walls.
+fn capsule(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
+    let half = 0.55 * direction(rng);
+    Ok(Capsule::new(0.4, [at - half, at + half], material)?.into())
+}
+
+fn roundbox(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
+    let half = 0.4 + 0.35 * DVec3::new(rng.f64(), rng.f64(), rng.f64());
+    Ok(Roundbox::new([at - half, at + half], 0.05 + 0.3 * rng.f64(), material)?.into())
+}
+
 fn planes(rng: &mut Rng) -> Result<Vec<Object>> {
     let walls = [
         (DVec3::NEG_Y, DVec3::Y),

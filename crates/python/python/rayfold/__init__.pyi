@@ -717,6 +717,47 @@ class Scene:
         ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
             the clauses of a material, as those of `Material`.
         """
+    def roundbox(
+        self,
+        u: Vector,
+        v: Vector,
+        radius: Number,
+        material: Material | str | None = None,
+        *,
+        ambient: Color | None = None,
+        diffuse: Color | None = None,
+        mirror: Color | None = None,
+        shine: tuple[Color, Number] | None = None,
+        glass: tuple[Color, Number] | None = None,
+        checker: tuple[Number, Material | str] | None = None,
+        stripes: tuple[Number, Material | str] | None = None,
+        noise: tuple[Number, Material | str] | None = None,
+        gradient: tuple[Number, Number, Material | str] | None = None,
+        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        own: bool | None = None,
+        glow: Color | None = None,
+        rough: Number | None = None,
+    ) -> None:
+        """A box with round edges.
+
+        In a script: `Roundbox ux uy uz vx vy vz r ar ag ab rr rg rb [sr sg sb]`.
+
+        Parameters
+        ----------
+        u : Vector
+            the corner (`ux uy uz`): position in world units.
+        v : Vector
+            the corner (`vx vy vz`): position in world units.
+        radius : Number
+            the radius (`r`): length in world units, at least 0.
+        material : Material | str, optional
+            the surface: a `Material`, the name of one, or a colour for `diffuse`; in its place the clauses below. Black by default.
+        ambient, diffuse, mirror, shine, glass, checker, stripes, noise, gradient, image, own, glow, rough
+            the clauses of a material, as those of `Material`.
+
+        In the names of the script, `r` is at most half of each side from `ux uy uz` to `vx vy vz`.
+        """
+
     @overload
     def mesh(
         self,

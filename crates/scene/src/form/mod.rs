@@ -201,6 +201,8 @@ pub enum Constraint {
     LooksAside(usize, usize, usize),
     /// The first number is greater than the second.
     Greater(usize, usize),
+    /// Twice the first number is at most the difference of the two positions, in every component.
+    FitsTwice(usize, usize, usize),
     /// Whole numbers: the first is at most the second.
     InOrder(usize, usize),
 }
@@ -591,6 +593,9 @@ impl Constraint {
                 format!("from {} to {} is not parallel to {}, if given", names(from), names(to), names(up))
             }
             Self::Greater(a, b) => format!("{} is greater than {}", names(a), names(b)),
+            Self::FitsTwice(a, u, v) => {
+                format!("{} is at most half of each side from {} to {}", names(a), names(u), names(v))
+            }
             Self::InOrder(a, b) => format!("{} is at most {}", names(a), names(b)),
         }
     }

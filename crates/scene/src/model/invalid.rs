@@ -52,6 +52,9 @@ pub enum InvalidValue {
     /// The tube of a torus is at least as thick as its circle is wide.
     #[error("the thickness r must be less than the radius R")]
     ThickTorus,
+    /// The edges of a box are rounded by more than half of its shortest side, which is given.
+    #[error("the radius r must be at most half of the shortest side, {0}")]
+    TooRound(f64),
     /// Eye and target of a camera are the same.
     #[error("the eye and the target must differ")]
     NoGaze,
@@ -83,6 +86,7 @@ impl InvalidValue {
             Self::NoAxis => parameter == Parameter::AxisEnd,
             Self::NoRadius => matches!(parameter, Parameter::RadiusA | Parameter::RadiusB),
             Self::ThickTorus => parameter == Parameter::Thickness,
+            Self::TooRound(_) => parameter == Parameter::Radius,
             Self::NoGaze => parameter == Parameter::Target,
             Self::FramesBackwards => matches!(parameter, Parameter::FirstFrame | Parameter::LastFrame),
             Self::EmptyGradient => matches!(parameter, Parameter::GradientStart | Parameter::GradientEnd),

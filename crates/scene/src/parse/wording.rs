@@ -240,6 +240,9 @@ fn expectation(fault: InvalidValue) -> String {
         InvalidValue::NoAxis => "expected two points that differ".into(),
         InvalidValue::NoRadius => "expected a number greater than 0 at one end at least".into(),
         InvalidValue::ThickTorus => "expected `r` to be less than `R`".into(),
+        InvalidValue::TooRound(most) => {
+            format!("expected `r` to be at most half of the shortest side, {most}").into()
+        }
         InvalidValue::NoGaze => "expected a target apart from the eye".into(),
         InvalidValue::FramesBackwards => "expected `a` to be at most `b`".into(),
         InvalidValue::EmptyGradient => "expected `a` and `b` to differ".into(),
@@ -520,7 +523,7 @@ pub(super) fn glass_panes() -> Fault {
         "triangles of glass do not refract: each is a thin pane, also where they close a body",
     )
     .expected("expected a shape with an inside")
-    .help("`Sphere`, `Box`, `Cylinder`, `Cone` and `Torus` refract; the index 1 says that panes are meant")
+    .help("bodies refract, such as `Sphere`, `Box`, `Cylinder` and closed meshes; the index 1 says that panes are meant")
 }
 
 pub(super) fn narrow_view(angle: f64) -> Fault {

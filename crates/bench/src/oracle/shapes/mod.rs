@@ -7,6 +7,7 @@ mod disc;
 mod instance;
 mod mesh;
 mod plane;
+mod roundbox;
 mod sphere;
 mod torus;
 mod triangle;
@@ -58,6 +59,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Cone(cone) => cone,
         Object::Torus(torus) => torus,
         Object::Capsule(capsule) => capsule,
+        Object::Roundbox(roundbox) => roundbox,
         Object::Instance(instance) => instance,
         Object::Mesh(mesh) => mesh,
     }

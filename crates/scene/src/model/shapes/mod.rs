@@ -11,6 +11,7 @@ mod disc;
 mod instance;
 mod mesh;
 mod plane;
+mod roundbox;
 mod sphere;
 mod torus;
 mod triangle;
@@ -44,6 +45,7 @@ macro_rules! with_shapes {
                 cone::Cone: "A closed cone or truncated cone.";
                 torus::Torus: "A ring (torus).";
                 capsule::Capsule: "A cylinder with round ends.";
+                roundbox::Roundbox: "A box with round edges.";
             }
         }
     };
@@ -60,6 +62,11 @@ trait Shape: Sized {
 
     /// Returns a valid property that is probably a mistake.
     fn lint(&self) -> Option<Lint> {
+        None
+    }
+
+    /// Returns the object of another shape with the same points, if there is one that is simpler.
+    fn simpler(&self) -> Option<Object> {
         None
     }
 }
@@ -81,7 +88,7 @@ macro_rules! objects {
 
         $(impl From<$Shape> for Object {
             fn from(shape: $Shape) -> Self {
-                Self::$Shape(shape)
+                shape.simpler().unwrap_or(Self::$Shape(shape))
             }
         })*
 
@@ -113,7 +120,7 @@ macro_rules! objects {
             /// Fails if a number overflows or a length vanishes.
             pub fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
                 match self {
-                    $(Self::$Shape(shape) => shape.moved(motion, material).map(Self::$Shape),)*
+                    $(Self::$Shape(shape) => shape.moved(motion, material).map(Self::from),)*
                     Self::Instance(instance) => instance.moved(motion).map(Self::Instance),
                     Self::Mesh(mesh) => mesh.moved(motion, material).map(Self::Mesh),
                 }

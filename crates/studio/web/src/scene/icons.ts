@@ -1,7 +1,7 @@
 // The icons of commands.
 
 import {
-  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Pill, Settings2, Shapes, Square, Sun, Torus, Triangle, Type,
+  Box, Boxes, Circle, Component, Cone, Cylinder, Disc, Lightbulb, type IconNode, Palette, Pill, Settings2, Shapes, Square, SquareRoundCorner, Sun, Torus, Triangle, Type,
   Video,
 } from "lucide";
 
@@ -17,6 +17,7 @@ const COMMANDS: Readonly<Record<string, IconNode>> = {
   Cone,
   Torus,
   Capsule: Pill,
+  Roundbox: SquareRoundCorner,
   Text: Type,
   Ilight: Sun,
   Plight: Lightbulb,

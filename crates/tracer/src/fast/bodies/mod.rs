@@ -1,4 +1,5 @@
-//! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, capsules, and rotated boxes.
+//! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, capsules, boxes with
+//! round edges, and rotated boxes.
 //!
 //! Each shape has its own file, with its intersection and its surface in the shape's coordinates. The common parts are
 //! here: the transformation into these coordinates and back, the offset of new rays, and the search. None of it is part
@@ -16,11 +17,13 @@ mod cone;
 mod cuboid;
 mod disc;
 mod plane;
+mod roundbox;
 mod solid;
 mod torus;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use glam::DMat3;
 use rayfold_scene::Object;
 
 use self::body_culler::BodyCuller;
@@ -29,11 +32,12 @@ use self::cone::{Cone, ConeForm};
 use self::cuboid::{Cuboid, CuboidForm};
 use self::disc::{Disc, DiscForm};
 use self::plane::PlaneForm;
+use self::roundbox::{Roundbox, RoundboxForm};
 use self::solid::{Form, Frame, Place};
 pub(super) use self::solid::{Solid, body, reach};
 use self::torus::{Torus, TorusForm};
 use super::shapes::Shape as PlacedShape;
-use super::shapes::instance::turned_box;
+use super::shapes::instance::{Turned, turned};
 use crate::fast::acceleration::descent::{backwards, descend};
 use crate::fast::acceleration::tree::{Copies, Tree, group};
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
@@ -64,6 +68,7 @@ enum AnyForm {
     Cone(ConeForm),
     Torus(TorusForm),
     Capsule(CapsuleForm),
+    Roundbox(RoundboxForm),
     Cuboid(CuboidForm),
 }
 
@@ -80,7 +85,20 @@ impl AnyForm {
             Object::Cone(o) => of(Self::Cone)(ConeForm::new(o.radii(), o.ends(), place)),
             Object::Torus(o) => of(Self::Torus)(TorusForm::new(o, place)),
             Object::Capsule(o) => of(Self::Capsule)(CapsuleForm::new(o, place)),
-            Object::Instance(o) => of(Self::Cuboid)(CuboidForm::new(turned_box(o)?, o.placement(), place)),
+            Object::Roundbox(o) => {
+                let center = o.min() + 0.5 * (o.max() - o.min());
+                of(Self::Roundbox)(RoundboxForm::new(o, (DMat3::IDENTITY, 1.0), center, place))
+            }
+            Object::Instance(o) => match turned(o)? {
+                Turned::Cuboid(cuboid) => of(Self::Cuboid)(CuboidForm::new(cuboid, o.placement(), place)),
+                Turned::Roundbox(roundbox) => {
+                    let placement = o.placement();
+                    let (min, max) = (roundbox.min(), roundbox.max());
+                    let center = placement.point(min + 0.5 * (max - min));
+                    let turn = (placement.rotation(), placement.scale());
+                    of(Self::Roundbox)(RoundboxForm::new(roundbox, turn, center, place))
+                }
+            },
             _ => return None,
         })
     }
@@ -92,6 +110,7 @@ impl AnyForm {
             Self::Cone(form) => form,
             Self::Torus(form) => form,
             Self::Capsule(form) => form,
+            Self::Roundbox(form) => form,
             Self::Cuboid(form) => form,
         }
     }
@@ -106,6 +125,7 @@ enum Shape<E> {
     Cone(Cone<E>, [E; 3]),
     Torus(Torus<E>),
     Capsule(Capsule<E>),
+    Roundbox(Roundbox<E>),
     Cuboid(Cuboid<E>),
 }
 
@@ -119,6 +139,7 @@ impl<E> Shape<E> {
             Self::Cone(..) => BUILT.cones,
             Self::Torus(_) => BUILT.tori,
             Self::Capsule(_) => BUILT.capsules,
+            Self::Roundbox(_) => BUILT.roundboxes,
             Self::Cuboid(_) => BUILT.turned_boxes,
         }
     }
@@ -149,6 +170,7 @@ impl<E: Real> Body<E> {
             AnyForm::Capsule(CapsuleForm { radius, height, .. }) => {
                 Shape::Capsule(Capsule::new(radius, height))
             }
+            AnyForm::Roundbox(RoundboxForm { half, radius }) => Shape::Roundbox(Roundbox::new(half, radius)),
             AnyForm::Cuboid(CuboidForm { half }) => Shape::Cuboid(Cuboid::new(half)),
         };
         Self {
@@ -224,6 +246,7 @@ impl<E: Real> Body<E> {
                         Shape::Cone(cone, end) => cone.intersect(simd, local, self.over(simd, *end, ray)),
                         Shape::Torus(torus) => torus.intersect(simd, local, nearest.distance),
                         Shape::Capsule(capsule) => capsule.intersect(simd, local),
+                        Shape::Roundbox(roundbox) => roundbox.intersect(simd, local),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
                         Shape::Plane | Shape::Disc(_) => return,
                     };
@@ -266,6 +289,9 @@ impl<E: Real> Body<E> {
                     }
                     Shape::Capsule(capsule) => {
                         self.in_scene(simd, capsule.surface(simd, self.local(simd, ray), distance))
+                    }
+                    Shape::Roundbox(roundbox) => {
+                        self.in_scene(simd, roundbox.surface(simd, self.local(simd, ray), distance))
                     }
                     Shape::Torus(torus) => {
                         self.in_scene(simd, torus.surface(simd, self.local(simd, ray), distance))

@@ -8,7 +8,7 @@ use rayfold_scene::Object;
 use super::AnyForm;
 use crate::fast::acceleration::tree::Grouped;
 use crate::fast::rays::bounds::{Bounds, NOTHING};
-use crate::fast::shapes::instance::{in_world, turned_box};
+use crate::fast::shapes::instance::{in_world, turned};
 use crate::fast::shared::{Flat, Plain, Surface};
 
 /// A body and its position in the script.
@@ -66,7 +66,7 @@ const AT_ORIGIN: f64 = 64.0 * f64::EPSILON;
 /// Returns an object in the kernels' coordinates, if it is a body that can be hit.
 pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f64) -> Option<Solid> {
     if let Object::Instance(instance) = object
-        && turned_box(instance).is_none()
+        && turned(instance).is_none()
     {
         return body(&in_world(instance)?, order, center, scale);
     }

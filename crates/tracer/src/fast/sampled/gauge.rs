@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use rayfold_scene::model::unit;
-use rayfold_scene::{Capsule, Cuboid, Light, Object, Scene, Shine};
+use rayfold_scene::{Capsule, Light, Object, Scene, Shine};
 
 use crate::fast::placement::lens::Lens;
 use crate::fast::rays::view::{View, view};
@@ -175,7 +175,14 @@ fn curvature(object: &Object) -> Option<(f64, DVec3)> {
         Object::Cone(o) => Some((o.radii()[0].max(o.radii()[1]), 0.5 * (o.ends()[0] + o.ends()[1]))),
         Object::Torus(o) => Some((o.thickness(), o.center())),
         Object::Capsule(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
-        Object::Instance(o) => curvature(&in_world(o)?),
+        Object::Roundbox(o) => Some((o.radius(), 0.5 * o.min() + 0.5 * o.max())),
+        Object::Instance(o) => match in_world(o) {
+            Some(object) => curvature(&object),
+            None => {
+                let (radius, at) = curvature(o.object())?;
+                Some((o.placement().scale() * radius, o.placement().point(at)))
+            }
+        },
         Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
             None
         }
@@ -192,8 +199,7 @@ fn ring(center: DVec3, normal: DVec3, radius: f64) -> impl Iterator<Item = DVec3
 }
 
 /// The corners of a box, and its edge of middle length if the third is much longer.
-pub(super) fn of_box(cuboid: &Cuboid, place: impl Fn(DVec3) -> DVec3, scale: f64) -> Hull {
-    let ends = [cuboid.min(), cuboid.max()];
+fn of_box(ends: [DVec3; 2], place: impl Fn(DVec3) -> DVec3, scale: f64) -> Hull {
     let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
     let mut edges = (ends[1] - ends[0]).to_array();
     edges.sort_by(f64::total_cmp);
@@ -214,7 +220,8 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
         Object::Triangle(o) => {
             Hull { points: o.vertices().to_vec(), girth: height(o.vertices()), is_flat: true }
         }
-        Object::Cuboid(o) => of_box(o, |p| p, 1.0),
+        Object::Cuboid(o) => of_box([o.min(), o.max()], |p| p, 1.0),
+        Object::Roundbox(o) => of_box([o.min(), o.max()], |p| p, 1.0),
         Object::Plane(_) | Object::Mesh(_) => return None,
         Object::Disc(o) => {
             let points = ring(o.center(), o.normal(), o.radius()).collect();
@@ -236,10 +243,14 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
         }
         Object::Instance(o) => match in_world(o) {
             Some(object) => return hull(&object),
-            None => match o.object() {
-                Object::Cuboid(cuboid) => of_box(cuboid, |p| o.placement().point(p), o.placement().scale()),
-                _ => return None,
-            },
+            None => {
+                let ends = match o.object() {
+                    Object::Cuboid(cuboid) => [cuboid.min(), cuboid.max()],
+                    Object::Roundbox(roundbox) => [roundbox.min(), roundbox.max()],
+                    _ => return None,
+                };
+                of_box(ends, |p| o.placement().point(p), o.placement().scale())
+            }
         },
     })
 }
@@ -296,6 +307,7 @@ mod tests {
             ("Torus 3 .05 0 0 -10 0 0 1", 1.0),
             ("Capsule .05 -5 0 -10 5 0 -10", 1.0),
             ("Capsule .05 0 0 -10 0 0 -10", 1.0),
+            ("Roundbox -5 -.05 -10.1 5 .05 -10 .04", 1.0),
             ("Box -5 -.05 -10.1 5 .05 -10", 1.0),
             ("Triangle -5 0 -10 5 0 -10 5 .1 -10", 1.0),
             ("Disc 1 0 0 -10 0 1 .05", 1.0),

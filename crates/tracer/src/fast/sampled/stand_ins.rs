@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{
-    Capsule, Cone, Cuboid, Cylinder, Instance, Material, Object, Placement, SharedSlice, Sphere, Torus,
-    Triangle,
+    Capsule, Cone, Cuboid, Cylinder, Instance, Material, Object, Placement, Roundbox, SharedSlice, Sphere,
+    Torus, Triangle,
 };
 
 use super::gauge::{Gauge, tips};
@@ -63,6 +63,7 @@ impl<'a> Widener<'a> {
                 }
             }
             Object::Cuboid(o) => self.brick((o.min(), o.max()), None, HALVINGS),
+            Object::Roundbox(o) => self.brick((o.min(), o.max()), None, HALVINGS),
             Object::Plane(_) | Object::Mesh(_) => {}
             Object::Disc(o) => {
                 let n = unit(o.normal());
@@ -88,6 +89,9 @@ impl<'a> Widener<'a> {
                 (Some(object), _) => self.widen(&object),
                 (None, Object::Cuboid(cuboid)) => {
                     self.brick((cuboid.min(), cuboid.max()), Some(o.placement()), HALVINGS);
+                }
+                (None, Object::Roundbox(roundbox)) => {
+                    self.brick((roundbox.min(), roundbox.max()), Some(o.placement()), HALVINGS);
                 }
                 (None, _) => {}
             },
@@ -152,7 +156,14 @@ pub(super) fn repainted(object: &Object, material: Material) -> Option<Object> {
             Object::from(Torus::new(o.radius(), o.thickness(), o.center(), o.normal(), material).ok()?)
         }
         Object::Capsule(o) => Object::from(Capsule::new(o.radius(), o.ends(), material).ok()?),
-        Object::Instance(o) => return repainted(&in_world(o)?, material),
+        Object::Roundbox(o) => Object::from(Roundbox::new(*o.corners(), o.radius(), material).ok()?),
+        Object::Instance(o) => match in_world(o) {
+            Some(object) => return repainted(&object, material),
+            None => {
+                let group = SharedSlice::from(vec![repainted(o.object(), material)?]);
+                Object::from(Instance::new(&group, 0, &Arc::new(*o.placement())))
+            }
+        },
         Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
             return None;
         }

@@ -53,7 +53,7 @@ impl Shape for Cuboid {
 }
 
 /// Returns the axis of the largest component.
-fn largest(v: DVec3) -> usize {
+pub(super) fn largest(v: DVec3) -> usize {
     let v = v.abs();
     if v.x >= v.y && v.x >= v.z {
         0

@@ -41,7 +41,7 @@ const FAR: f64 = 8.0;
 const EDGE: f64 = 8.0;
 
 /// The cosine above which a normal is that of a cap, which is the axis. A normal of a side is farther from the axis.
-const CAP: f64 = 1.0 - 1e-12;
+pub(super) const CAP: f64 = 1.0 - 1e-12;
 
 impl Frustum {
     /// Returns whether a unit normal is that of a cap.

@@ -12,6 +12,7 @@ mod double_double;
 mod frustum;
 mod instance;
 mod plane;
+mod roundbox;
 mod sphere;
 mod torus;
 mod triangle;
@@ -98,6 +99,7 @@ fn shape(object: &Object) -> &dyn Shape {
         Object::Cone(cone) => cone,
         Object::Torus(torus) => torus,
         Object::Capsule(capsule) => capsule,
+        Object::Roundbox(roundbox) => roundbox,
         Object::Instance(instance) => instance,
         Object::Mesh(_) => unreachable!("meshes are expanded to their triangles"),
     }
