@@ -21,7 +21,7 @@ use rayfold_pipeline::SystemClock;
 use rayfold_pipeline::keys::{Animation, ScriptName};
 use rayfold_pipeline::manifest::Manifest;
 use rayfold_pipeline::store::S3Store;
-use rayfold_scene::Container;
+use rayfold_scene::{Container, UnknownContainer};
 
 use crate::error::{guarded, os_error, scene_error};
 use crate::given::Given;
@@ -38,7 +38,8 @@ struct Order {
     bucket: String,
     animation: Animation,
     submission: Submission,
-    /// The file of the GIF; without one its bytes are returned.
+    output: Container,
+    /// The file to write; without one its bytes are returned.
     path: Option<PathBuf>,
     is_awaited: bool,
 }
@@ -50,7 +51,7 @@ struct Reports {
     failed: RefCell<Option<PyErr>>,
 }
 
-/// Makes the scripts, and the files that they name, those of an animation in a bucket. `place` is `s3://BUCKET/NAME`. Waits for the GIF if it `is_awaited`,
+/// Makes the scripts, and the files that they name, those of an animation in a bucket. `place` is `s3://BUCKET/NAME`. Waits for the `output`, a file such as `gif`, if it `is_awaited`,
 /// and returns its bytes, or writes them to `path`. `report` is called with a kind, the number done and the total.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the properties of a submission, which Python names")]
@@ -61,12 +62,15 @@ pub(crate) fn submit<'py>(
     files: Vec<(String, PathBuf)>,
     given: Vec<Given>,
     settings: String,
+    output: &str,
     path: Option<PathBuf>,
     delete: bool,
     is_awaited: bool,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Option<Bound<'py, PyBytes>>> {
     let (bucket, animation) = parse_place(place)?;
+    let output: Container =
+        output.parse().map_err(|error: UnknownContainer| PyValueError::new_err(error.to_string()))?;
     if let Some(path) = &path {
         probe(path).map_err(os_error)?;
     }
@@ -80,7 +84,7 @@ pub(crate) fn submit<'py>(
         other => PyOSError::new_err(other.to_string()),
     })?;
     let submission = if delete { submission.deleting_all_others() } else { submission };
-    let order = Order { bucket, animation, submission, path, is_awaited };
+    let order = Order { bucket, animation, submission, output, path, is_awaited };
     let gif = py.detach(|| guarded(|| run(&order, Reports { report, failed: RefCell::default() })))??;
     Ok(gif.map(|gif| PyBytes::new(py, &gif)))
 }
@@ -158,11 +162,11 @@ async fn deliver(
     }
     match &order.path {
         Some(path) => {
-            client.download(&order.animation, Container::Gif, path).await.map(|_| None).map_err(wrong)
+            client.download(&order.animation, order.output, path).await.map(|_| None).map_err(wrong)
         }
         None => {
             let mut gif = Vec::new();
-            client.fetch(&order.animation, Container::Gif, &mut gif).await.map_err(wrong)?;
+            client.fetch(&order.animation, order.output, &mut gif).await.map_err(wrong)?;
             Ok(Some(gif))
         }
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use rayfold_files::Folder;
-use rayfold_scene::{AnimationSettings, parse_settings};
+use rayfold_scene::{AnimationSettings, UnknownContainer, parse_settings};
 
 use crate::error::{guarded, scene_error};
 
@@ -70,9 +70,13 @@ pub(crate) fn settings_text(
     loops: u16,
     bounce: bool,
     durations: BTreeMap<u64, f64>,
+    output: &str,
 ) -> PyResult<String> {
+    let output =
+        output.parse().map_err(|error: UnknownContainer| PyValueError::new_err(error.to_string()))?;
     let settings = AnimationSettings::new(frames, fps, loops)
         .and_then(|settings| settings.bouncing(bounce).with_durations(durations))
+        .and_then(|settings| settings.with_outputs(vec![output]))
         .map_err(|error| PyValueError::new_err(error.to_string()))?;
     serde_json::to_string_pretty(&settings)
         .map(|text| text + "\n")

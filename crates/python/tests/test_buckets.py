@@ -69,7 +69,12 @@ def test_the_gif_of_a_bucket_is_the_one_that_is_drawn_here(bucket, tmp_path):
     out = tmp_path / "wave.gif"
     assert moving.submit(f"{bucket}/shots/wave/", out, progress=False) is None
     assert out.read_bytes() == expected
-    # Nothing is uploaded again, and the command knows it.
+    for output in ["webp", "apng"]:
+        out, here = tmp_path / f"wave.{output}", tmp_path / f"here.{output}"
+        moving.save(here, progress=False)
+        assert moving.submit(f"{bucket}/wave", out, progress=False) is None
+        assert out.read_bytes() == here.read_bytes()
+    # Only the settings are uploaded again, and the command knows it.
     assert moving.submit(f"{bucket}/wave", progress=False) == expected
 
 
@@ -161,7 +166,7 @@ def test_a_report_that_fails_ends_the_run(bucket, monkeypatch):
         (lambda f: f.submit("s3://films"), ValueError, "s3://films/wave"),
         (lambda f: f.submit("s3:///wave"), ValueError, "s3://films/wave"),
         (lambda f: f.submit("s3://films/a/../b"), ValueError, r"a/\.\./b"),
-        (lambda f: f.submit("s3://films/wave", "a.webp"), ValueError, "ends in .gif"),
+        (lambda f: f.submit("s3://films/wave", "a.mp4"), ValueError, "ends in .gif"),
         (lambda f: f.submit("s3://films/wave", "a.gif", wait=False), ValueError, "wait=False"),
         (lambda f: f.submit("s3://films/wave", "no/such/folder/a.gif"), OSError, "no/such/folder"),
         (lambda f: rf.animation(frame, frames=2, loop=-1).submit("s3://films/wave"), ValueError, "shown once"),

@@ -90,7 +90,7 @@ class Animation:
         address : str
             the bucket and the animation's name in it: `"s3://films/wave"`.
         path : str or path, optional
-            the GIF's file.
+            the file to write: `.gif`, `.webp`, `.apng` or `.y4m`. The bucket then holds that file of the animation.
         delete : bool
             whether scripts of that name in the bucket that the animation does not have are deleted. Otherwise they are an
             error, and nothing is uploaded.
@@ -103,13 +103,17 @@ class Animation:
         delete = _arguments.flag("submit", "delete", delete)
         wait = _arguments.flag("submit", "wait", wait)
         progress = _arguments.flag("submit", "progress", progress)
+        output = "gif"
         if path is not None:
             path = _arguments.path("submit", "path", path)
-            if not path.lower().endswith(".gif"):
-                raise ValueError(f"submit(): path is that of a GIF, which ends in .gif, not {_arguments.shown(path)}")
+            output = os.path.splitext(path)[1].lower().removeprefix(".")
+            if output not in ("gif", "webp", "apng", "y4m"):
+                raise ValueError(
+                    f"submit(): path is that of an animation, which ends in .gif, .webp, .apng or .y4m, not {_arguments.shown(path)}"
+                )
             if not wait:
                 raise ValueError("submit(): there is no file without waiting: expected either path or wait=False")
-        scripts, settings = self._folder(has_one_size=True)
+        scripts, settings = self._folder(has_one_size=True, output=output)
         texts = [(name, text) for name, text, _ in scripts]
         files, given = {}, {}
         for folder, names, in_memory in (named for _, _, named in scripts):
@@ -122,7 +126,9 @@ class Animation:
         with _Progress(progress) as bar:
             report = bar.at if progress else None
             files = [(name, path) for name, path in files.items() if name not in given]
-            return _rayfold.submit(address, texts, files, list(given.values()), settings, path, delete, wait, report)
+            return _rayfold.submit(
+                address, texts, files, list(given.values()), settings, output, path, delete, wait, report
+            )
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         if self._shown is None:
@@ -268,7 +274,7 @@ class Animation:
             file = name[: digits.start()] + shown + name[digits.end() :]
             _rayfold.write_file(os.path.join(folder, file), image.png())
 
-    def _folder(self, has_one_size=False):
+    def _folder(self, has_one_size=False, output="gif"):
         """The name of each script, without `.txt`, its text and the files that it names; and the text of `animation.json`."""
         if self.loop == -1:
             raise ValueError("animation.json cannot say that an animation is shown once: expected a loop from 0")
@@ -292,7 +298,7 @@ class Animation:
             raise ValueError(
                 f"the scripts have {frames} frames, not {length}: a script is saved whole, so that `frames` cannot cut it"
             )
-        return scripts, _rayfold.settings_text(frames, self.fps, self.loop, self.bounce, self.durations)
+        return scripts, _rayfold.settings_text(frames, self.fps, self.loop, self.bounce, self.durations, output)
 
     def _save_scripts(self, folder):
         scripts, settings = self._folder()

@@ -87,7 +87,7 @@ def number(call, name, value):
 def playback(call, fps, loop, bounce, seconds):
     """The bounds of an animation are the language's: said at the call, and not when it is saved."""
     try:
-        _rayfold.settings_text(None, fps, max(loop, 0), bounce, seconds)
+        _rayfold.settings_text(None, fps, max(loop, 0), bounce, seconds, "gif")
     except ValueError as error:
         raise ValueError(f"{call}(): {error}") from None
 
