@@ -12,7 +12,7 @@ locals {
 resource "aws_s3_bucket" "this" {
   count = local.made_here
 
-  #checkov:skip=CKV_AWS_144:Frames and GIFs can be made again from the scripts, and their owner has those
+  #checkov:skip=CKV_AWS_144:Frames and animations can be made again from the scripts, and their owner has those
   #checkov:skip=CKV_AWS_145:The key is optional (kms_key_arn): with it the same bytes render again
   bucket        = coalesce(var.bucket_name, "${var.name}-${local.account_id}-${local.region}")
   force_destroy = var.force_destroy

@@ -118,8 +118,8 @@ resource "aws_lambda_function" "this" {
 }
 
 # A function that wakes itself without end is stopped by Lambda. The longest chain here is script, part, band, claim, and one
-# more claim for each further invocation that a long GIF takes: one of more than a dozen is stopped, and the sweep takes it up
-# again. This spells out the default, so that nobody turns it off in passing.
+# more claim for each further invocation that a long animation takes: one of more than a dozen is stopped, and the sweep takes
+# it up again. This spells out the default, so that nobody turns it off in passing.
 resource "aws_lambda_function_recursion_config" "this" {
   for_each = aws_lambda_function.this
 

@@ -30,7 +30,7 @@ locals {
     })
     assemble = merge(var.assemble, {
       program     = "assemble"
-      description = "Writes the GIF, and sweeps"
+      description = "Writes the animations, and sweeps"
     })
     # The assemble program once more, with a short timeout: a queue must hide a batch for longer than its reader may
     # take, and a record that fails once would wait for that long.

@@ -9,12 +9,12 @@ output "bucket_arn" {
 }
 
 output "sync_command" {
-  description = "Uploads the folder FOLDER as the animation FOLDER; the GIF appears as animations/FOLDER.gif"
+  description = "Uploads the folder FOLDER as the animation FOLDER; the GIF appears as animations/FOLDER.gif, or the files that animation.json asks for"
   value       = "aws s3 sync FOLDER s3://${local.bucket}/scripts/FOLDER/ --region ${local.region}"
 }
 
 output "submit_command" {
-  description = "Checks the folder FOLDER, uploads what changed, waits, and downloads the GIF"
+  description = "Checks the folder FOLDER, uploads what changed, waits, and downloads the GIF, or the files that animation.json asks for"
   value       = "AWS_REGION=${local.region} rayfold submit FOLDER --bucket ${local.bucket}"
 }
 

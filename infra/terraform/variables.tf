@@ -48,7 +48,7 @@ variable "force_destroy" {
 }
 
 variable "noncurrent_version_days" {
-  description = "Days to keep overwritten or deleted scripts and GIFs; the pipeline's own working objects are kept one day"
+  description = "Days to keep overwritten or deleted scripts and animations; the pipeline's own working objects are kept one day"
   type        = number
   default     = 30
   nullable    = false
@@ -120,14 +120,14 @@ variable "bucket_policy_statements" {
 }
 
 variable "eventbridge_enabled" {
-  description = "Whether the bucket tells EventBridge of its objects, so that rules there can act on a finished GIF (`animations/`)"
+  description = "Whether the bucket tells EventBridge of its objects, so that rules there can act on a finished file (`animations/`)"
   type        = bool
   default     = false
   nullable    = false
 }
 
 variable "finished_topic_arn" {
-  description = "ARN of an SNS topic that gets a message for each finished GIF; its policy must let s3.amazonaws.com publish. Null sends none"
+  description = "ARN of an SNS topic that gets a message for each finished file (`animations/`); its policy must let s3.amazonaws.com publish. Null sends none"
   type        = string
   default     = null
 
@@ -190,7 +190,7 @@ variable "render" {
 }
 
 variable "assemble" {
-  description = "Size of the assemble function, which writes GIFs and sweeps"
+  description = "Size of the assemble function, which writes the animations and sweeps"
   type = object({
     memory_mb            = optional(number, 3008)
     timeout_s            = optional(number, 900)

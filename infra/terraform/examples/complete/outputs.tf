@@ -9,7 +9,7 @@ output "sync_command" {
 }
 
 output "submit_command" {
-  description = "Uploads a folder, waits, and downloads the GIF"
+  description = "Uploads a folder, waits, and downloads the animation"
   value       = module.rayfold.submit_command
 }
 
