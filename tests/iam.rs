@@ -20,7 +20,7 @@ use stage::stores::on_every_store_with_roles;
 const BUCKET: &str = "films";
 
 /// One key of each kind, and some keys outside the pipeline.
-const KEYS: [&str; 29] = [
+const KEYS: [&str; 31] = [
     "scripts/a/1.txt",
     "scripts/a/animation.json",
     "parts/a/1@v-p1/2.json",
@@ -41,12 +41,14 @@ const KEYS: [&str; 29] = [
     "frames/a/1@v-p1/2.begun-2",
     "frames/a/@assembler.json",
     "frames/a/@sweep.json",
+    "frames/a/@output.webp",
     "manifests/a.json",
     "manifests/a.json~0123456789abcdef",
     "assemblies/a/1-g.json",
     "retries/a/1@v-p1/1",
     "checkpoints/a.state",
     "animations/a.gif",
+    "animations/a.webp",
     "films/a.gif",
     "frames.json",
     "animation.json",
@@ -79,9 +81,9 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
     };
     let errors = ["frames/a/1@v-p1.error.json", "frames/a/1@v-p1/2.error.json"];
     let receipts = || keys(&["frames/"]).into_iter().filter(|key| !key.ends_with('/'));
-    // All except the leases.
-    let leases = ["frames/a/@assembler.json", "frames/a/@sweep.json"];
-    let results: Vec<&str> = receipts().filter(|key| !leases.contains(key)).collect();
+    // All except the assembler's own.
+    let own = ["frames/a/@assembler.json", "frames/a/@sweep.json", "frames/a/@output.webp"];
+    let results: Vec<&str> = receipts().filter(|key| !own.contains(key)).collect();
     let frames: Vec<&str> = receipts().filter(|key| key.ends_with(".png")).collect();
     let bands = ["frames/a/1@v-p1.2-of-3.band", "frames/a/1@v-p1/2.2-of-3.band"];
     match role {
@@ -94,7 +96,7 @@ fn allowed(role: &str) -> Vec<(&'static str, Vec<&'static str>)> {
         ],
         "assemble" => {
             let written = keys(&["manifests/", "animations/", "retries/", "assemblies/", "checkpoints/"]);
-            let written = [written, errors.to_vec(), leases.to_vec()].concat();
+            let written = [written, errors.to_vec(), own.to_vec()].concat();
             vec![
                 ("list", keys(&["scripts/", "parts/", "frames/", "manifests/", "retries/"])),
                 ("read", keys(&["scripts/", "frames/", "manifests/", "checkpoints/", "animations/"])),

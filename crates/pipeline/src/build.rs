@@ -125,6 +125,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             }
             Ok(Encoded::No(ended)) => Ok(ended),
             Ok(Encoded::Alpha) => Ok(Built::Refused(Reason::new("the encoder takes no frames with alpha"))),
+            // No attempt would come further.
+            Err(error @ Error::TooLarge { .. }) => Ok(Built::Refused(Reason::new(error.to_string()))),
             // The checkpoint stands: the next attempt continues from there.
             Err(error) if held.has_checkpoint && (error.is_retryable() || error.is_out_of_time()) => {
                 return Err(error);
@@ -161,6 +163,10 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         };
         if let Err(error) = upload.write(rest).await {
             return match error {
+                error @ Error::TooLarge { .. } => {
+                    let refused = Built::Refused(Reason::new(error.to_string()));
+                    self.give_up(upload, head, held, Ok(refused)).await
+                }
                 // The checkpoint stands.
                 error if held.has_checkpoint && error.is_retryable() => Err(error),
                 error if held.has_checkpoint && error.is_not_found() => {

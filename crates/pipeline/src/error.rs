@@ -44,6 +44,9 @@ pub enum Error {
         /// The error of the store.
         source: Cause,
     },
+    /// An upload has more parts than the store takes.
+    #[error("{key} would be larger than {limit_gb} GB, the most that can be uploaded in parts")]
+    TooLarge { key: String, limit_gb: u64 },
     /// The environment does not say in which region the bucket is; nothing was asked of the store.
     #[error("found no AWS region: set AWS_REGION, or a region in the AWS profile")]
     NoRegion,

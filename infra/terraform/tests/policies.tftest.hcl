@@ -100,8 +100,8 @@ run "objects" {
       ]))
       } == {
       render   = "assemblies/* frames/*.band frames/*.begun-* frames/*.cut-* frames/*.error.json frames/*.files-* frames/*.png frames/*.split-* frames/*.taken frames/*.waits.json manifests/* parts/*"
-      assemble = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@sweep.json manifests/* retries/*"
-      record   = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@sweep.json manifests/* retries/*"
+      assemble = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@output.* frames/*/@sweep.json manifests/* retries/*"
+      record   = "animations/* assemblies/* checkpoints/* frames/*.error.json frames/*/@assembler.json frames/*/@output.* frames/*/@sweep.json manifests/* retries/*"
     }
     error_message = "nobody writes scripts, and only assemble writes GIFs"
   }

@@ -114,6 +114,23 @@ async fn a_gif_whose_parts_cannot_be_sent_is_given_up_and_why_is_said() {
     }
 }
 
+/// At any part, also of one that is gone on with.
+#[tokio::test]
+async fn a_file_that_is_larger_than_an_upload_may_be_is_refused() {
+    let too_large = || Error::TooLarge { key: "animations/film.gif".into(), limit_gb: 83 };
+    for nth in [1, parts(false).await] {
+        let world = World::new();
+        let claim = world.announced(2).await;
+        world.answers(PART, nth, u32::MAX - nth, too_large);
+        let assembled = world.assemble(&world.joiner(), &claim).await.unwrap();
+        assert_eq!((assembled.built, assembled.status), (0, Status::Refused));
+        let reason = world.manifest().head.refusal.unwrap().reason.unwrap();
+        assert!(reason.message.contains("83 GB"), "{}", reason.message);
+        assert_eq!((world.gif(), world.uploads()), (None, 0));
+        assert!(world.is_at_rest());
+    }
+}
+
 /// A transient error leaves it to the next attempt, an upload that is gone is begun again, and all
 /// other errors are reported.
 #[tokio::test]

@@ -15,6 +15,9 @@ use crate::{Error, Result};
 /// objects of 78 GiB.
 const PART: usize = 8 << 20;
 
+/// The most parts of an upload.
+const MAX_PARTS: usize = 10_000;
+
 /// An object being written to an [`S3Store`].
 #[derive(Debug)]
 pub struct S3Upload {
@@ -61,6 +64,10 @@ impl S3Upload {
 
     async fn send_next(&mut self, body: Bytes) -> Result<()> {
         let number = self.parts.len() + 1 + usize::from(self.start.is_some());
+        if number > MAX_PARTS {
+            let limit_gb = (MAX_PARTS * PART / 1_000_000_000) as u64;
+            return Err(Error::TooLarge { key: self.key.clone(), limit_gb });
+        }
         let sent = self.send_part(i32::try_from(number).unwrap_or(i32::MAX), body).await?;
         self.parts.push(sent);
         Ok(())

@@ -297,7 +297,7 @@ function Result({ run: now, first }: { readonly run: Run; readonly first: RunFil
               Download {file.format} ({size(file.bytes)})
             </a>
           ))}
-          <a class="button" href={resource("frames.zip", { run: now.run })} download={`${file}-frames.zip`}>
+          <a class="button" href={resource("frames.zip", { run: now.run })} download={`${name}-frames.zip`}>
             Download frames
           </a>
         </span>
