@@ -399,16 +399,20 @@ total: number,
 behind: boolean, 
 /** Nothing more will happen unless a script changes. */
 settled: boolean, 
-/** The existing GIF, if there is one. */
-gif: GifInfo | null, };
+/** The existing files, in the order in which the settings ask for them. */
+files: ReadonlyArray<RunFile>, };
 
-/** A GIF in the bucket. */
-export type GifInfo = { 
+/** A file in the bucket that was made of an animation. */
+export type RunFile = { 
+/** The ending of its name, without a dot. */
+ending: string, 
+/** The name of its format. */
+format: string, 
 /** The size of the file. */
 bytes: number, 
-/** The version, so that another GIF has another address. */
+/** The version, so that another file has another address. */
 version: string, 
-/** The GIF shows the newest scripts. */
+/** The file shows the newest scripts. */
 current: boolean, };
 
 /** An update of a run. Contains only the frames that changed since the last update. */
@@ -439,8 +443,8 @@ total: number,
 behind: boolean, 
 /** Nothing more will happen unless a script changes. */
 settled: boolean, 
-/** The existing GIF, if there is one. */
-gif: GifInfo | null, };
+/** The existing files, in the order in which the settings ask for them. */
+files: ReadonlyArray<RunFile>, };
 
 /** The state of a run without its frames. */
 export type RunState = { 
@@ -466,8 +470,8 @@ total: number,
 behind: boolean, 
 /** Nothing more will happen unless a script changes. */
 settled: boolean, 
-/** The existing GIF, if there is one. */
-gif: GifInfo | null, };
+/** The existing files, in the order in which the settings ask for them. */
+files: ReadonlyArray<RunFile>, };
 
 /** The state of a frame. */
 export type FrameUpdate = { 
