@@ -157,6 +157,48 @@ async fn a_submitted_folder_becomes_the_gif_that_render_makes() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_submitted_folder_becomes_all_files_that_it_asks_for() {
+    on_every_store(async |store| {
+        let mut cloud = cloud(store, |_| {}).await;
+        cloud.write("film/1.txt", scene(8.0));
+        cloud.write("film/2.txt", scene(12.0));
+        cloud.write("film/animation.json", "{\"outputs\": [\"webp\", \"gif\"], \"bounce\": true}");
+        let said = cloud.says("submit film -o film.apng", 1);
+        let right = "add \"outputs\": [\"webp\", \"gif\", \"apng\"] to its animation.json";
+        assert!(said.contains("no APNG is made of film, but WebP and GIF") && said.contains(right), "{said}");
+        assert_eq!(cloud.keys("scripts/").await, [""; 0]);
+
+        cloud.rayfold("submit film", 0);
+        for ending in ["webp", "gif"] {
+            cloud.rayfold(&format!("render film -o local.{ending}"), 0);
+            assert!(
+                cloud.read(&format!("film.{ending}")) == cloud.read(&format!("local.{ending}")),
+                "{ending}"
+            );
+        }
+        assert_eq!(cloud.work().await, (2, 2));
+        let table = cloud.prints("status");
+        assert!(table.contains("2 of 2 frames, WebP of ") && table.contains(", GIF of "), "{table}");
+        let report: serde_json::Value =
+            serde_json::from_str(&cloud.prints("status film --format json")).unwrap();
+        let film = &report["animations"][0];
+        assert_eq!(film["outputs"]["webp"]["key"], "animations/film.webp");
+        assert_eq!(
+            (&film["outputs"]["webp"]["current"], &film["gif"]["current"]),
+            (&true.into(), &true.into())
+        );
+        cloud.rayfold("fetch film -o fetched.webp", 0);
+        assert_eq!(cloud.read("fetched.webp"), cloud.read("film.webp"));
+        let said = cloud.says("fetch film -o fetched.y4m", 1);
+        assert!(said.contains("no Y4M is made of film"), "{said}");
+
+        cloud.rayfold("remove film --yes", 0);
+        assert_eq!(cloud.keys("").await, [""; 0]);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn removing_leaves_nothing_of_an_animation_and_everything_of_others() {
     on_every_store(async |store| {
         let mut cloud = cloud(store, |_| {}).await;

@@ -130,8 +130,8 @@ impl<'a> FileSets<'a> {
     }
 }
 
-/// Whether a version of a script is drawn, or invocations are at it. Those for parts and bands of it that began before a
-/// file was `changed` may have drawn nothing; without a time it is absent now.
+/// Whether a version of a script is drawn, or invocations are at it. Those that began before a file was `changed` may have
+/// ended for another version, and drawn nothing of this one; without a time the file is absent now.
 fn is_drawn(
     receipts: &[ReceiptFound],
     name: &ScriptName,
@@ -145,7 +145,8 @@ fn is_drawn(
             Receipt::Frame { .. } | Receipt::Fault { .. } | Receipt::Waits { .. } => return true,
             Receipt::Split { .. } => return is_newer,
             Receipt::Cut { .. } => is_cut |= !is_newer,
-            Receipt::Taken { .. } => is_taken = true,
+            // A store may tell times in seconds: a change and what follows it may have the same.
+            Receipt::Taken { .. } => is_taken |= changed.is_some_and(|changed| found.modified >= changed),
             _ => {}
         }
     }
