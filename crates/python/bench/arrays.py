@@ -29,10 +29,17 @@ def stage():
     return scene
 
 
+def timed(work):
+    """Milliseconds by the clock and of all processors. Other programs disturb the first more."""
+    start, before = time.perf_counter(), time.process_time()
+    work()
+    return 1e3 * (time.perf_counter() - start), 1e3 * (time.process_time() - before)
+
+
 def run():
-    # Medians, and the least in parentheses, by the clock.
-    print(f"| {2 * SIDE**2:,} triangles | handed over, ms | read, ms | again, ms | goal |")
-    print("| --- | ---: | ---: | ---: | ---: |")
+    print("Medians by the clock, the least in parentheses, and medians of processor time, in ms.\n")
+    print(f"| {2 * SIDE**2:,} triangles | handed over | processor | read | processor | both again | goal |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     missed = False
     for kind, index in (("float32", "int32"), ("float64", "int64")):
         vertices, faces = grid(kind, index)
@@ -43,20 +50,14 @@ def run():
             for k in range(ROUNDS):
                 # Another mesh each time, so that nothing is known of it.
                 vertices[0, 1] = k
-                scene = stage()
-                start = time.perf_counter()
-                scene.mesh(vertices, faces, **more)
-                handed = time.perf_counter()
-                scene.frame_count
-                done = time.perf_counter()
-                other = stage()
-                other.mesh(vertices, faces, **more)
-                other.frame_count
-                end = time.perf_counter()
-                given.append(1e3 * (handed - start))
-                read.append(1e3 * (done - handed))
-                again.append(1e3 * (end - done))
-            missed |= statistics.median(given) > GOAL
-            shown = [f"{statistics.median(times):.0f} ({min(times):.0f})" for times in (given, read, again)]
-            print(f"| {kind}, {index}, {name} | {' | '.join(shown)} | {GOAL} |")
+                scene, other = stage(), stage()
+                given.append(timed(lambda: scene.mesh(vertices, faces, **more)))
+                read.append(timed(lambda: scene.frame_count))
+                again.append(timed(lambda: (other.mesh(vertices, faces, **more), other.frame_count)))
+            shown = []
+            for times in (given, read, again):
+                clock, processor = zip(*times)
+                shown += [f"{statistics.median(clock):.0f} ({min(clock):.0f})", f"{statistics.median(processor):.0f}"]
+            missed |= statistics.median(clock for clock, _ in given) > GOAL
+            print(f"| {kind}, {index}, {name} | {' | '.join(shown[:5])} | {GOAL} |")
     return int(missed)

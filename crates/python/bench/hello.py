@@ -54,7 +54,7 @@ def run():
 
         kinds = {
             "load and save, in a process that runs": lambda: rf.load(FOLDER).save(ours, progress=False),
-            "a process, with the start of Python and NumPy": lambda: subprocess.run(by_python, check=True),
+            "a process, with the start of Python": lambda: subprocess.run(by_python, check=True),
         }
         print("| 50 frames of hello | Python, ms | the command, ms | ratio by the clock | ratio of processor time | goal |")
         print("| --- | ---: | ---: | ---: | ---: | ---: |")

@@ -19,8 +19,8 @@ use crate::place::Place;
 /// A property of a vertex: its name, its type in PLY and the bytes of a value.
 type Column<'a> = (&'a [&'a str], &'static str, usize, &'a [u8]);
 
-/// The faces that are written in one piece.
-const FACES: usize = 1 << 16;
+/// The vertices or faces that are written in one piece: few enough to stay in the cache.
+const PIECE: usize = 1 << 13;
 
 /// Returns the type in PLY of one of NumPy, and the bytes of a value.
 fn type_of(name: &str) -> PyResult<(&'static str, usize)> {
@@ -92,32 +92,49 @@ fn ply(columns: &[Column<'_>], count: usize, faces: &[u8], corners: u8) -> Vec<u
     }
     file.resize(end + faces.len() / of_face * (of_face + 1), 0);
     let (vertices, rows) = file[start..].split_at_mut(count * of_vertex);
-    if columns.len() > 1 {
-        let mut offset = 0;
-        for (.., size, bytes) in columns {
-            for (row, values) in vertices.chunks_exact_mut(of_vertex).zip(bytes.chunks_exact(*size)) {
-                row[offset..offset + size].copy_from_slice(values);
-            }
-            offset += size;
-        }
+    // Small ones are written here: after a fork there is no pool of threads.
+    if count.max(faces.len() / of_face) <= PIECE {
+        write_vertices(vertices, columns, of_vertex, 0);
+        write_faces(rows, faces, corners);
+    } else {
+        let pieces = vertices.par_chunks_mut(PIECE * of_vertex).enumerate();
+        pieces.for_each(|(piece, rows)| write_vertices(rows, columns, of_vertex, piece * PIECE));
+        let rows = rows.par_chunks_mut(PIECE * (of_face + 1));
+        rows.zip(faces.par_chunks(PIECE * of_face))
+            .for_each(|(rows, faces)| write_faces(rows, faces, corners));
     }
-    // Side by side, in pieces of many faces.
-    let rows = rows.par_chunks_mut(FACES * (of_face + 1));
-    rows.zip(faces.par_chunks(FACES * of_face)).for_each(|(rows, faces)| {
-        let write = |row: &mut [u8], face: &[u8]| {
-            row[0] = corners;
-            row[1..].copy_from_slice(face);
-        };
-        // Rows of known lengths are copied faster, and most are triangles.
-        if corners == 3 {
-            let rows = rows.as_chunks_mut::<13>().0.iter_mut();
-            rows.zip(faces.as_chunks::<12>().0).for_each(|(row, face)| write(row, face));
-        } else {
-            let rows = rows.chunks_exact_mut(of_face + 1);
-            rows.zip(faces.chunks_exact(of_face)).for_each(|(row, face)| write(row, face));
-        }
-    });
     file
+}
+
+/// Writes the attributes of vertices from the `first` on, unless they are places alone, which are there already.
+fn write_vertices(rows: &mut [u8], columns: &[Column<'_>], of_vertex: usize, first: usize) {
+    if columns.len() == 1 {
+        return;
+    }
+    let mut offset = 0;
+    for (.., size, bytes) in columns {
+        let values = bytes[first * size..].chunks_exact(*size);
+        for (row, values) in rows.chunks_exact_mut(of_vertex).zip(values) {
+            row[offset..offset + size].copy_from_slice(values);
+        }
+        offset += size;
+    }
+}
+
+fn write_faces(rows: &mut [u8], faces: &[u8], corners: u8) {
+    let write = |row: &mut [u8], face: &[u8]| {
+        row[0] = corners;
+        row[1..].copy_from_slice(face);
+    };
+    // Rows of known lengths are copied faster, and most are triangles.
+    if corners == 3 {
+        let rows = rows.as_chunks_mut::<13>().0.iter_mut();
+        rows.zip(faces.as_chunks::<12>().0).for_each(|(row, face)| write(row, face));
+    } else {
+        let of_face = 4 * usize::from(corners);
+        let rows = rows.chunks_exact_mut(of_face + 1);
+        rows.zip(faces.chunks_exact(of_face)).for_each(|(row, face)| write(row, face));
+    }
 }
 
 /// Makes the file of a picture of levels: 1, 3 or 4 for each pixel, of 8 or 16 bits.
