@@ -241,7 +241,7 @@ fn expectation(fault: InvalidValue) -> String {
         InvalidValue::NoRadius => "expected a number greater than 0 at one end at least".into(),
         InvalidValue::ThickTorus => "expected `r` to be less than `R`".into(),
         InvalidValue::TooRound(most) => {
-            format!("expected `r` to be at most half of the shortest side, {most}").into()
+            format!("expected `r` to be at most half of the shortest side, {most}")
         }
         InvalidValue::NoGaze => "expected a target apart from the eye".into(),
         InvalidValue::FramesBackwards => "expected `a` to be at most `b`".into(),

@@ -36,15 +36,15 @@ struct Slab<S: Simd, E: Real> {
     /// The parameters at which rays enter and leave it; those of no numbers for rays along it.
     near: Lanes<S, E>,
     far: Lanes<S, E>,
-    /// How far the rays are, at the parameter 0, beyond the face by which they enter, and that by which they leave.
+    /// The places of the rays, at the parameter 0, beyond the face by which they enter, and that by which they leave.
     before: Lanes<S, E>,
     behind: Lanes<S, E>,
-    /// How far rays along it are from it; 0 for all others.
+    /// The places of rays along it, beyond the nearer face; 0 within it, and for all other rays.
     aside: Lanes<S, E>,
     direction: Lanes<S, E>,
 }
 
-/// How far rays are from the core along an axis, at the parameter 0, and how that grows.
+/// The place of rays beyond the core along an axis, at the parameter 0, and how it grows.
 type Beside<S, E> = (Lanes<S, E>, Lanes<S, E>);
 
 /// A place where rays cross the surface: the parameter, and the vector there from the core.
@@ -83,14 +83,14 @@ impl<S: Simd, E: Real> Slab<S, E> {
         }
     }
 
-    /// Returns how far rays are beside it from the parameter `at` on.
+    /// Returns the place of rays beyond it from the parameter `at` on.
     #[inline(always)]
     fn from(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
         let (is_before, is_behind) = (at.simd_lt(self.near), at.simd_ge(self.far));
         self.beside(simd, is_before, is_behind)
     }
 
-    /// Returns how far rays are beside it up to the parameter `at`.
+    /// Returns the place of rays beyond it up to the parameter `at`.
     #[inline(always)]
     fn up_to(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
         let (is_before, is_behind) = (at.simd_le(self.near), at.simd_gt(self.far));
