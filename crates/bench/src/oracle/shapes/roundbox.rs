@@ -1,6 +1,5 @@
 //! Boxes with round edges: six faces, twelve quarters of cylinders and eight eighths of spheres, each tried alone.
 
-use glam::DVec3;
 use rayfold_scene::Roundbox;
 
 use super::Shape;
@@ -117,6 +116,8 @@ fn part_at(roundbox: &Roundbox, line: &Line, t: &Real, part: Part) -> bool {
 #[cfg(test)]
 mod tests {
     use rayfold_scene::{Material, Object, Sphere};
+
+    use glam::DVec3;
 
     use super::*;
     use crate::oracle::nearest;
