@@ -9,7 +9,7 @@
 use std::time::Duration;
 
 use futures_util::stream::{self, StreamExt};
-use rayfold_scene::{AnimationSettings, Container};
+use rayfold_scene::Container;
 
 use crate::animator::{Animator, Encoding, Unfit};
 use crate::checkpoint::{Checkpoint, CheckpointHead, ResumedUpload};
@@ -75,7 +75,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             .metadata(GENERATION, head.generation.as_str());
         // A WebP begins with its length.
         let options = if output == Container::Webp { options.start_last() } else { options };
-        let begin = async |alpha| match animator.begin(&settings_of(head), output, alpha) {
+        let begin = async |alpha| match animator.begin(&head.counted_settings(), output, alpha) {
             Ok(encoding) => {
                 let upload = self.store.upload(&head.animation.output(output), options.clone()).await?;
                 Ok::<_, Error>(Ok(ResumedUpload { encoding, upload, frames: 0, pieces: 0 }))
@@ -196,7 +196,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<Encoded<'m>> {
         let ResumedUpload { encoding, upload, frames: before, .. } = made;
         let animation = &manifest.head.animation;
-        let settings = settings_of(&manifest.head);
+        let settings = manifest.head.counted_settings();
         let shown = settings.shown(&manifest.frames);
         let keys = shown.filter_map(|frame| Some((frame, frame_key(animation, frame)?)));
         let keys = keys.skip(usize::try_from(*before).unwrap_or(usize::MAX));
@@ -257,11 +257,6 @@ fn out_of_time(head: &Head, before: Duration, building: Duration) -> Result<Reas
         "1 of {total} frames were assembled in the {seconds} s that the assemble function had: give it more \
          time or memory and retry, or fetch the frames and assemble them locally"
     )))
-}
-
-/// The settings of an animation, with the number of frames that there are.
-pub(crate) fn settings_of(head: &Head) -> AnimationSettings {
-    head.settings.value.clone().unwrap_or_default().of_frames(head.total)
 }
 
 /// The key of a frame that is drawn.

@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::animator::Animator;
-use crate::build::settings_of;
 use crate::invocation::{Invocation, Mutation};
 use crate::keys::Generation;
 use crate::lease::HeldLease;
@@ -147,7 +146,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
                 && of.replaces.as_ref() == replaces
                 && of.frames <= head.total;
             if (fits || self.breaks(Mutation::TakeUpAnyCheckpoint))
-                && let Ok(encoding) = animator.resume(&settings_of(head), output, encoding).await
+                && let Ok(encoding) = animator.resume(&head.counted_settings(), output, encoding).await
             {
                 return Ok(Some(ResumedUpload { encoding, upload, frames: of.frames, pieces: of.pieces }));
             }

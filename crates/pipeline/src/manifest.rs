@@ -245,6 +245,11 @@ impl Head {
         settings.map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs)
     }
 
+    /// The settings of the animation, with the number of frames that there are.
+    pub(crate) fn counted_settings(&self) -> AnimationSettings {
+        self.settings.value.clone().unwrap_or_default().of_frames(self.total)
+    }
+
     /// The version of a file of this generation, if an assembler has seen it.
     pub fn version_of(&self, output: Container) -> Option<&ETag> {
         let made = if output == Container::Gif { self.gif.as_ref() } else { self.outputs.get(&output) };

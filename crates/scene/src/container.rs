@@ -1,3 +1,5 @@
+//! The file formats of animations.
+
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
