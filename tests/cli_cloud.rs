@@ -192,7 +192,7 @@ async fn a_submitted_folder_becomes_all_files_that_it_asks_for() {
         let said = cloud.says("fetch film -o fetched.y4m", 1);
         assert!(said.contains("no Y4M is made of film"), "{said}");
 
-        cloud.rayfold("remove film --yes", 0);
+        cloud.rayfold("remove film --delete", 0);
         assert_eq!(cloud.keys("").await, [""; 0]);
     })
     .await;

@@ -86,11 +86,11 @@ fn submit_recommended_flags_that_it_lacked() {
 fn submit_listed_endings_that_it_refused() {
     let folder = balls(1);
     folder.rayfold("submit balls --bucket nowhere -o x.mp4").assert().code(2).stderr_eq(str![[r#"
-error: cannot write x.mp4: expected a name that ends in .gif
+error: cannot write x.mp4: expected a name that ends in .gif, .apng, .webp or .y4m
 
 "#]]);
     folder.rayfold("fetch film --bucket nowhere -o x.mp4").assert().code(2).stderr_eq(str![[r#"
-error: cannot write x.mp4: expected .gif, or a pattern such as frames/%04d.png (or .tif)
+error: cannot write x.mp4: expected .gif, .webp, .apng or .y4m, or a pattern such as frames/%04d.png (or .tif)
 
 "#]]);
 }

@@ -102,11 +102,11 @@ impl Target {
 /// When the name does not end as such a file's, or stands for many files.
 #[cfg(feature = "network")]
 pub(crate) fn container_of(out: &Path) -> Result<Container, Usage> {
-    match Target::parse(out, None)? {
-        Target::Animation(container, Place::File(_)) => Ok(container),
+    match Target::parse(out, None) {
+        Ok(Target::Animation(container, Place::File(_))) => Ok(container),
         _ => {
-            let endings = Container::ALL.map(Container::ending).join(", .");
-            Err(Usage(format!("cannot write {}: expected a name that ends in .{endings}", out.display())))
+            let endings = "a name that ends in .gif, .apng, .webp or .y4m";
+            Err(Usage(format!("cannot write {}: expected {endings}", out.display())))
         }
     }
 }
