@@ -97,7 +97,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                     anyhow::bail!(not_asked_for(watch.outputs(), container, &animation.to_string()));
                 }
                 let is_current = watch.has_current(container);
-                if !is_current && !(args.last && watch.file(container).is_some()) {
+                let is_of_use = is_current || (args.last && watch.file(container).is_some());
+                if !is_of_use {
                     return Err(not_there(&watch, container, manifest, console));
                 }
                 if let (false, Some(age)) = (is_current, watch.age(container)) {

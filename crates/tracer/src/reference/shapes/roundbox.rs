@@ -303,7 +303,7 @@ mod tests {
             for (ray, fast) in rays.iter().zip(fast) {
                 let (marched, least) = march(*ray, half, radius, 1e-9);
                 let exact = distance(&object, *ray);
-                if least < 1e-9 || least > 1e-6 {
+                if !(1e-9..=1e-6).contains(&least) {
                     assert_eq!(exact.is_some(), marched.is_some(), "{ray:?} {half} {radius}");
                 }
                 assert_eq!(fast.is_some(), exact.is_some(), "{ray:?} {half} {radius}");
