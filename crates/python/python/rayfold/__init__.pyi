@@ -733,7 +733,7 @@ class Scene:
         stripes: tuple[Number, Material | str] | None = None,
         noise: tuple[Number, Material | str] | None = None,
         gradient: tuple[Number, Number, Material | str] | None = None,
-        image: tuple[str, Literal["uv", "ball"]] | tuple[str, Literal["flat"], Number] | tuple[str, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
+        image: tuple[str | Pixels, Literal["uv", "ball"]] | tuple[str | Pixels, Literal["flat"], Number] | tuple[str | Pixels, Literal["flat"], Number, Literal["xy", "xz", "zy"]] | None = None,
         own: bool | None = None,
         glow: Color | None = None,
         rough: Number | None = None,
