@@ -1,6 +1,6 @@
 //! The assembler makes the bucket agree with itself, whichever claim woke it.
 //!
-//! Each round reads the manifest and the versions and generations of the [files](crate::outputs), and lists, in this order.
+//! Each round reads the manifest and the versions and generations of the files (`outputs.rs`), and lists, in this order.
 //! Then it does what is due: it commits the manifest where it differs (without a claim: the assembler is here already),
 //! builds a file of a set that is done and settled, removes a file of a set that can have none. The assembler ends only
 //! on a round that wrote nothing, so that no file from an older listing stays, and no set that became whole while it

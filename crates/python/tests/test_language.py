@@ -50,7 +50,7 @@ def arguments(parameters, doc, next_number):
 
 def attempts(parameters, doc):
     """Arguments of which some are valid, whatever is to be greater than what."""
-    for step, first in [(1, 1), (-1, 40), (0.01, 0.1), (0.7, 2.3)]:
+    for step, first in [(1, 1), (-1, 40), (0.01, 0.1), (0.7, 2.3), (1, -5)]:
         yield arguments(parameters, doc, numbers(step, first))
 
 

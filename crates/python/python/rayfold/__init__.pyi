@@ -757,7 +757,6 @@ class Scene:
 
         In the names of the script, `r` is at most half of each side from `ux uy uz` to `vx vy vz`.
         """
-
     @overload
     def mesh(
         self,
