@@ -150,8 +150,15 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "thing").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 
 
+# Where one parameter bounds another, the message is about the one that is bounded.
+BOUNDED = {("roundbox", "u"): "radius", ("roundbox", "v"): "radius"}
+
+
 def is_named(message, call, parameter):
     """Whether a message says the function and the parameter."""
+    bounded = BOUNDED.get((call, parameter))
+    if bounded and is_named(message, call, bounded):
+        return True
     return re.search(rf"\b{re.escape(parameter)}\b", message) and re.search(rf"\b{re.escape(call)}\b", message)
 
 
