@@ -36,11 +36,12 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         "f64" => Precision::F64,
         _ => Precision::Auto,
     };
-    // The model beside the script, if there is one.
-    let model = std::path::Path::new(path).with_file_name("model.obj");
+    // The model and the picture beside the script, if they are there.
     let mut files = MemoryFiles::default();
-    if let Ok(bytes) = std::fs::read(model) {
-        files.insert("model.obj", bytes);
+    for name in ["model.obj", "sky.png"] {
+        if let Ok(bytes) = std::fs::read(std::path::Path::new(path).with_file_name(name)) {
+            files.insert(name, bytes);
+        }
     }
     let library = Library::new(files);
     let parsed = parse_with_files(path, &std::fs::read(path)?, &Limits::default(), &library);

@@ -105,6 +105,7 @@ pub fn run(args: &Args) -> Result<()> {
             let script = folder.path().join(format!("{k}.txt"));
             std::fs::write(&script, &subject.script)?;
             std::fs::write(script.with_file_name("model.obj"), subjects::MODEL)?;
+            std::fs::write(script.with_file_name("sky.png"), subjects::SKY)?;
             Ok(script)
         })
         .collect::<Result<_>>()?;

@@ -36,8 +36,8 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
     Ok(subjects)
 }
 
-/// A panorama.
-const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
+/// A panorama, which scenes name as `sky.png`.
+pub(super) const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
 
 /// The camera and the sun of the scenes of version 2.
 const BEFORE: &str = "\
