@@ -75,7 +75,8 @@ impl State {
             return Err(DAMAGED);
         }
         let mut picture = |channels: u8| {
-            let levels = size.0 as usize * size.1 as usize * usize::from(channels);
+            let mut factors = [size.1 as usize, channels.into()].into_iter();
+            let levels = factors.try_fold(size.0 as usize, usize::checked_mul).ok_or(DAMAGED)?;
             let (levels, left) = rest.split_at_checked(levels).ok_or(DAMAGED)?;
             rest = left;
             let (levels, (width, height)) = (levels.to_vec(), size);

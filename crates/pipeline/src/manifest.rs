@@ -241,8 +241,7 @@ impl Head {
 
     /// The files that are to be made of the animation.
     pub fn outputs(&self) -> &[Container] {
-        let settings = self.settings.value.as_ref();
-        settings.map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs)
+        self.settings.outputs()
     }
 
     /// The settings of the animation, with the number of frames that there are.
@@ -387,6 +386,11 @@ impl Frame {
 }
 
 impl Settings {
+    /// Returns the files that are to be made of the animation; of settings with a fault the usual ones.
+    pub(crate) fn outputs(&self) -> &[Container] {
+        self.value.as_ref().map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs)
+    }
+
     /// As when there is no `animation.json`.
     pub fn absent() -> Self {
         Settings { version: None, value: Some(AnimationSettings::default()), fault: None }

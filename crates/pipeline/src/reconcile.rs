@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 
-use rayfold_scene::AnimationSettings;
 use sha2::{Digest, Sha256};
 
 use crate::Timestamp;
@@ -126,11 +125,9 @@ pub fn reconcile(
     let waiting = count(|state| matches!(state, FrameState::Waiting(_)));
     let failed = count(|state| matches!(state, FrameState::Failed(_)));
     let generation = generation(&frames, settings);
-    let outputs = settings.value.as_ref();
-    let outputs = outputs.map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs);
     let refusal = results.receipts.iter().find_map(|found| match &found.receipt {
         Receipt::Refusal { generation: refused, output }
-            if *refused == generation && outputs.contains(output) =>
+            if *refused == generation && settings.outputs().contains(output) =>
         {
             Some(Fault { receipt: found.etag.clone(), reason: None })
         }
