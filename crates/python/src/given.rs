@@ -9,6 +9,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
@@ -46,7 +47,6 @@ pub(crate) type Givens = BTreeMap<String, Given>;
 struct Content {
     name: String,
     bytes: Vec<u8>,
-    tag: u64,
 }
 
 #[derive(Default)]
@@ -87,13 +87,10 @@ impl Given {
     }
 
     fn of(name: String, bytes: Vec<u8>) -> Self {
-        let tag = name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-        });
         let mut known = known();
         let there = known.all.get(&name).and_then(Weak::upgrade);
         let content = there.unwrap_or_else(|| {
-            let content = Arc::new(Content { name: name.clone(), bytes, tag });
+            let content = Arc::new(Content { name: name.clone(), bytes });
             known.all.insert(name, Arc::downgrade(&content));
             content
         });
@@ -201,10 +198,11 @@ impl<F: Files> Files for Both<F> {
     }
 
     fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
-        match content(name) {
-            Some(content) => Ok(Some(FileInfo { bytes: content.bytes.len() as u64, tag: content.tag })),
-            None => self.folder.look(name),
-        }
+        let Some(content) = content(name) else { return self.folder.look(name) };
+        // The content of a name never changes.
+        let mut tag = DefaultHasher::new();
+        name.hash(&mut tag);
+        Ok(Some(FileInfo { bytes: content.bytes.len() as u64, tag: tag.finish() }))
     }
 
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {

@@ -34,6 +34,22 @@ impl Real {
         Self(self.0.sqrt(BITS, ROUNDING))
     }
 
+    /// Returns the real roots of a·t² + 2·b·t + c, of which one is exact where c is 0; a is greater than 0.
+    pub(super) fn roots(a: &Self, b: &Self, c: &Self) -> Vec<Self> {
+        let discriminant = &(b * b) - &(a * c);
+        if discriminant.sign() < 0 {
+            return Vec::new();
+        }
+        // From a point of a surface one root is 0, which the other formula would round.
+        let root = discriminant.root();
+        let q = if b.sign() < 0 { &root - b } else { &(-b) - &root };
+        let mut roots = vec![q.over(a)];
+        if q.sign() != 0 {
+            roots.push(c.over(&q));
+        }
+        roots
+    }
+
     /// Returns the tangent of half an angle in degrees.
     pub(super) fn tangent_of_half(degrees: f64) -> Self {
         // The cache of constants only saves time.

@@ -61,18 +61,7 @@ fn in_ball(line: &Line, center: DVec3, radius: f64) -> Vec<Real> {
     let a = line.direction.dot(&line.direction);
     let b = from_center.dot(&line.direction);
     let c = &from_center.dot(&from_center) - &(&radius * &radius);
-    let discriminant = &(&b * &b) - &(&a * &c);
-    if discriminant.sign() < 0 {
-        return Vec::new();
-    }
-    // From a point of the ball itself one root is 0, which the other formula would round.
-    let root = discriminant.root();
-    let q = if b.sign() < 0 { &root - &b } else { &(-&b) - &root };
-    let mut roots = vec![q.over(&a)];
-    if q.sign() != 0 {
-        roots.push(c.over(&q));
-    }
-    roots
+    Real::roots(&a, &b, &c)
 }
 
 #[cfg(test)]

@@ -84,18 +84,7 @@ fn roots(roundbox: &Roundbox, line: &Line, part: Part) -> Vec<Real> {
     if a.sign() == 0 {
         return Vec::new();
     }
-    let discriminant = &(&b * &b) - &(&a * &c);
-    if discriminant.sign() < 0 {
-        return Vec::new();
-    }
-    // From a point of the surface itself one root is 0, which the other formula would round.
-    let root = discriminant.root();
-    let q = if b.sign() < 0 { &root - &b } else { &(-&b) - &root };
-    let mut roots = vec![q.over(&a)];
-    if q.sign() != 0 {
-        roots.push(c.over(&q));
-    }
-    roots
+    Real::roots(&a, &b, &c)
 }
 
 /// Returns whether the place at `t` is beside the core as the part is. A seam belongs to the parts on both sides.
