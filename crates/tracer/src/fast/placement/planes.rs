@@ -6,6 +6,7 @@
 //! looked up by their numbers, quantised to cells.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use glam::DVec3;
 
@@ -92,7 +93,8 @@ pub(crate) fn share(solids: &mut [Solid]) {
         .map(|(at, solid)| (solid.order, at))
         .collect();
     triangles.sort_unstable();
-    let mut planes: HashMap<[i64; 4], Vec<Plane>> = HashMap::new();
+    // The same hashes in every run, so that the same scene always takes as many instructions.
+    let mut planes: HashMap<[i64; 4], Vec<Plane>, BuildHasherDefault<DefaultHasher>> = HashMap::default();
     for (_, at) in triangles {
         let Shape::Triangle(triangle) = &mut solids[at].shape else { continue };
         let plane = Plane::of(triangle);

@@ -133,12 +133,11 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     let is_unclamped = pass.wanted.is_unclamped();
     let still = if let [moment] = pass.moments { Some(moment) } else { None };
     let nothing = still.filter(|moment| moment.shows_nothing(tile));
-    let backdrop = nothing.map_or([0.0; 3], |moment| moment.prepared.backdrop().map(E::widen));
-    let backdrop = DVec3::from_array(backdrop);
-    let nothing = nothing.map(|moment| moment.prepared.backdrop().map(|channel| quantised(channel.widen())));
+    let backdrop = nothing.map(|moment| moment.prepared.backdrop().map(E::widen));
     if pass.wanted.is_first_look {
-        match (nothing, &mut first) {
+        match (backdrop, &mut first) {
             (Some(color), Some(first)) => {
+                let color = color.map(quantised);
                 tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), color, NOTHING));
                 if let Some(CoverTile { first: Some(first), .. }) = &mut cover {
                     tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), [0; CHANNELS], NOTHING));
@@ -148,35 +147,28 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         }
     } else {
         pixels.resize(tile.side.0 * tile.side.1, Pixel::default());
-        tile.each_wanted_pixel(pass.wanted, |at| {
-            let pixel = &mut pixels[tile.in_tile(at)];
-            let looked = u32::from(first.is_some());
-            let goal = pass.wanted.goal(pixel.count().max(looked));
-            if let (0, Some(first), false) = (pixel.count(), &first, is_unclamped) {
-                pixel.add_equal(first.color(tile.in_rows(at)), 1);
-            }
-            if let Some(cover) = &mut cover {
-                cover.begin(tile.side.0 * tile.side.1);
-                let covered = &mut cover.pixels[tile.in_tile(at)];
-                if let (0, Some(first), false) = (covered.count(), &cover.first, is_unclamped) {
-                    covered.add_equal(first.color(tile.in_rows(at)), 1);
-                }
-                if nothing.is_some() {
-                    let count = goal - covered.count();
-                    match is_unclamped {
-                        true => covered.add_unclamped(DVec3::ZERO, count),
-                        false => covered.add_equal([0; CHANNELS], count),
+        if let Some(cover) = &mut cover {
+            cover.begin(tile.side.0 * tile.side.1);
+        }
+        let looked = u32::from(first.is_some());
+        if let Some(color) = backdrop {
+            let cover = cover.as_mut().map(|cover| &mut cover.pixels[..]);
+            add_backdrop(pass, tile, color, looked, (pixels, cover));
+        } else {
+            // Where samples are not clamped the first look is none of them.
+            let counted = first.as_deref().filter(|_| !is_unclamped);
+            tile.each_wanted_pixel(pass.wanted, |at| {
+                let pixel = &mut pixels[tile.in_tile(at)];
+                let goal = pass.wanted.goal(pixel.count().max(looked));
+                if let (0, Some(first)) = (pixel.count(), counted) {
+                    pixel.add_equal(first.color(tile.in_rows(at)), 1);
+                    if let Some(CoverTile { pixels, first: Some(first) }) = &mut cover {
+                        pixels[tile.in_tile(at)].add_equal(first.color(tile.in_rows(at)), 1);
                     }
                 }
-            }
-            match nothing {
-                Some(_) if is_unclamped => pixel.add_unclamped(backdrop, goal - pixel.count()),
-                Some(color) => pixel.add_equal(color, goal - pixel.count()),
-                None => {
-                    items.extend((pixel.count()..goal).map(|sample| Item { moment: 0, sample, pixel: at }))
-                }
-            }
-        });
+                items.extend((pixel.count()..goal).map(|sample| Item { moment: 0, sample, pixel: at }));
+            });
+        }
     }
     if let Some(time) = pass.dimensions.time {
         set_moments(pass, tile, time, &mut items, &mut workspace.sorted);
@@ -209,6 +201,44 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             unsettled.set(column, row, is_unsettled);
         });
     }
+}
+
+/// Gives the pixels of a tile that shows nothing but the background the samples that they lack.
+#[inline(never)]
+fn add_backdrop<E>(
+    pass: &Pass<E>,
+    tile: &SampledTile,
+    color: [f64; CHANNELS],
+    looked: u32,
+    layers: (&mut [Pixel], Option<&mut [Pixel]>),
+) {
+    if pass.wanted.is_unclamped() {
+        let colors = (DVec3::from_array(color), DVec3::ZERO);
+        add_equal(pass.wanted, tile, colors, looked, layers, Pixel::add_unclamped);
+    } else {
+        let colors = (color.map(quantised), [0; CHANNELS]);
+        add_equal(pass.wanted, tile, colors, looked, layers, Pixel::add_equal);
+    }
+}
+
+/// Adds equal samples to the pixels of a tile and to their cover.
+#[inline(always)]
+fn add_equal<T: Copy>(
+    wanted: PassTargets,
+    tile: &SampledTile,
+    (color, none): (T, T),
+    looked: u32,
+    (pixels, mut cover): (&mut [Pixel], Option<&mut [Pixel]>),
+    add: impl Fn(&mut Pixel, T, u32),
+) {
+    tile.each_wanted_pixel(wanted, |at| {
+        let pixel = &mut pixels[tile.in_tile(at)];
+        let count = wanted.goal(pixel.count().max(looked)) - pixel.count();
+        add(pixel, color, count);
+        if let Some(cover) = &mut cover {
+            add(&mut cover[tile.in_tile(at)], none, count);
+        }
+    });
 }
 
 impl SampledTile {
