@@ -2,8 +2,8 @@
 //!
 //! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request. While
 //! something moves, a rendering is completed, in a smaller size if it would take too long, so that there is always a
-//! picture. It then has one ray per pixel, whatever the script says. At rest, a slow picture begins with sketches:
-//! few pixels with one ray each, then more. A picture with several rays per pixel is shown after each pass over it.
+//! picture. It then has one ray per pixel, or a few where light goes round, whatever the script says. At rest, a slow
+//! picture begins with sketches: few pixels with as few rays, then more. A picture with several rays per pixel is shown after each pass over it.
 //! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
 //! waits behind another is outdated when it is shown.
 
@@ -32,6 +32,9 @@ const PATIENCE: f64 = 0.1;
 
 /// The smallest share of width and height that is drawn while something moves, and that of the first sketch.
 const LEAST: f64 = 0.125;
+
+/// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
+const FEW: u32 = 4;
 
 /// The factor by which the next sketch is wider and higher.
 const GROWTH: f64 = 2.0;
@@ -63,11 +66,9 @@ pub(crate) struct Motion {
 impl Motion {
     /// Returns the scene this many frames after the frame.
     fn after(&self, scene: &Scene, frames: f64) -> Scene {
-        match self.script.frame_after(self.frame, frames) {
-            Some(then) if self.is_free => Scene { screen: scene.screen, camera: scene.camera, ..then },
-            Some(then) => Scene { screen: scene.screen, ..then },
-            None => scene.clone(),
-        }
+        let Some(then) = self.script.frame_after(self.frame, frames) else { return scene.clone() };
+        let camera = if self.is_free { scene.camera } else { then.camera };
+        Scene { screen: scene.screen, camera, indirect: scene.indirect, ..then }
     }
 }
 
@@ -227,8 +228,9 @@ impl Shared {
     fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
-        let scene =
-            Scene { screen: smaller(whole.screen, share), samples: Samples::default(), ..whole.clone() };
+        let few = if whole.goes_round() { FEW } else { 1 };
+        let samples = Samples::new(few, 0.0).unwrap_or_default();
+        let scene = Scene { screen: smaller(whole.screen, share), samples, ..whole.clone() };
         let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
         let drawing = Drawing::new(&scene, &options)?;
         pace.prepared(start.elapsed());
@@ -376,6 +378,29 @@ mod tests {
         let mut shown = Shown::default();
         seen.iter().for_each(|picture| shown.put(picture));
         assert_eq!(shown.0, expected.into_rgba8());
+        painter.close();
+    }
+
+    #[test]
+    fn while_something_moves_indirect_light_is_shown() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        // The ball is lit by the glowing floor alone.
+        let text = "Material lit glow 1 1 1\nSphere 1 0 0 0  0 0 0  1 1 1\nPlane 0 -1 0 0 1 0 lit";
+        let brightness = |indirect: &str| {
+            let mut request = pinhole(1, &format!("Samples 16\nIndirect {indirect}\n{text}"));
+            request.scene.lights = Vec::new().into();
+            request.moving = true;
+            painter.want(request);
+            let picture = pictures.recv_timeout(Duration::from_secs(20)).unwrap();
+            painter.shown();
+            let mut shown = Shown::default();
+            shown.put(&picture);
+            let (width, height) = shown.0.dimensions();
+            shown.0.get_pixel(width / 2, height / 2).0[0]
+        };
+        assert_eq!(brightness("0"), 0);
+        assert!(brightness("1") > 0);
         painter.close();
     }
 

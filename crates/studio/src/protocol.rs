@@ -44,6 +44,8 @@ pub(crate) enum ClientMessage {
     Navigate { how: Navigation, x: f64, y: f64 },
     /// Look through a camera.
     Look { at: ViewPreset },
+    /// Leave out indirect light in the viewport, or draw it again.
+    Draft { on: bool },
     /// Write the current view into the script as its camera.
     KeepCamera,
     /// Set the numbers of a line from number `first` on. All changes with the same `gesture` are one step.
@@ -443,6 +445,8 @@ pub(crate) struct State {
     pub(crate) time: TimeState,
     /// Whether the view is that of a free camera.
     pub(crate) free: bool,
+    /// Whether the viewport leaves out indirect light, or `null` if the scene has none.
+    pub(crate) draft: Option<bool>,
     /// Number, width and height of the picture that was requested last; `None` if there is nothing to draw.
     pub(crate) picture: Option<(u32, u32, u32)>,
 }

@@ -36,6 +36,10 @@ use crate::values::changed;
 use crate::view::Orbit;
 use hold::Held;
 
+/// The reply to a move of what has no position.
+const NO_POSITION: &str =
+    "The selection has no position of its own. Models and words move in a group: Ctrl+G makes one.";
+
 /// The largest text that the page may send for a line, in bytes.
 const TEXT: usize = 1 << 20;
 
@@ -46,6 +50,8 @@ pub(crate) struct Session {
     frame: usize,
     /// The free camera, if it is in use.
     free: Option<Orbit>,
+    /// The viewport leaves out indirect light.
+    is_draft: bool,
     selection: Vec<usize>,
     held: Option<Held>,
     /// The number of messages received.
@@ -118,6 +124,7 @@ impl Session {
             size: (960, 540),
             frame: 0,
             free: None,
+            is_draft: false,
             selection: Vec::new(),
             held: None,
             asked: 0,
@@ -245,6 +252,10 @@ impl Session {
             ClientMessage::Look { at } => {
                 self.look(project, at);
                 self.outline(project, tell);
+                Change::Still
+            }
+            ClientMessage::Draft { on } => {
+                self.is_draft = on;
                 Change::Still
             }
             ClientMessage::KeepCamera => self.keep_camera(project, None, tell),
@@ -415,7 +426,10 @@ impl Session {
                     .filter_map(|&at| {
                         Some(edits::set(at, edits::moved(self.line(project, at)?, by, keying)?))
                     })
-                    .collect();
+                    .collect::<Vec<_>>();
+                if splices.is_empty() && !lines.is_empty() {
+                    tell.notice = Some(NO_POSITION.into());
+                }
                 self.edit(project, splices, None, tell);
                 self.outline(project, tell);
                 Change::Still

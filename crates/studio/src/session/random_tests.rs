@@ -100,6 +100,7 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
         )
             .prop_map(|(command, at)| ClientMessage::Add { command: command.into(), at }),
         Just(ClientMessage::KeepCamera),
+        any::<bool>().prop_map(|on| ClientMessage::Draft { on }),
     ];
     let looks = prop_oneof![
         (0..12usize, any::<bool>()).prop_map(|(frame, moving)| ClientMessage::Frame { frame, moving }),

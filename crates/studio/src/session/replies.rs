@@ -133,6 +133,7 @@ impl Session {
             locked: self.locked_lines(project),
             time: self.time_state(project),
             free: self.free.is_some(),
+            draft: now.scene.as_ref().filter(|scene| scene.indirect_bounces() > 0).map(|_| self.is_draft),
             picture: scene.map(|scene| (self.pictures, scene.screen.width(), scene.screen.height())),
         }
     }

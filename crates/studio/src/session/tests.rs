@@ -177,6 +177,33 @@ fn a_camera_of_the_palette_looks_from_here_at_what_it_falls_on() {
 }
 
 #[test]
+fn a_draft_leaves_out_indirect_light_in_the_viewport_alone() {
+    assert_eq!(Desk::new(TEXT).ask(ClientMessage::Undo).tell.state.unwrap().draft, None, "there is none");
+    let text = format!("Samples 16\nIndirect 3\n{TEXT}");
+    let mut desk = Desk::new(&text);
+    let bounces = |picture: &Wanted| picture.scene.indirect_bounces();
+    let answer = desk.ask(ClientMessage::Draft { on: true });
+    assert_eq!(answer.tell.state.unwrap().draft, Some(true));
+    assert_eq!(bounces(&answer.picture.unwrap()), 0);
+    let answer = desk.ask(ClientMessage::Draft { on: false });
+    assert_eq!(answer.tell.state.unwrap().draft, Some(false));
+    assert_eq!(bounces(&answer.picture.unwrap()), 3);
+    assert_eq!(desk.text(), text);
+}
+
+#[test]
+fn a_key_that_cannot_move_the_selection_says_why() {
+    let mut desk = Desk::new(&TEXT.replace("Trace", "Text \"A\" 1 .2\nTrace"));
+    let line = desk.text().lines().position(|line| line.starts_with("Text")).unwrap();
+    let nudged = |desk: &mut Desk, line| {
+        desk.ask(ClientMessage::Nudge { lines: vec![line], by: [1.0, 0.0, 0.0] }).tell.notice
+    };
+    assert!(nudged(&mut desk, line).is_some_and(|notice| notice.contains("Ctrl+G")));
+    let ball = desk.text().lines().position(|line| line.starts_with("Sphere")).unwrap();
+    assert_eq!(nudged(&mut desk, ball), None);
+}
+
+#[test]
 fn the_picture_through_the_scripts_camera_is_the_scene_of_the_script() {
     let mut desk = Desk::new(TEXT);
     let picture = desk.ask(ClientMessage::Size { width: 160, height: 200 }).picture.unwrap();

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use rayfold_scene::model::Indirect;
 use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
 
 use super::{Change, Session};
@@ -39,6 +40,9 @@ impl Session {
     /// Returns the scene in the viewport.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
         let mut scene = self.shown(project).scene.clone()?;
+        if self.is_draft {
+            scene.indirect = Indirect::default();
+        }
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
         match (&self.free, &scene.camera) {
             (Some(orbit), _) => {

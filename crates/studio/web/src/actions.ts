@@ -111,6 +111,12 @@ export const actions = {
     run: () => ask({ ask: "keep-camera" }),
     enabled: () => state.value?.free ?? false,
   },
+  draft: {
+    title: "Draft: draw without indirect light, on or off",
+    keys: ["Shift+D"],
+    run: () => ask({ ask: "draft", on: !state.value?.draft }),
+    enabled: () => (state.value?.draft ?? null) !== null,
+  },
   search: { title: "Search everything", keys: ["Ctrl+k"], icon: Search, run: () => (searching.value = true) },
   help: { title: "Show the keys", keys: ["?"], icon: Keyboard, run: () => (help.value = !help.value) },
 } as const satisfies Record<string, Action>;

@@ -221,6 +221,27 @@ test("frames are scrubbed, and each is the tracer's picture", async (t) => {
   studio.check();
 });
 
+test("a draft leaves out indirect light, and then it is there again", async (t) => {
+  const scene = (indirect) =>
+    `Screen 96 64\nSamples 16\nIndirect ${indirect}\nLook 0 1 6  0 0 0  50\nBackground .7 .8 .9\nSphere 1  0 0 0  0 0 0  .8 .4 .2\nPlane 0 -1 0  0 1 0  0 0 0  .6 .6 .6\nTrace\n`;
+  const studio = await open(t, { text: scene(2) });
+  const { page } = studio;
+  await studio.settled();
+  await isDrawn(page, studio.path);
+  const draft = page.getByRole("button", { name: "Draft", exact: true });
+  await draft.click();
+  await page.locator("button[aria-pressed=true]", { hasText: "Draft" }).waitFor();
+  await studio.settled();
+  const without = `${studio.path}.without.txt`;
+  writeFileSync(without, scene(0));
+  await isDrawn(page, without);
+  assert.equal(readFileSync(studio.path, "utf8"), scene(2), "the script stays as it is");
+  await page.keyboard.press("Shift+D");
+  await studio.settled();
+  await isDrawn(page, studio.path);
+  studio.check();
+});
+
 test("a free camera turns, and becomes that of the script", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page } = studio;

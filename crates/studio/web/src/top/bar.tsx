@@ -46,6 +46,7 @@ export function Bar(): JSX.Element {
         <Button action={actions.lookTop} label="Top" />
         <Button action={actions.frame} label="Selection" />
         <Button action={actions.keepCamera} label="Keep this view" />
+        {typeof now?.draft === "boolean" && <Button action={actions.draft} label="Draft" pressed={now.draft} />}
       </nav>
       <span class="gap" />
       <Result />
