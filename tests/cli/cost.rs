@@ -73,6 +73,21 @@ fn twice_the_frames_twice_the_rendering() {
 }
 
 #[test]
+fn a_folder_with_a_model_and_two_outputs_costs_what_they_need() {
+    let folder = Folder::new();
+    let model = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    folder.write("spin/corner.obj", model);
+    folder.write("spin/unused.obj", model);
+    folder.write("spin/a.txt", "Screen 16 12\nMesh \"corner.obj\"\nFrames 1 3\nTrace\n");
+    folder.write("spin/animation.json", r#"{"outputs": ["gif", "webp"]}"#);
+    let output = folder.rayfold("cost spin --format json").assert().code(0).get_output().stdout.clone();
+    let report: Value = serde_json::from_slice(&output).unwrap();
+    let work = &report["workload"];
+    assert_eq!(work["outputs"], serde_json::json!(["gif", "webp"]));
+    assert_eq!((&work["files"], work["files_mb"].as_f64()), (&1.into(), Some(model.len() as f64 / 1e6)));
+}
+
+#[test]
 fn prices_of_ones_own() {
     let folder = Folder::new();
     let built_in =

@@ -1,11 +1,13 @@
 //! Estimates the time that the render function would take for the frames of a folder: some of them are drawn here.
 
+use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
 use rayfold_client::cost::{render_ms, waiting_ms};
-use rayfold_scene::{Limits, Screen};
+use rayfold_files::named_by_scripts;
+use rayfold_scene::{Container, Limits, Screen};
 
 use crate::console::Console;
 use crate::input::Input;
@@ -29,6 +31,11 @@ pub(super) struct Measured {
     pub(super) ms: f64,
     /// A frame's PNG, in the mean.
     pub(super) frame_kb: f64,
+    /// What the settings ask for.
+    pub(super) outputs: Vec<Container>,
+    /// The number of the files that the scripts name, and of those that they refer to.
+    pub(super) files: u64,
+    pub(super) files_mb: f64,
 }
 
 /// Draws some frames of `input`, for functions of `memory_mb` on this number of places.
@@ -77,5 +84,18 @@ pub(super) fn measure(
         Size(bytes as u64)
     ));
     let ms = render_ms(frames, places, drawing_ms, memory_mb);
-    Ok(Measured { frames, size, ms, frame_kb: bytes / 1e3 })
+    // What a model refers to may be absent.
+    let sizes =
+        named_by_scripts().into_iter().filter_map(|path| fs::metadata(path).ok()).map(|file| file.len());
+    let (files, files_bytes) = sizes.fold((0, 0), |(count, bytes), size| (count + 1, bytes + size));
+    let outputs = plan.settings.outputs().to_vec();
+    Ok(Measured {
+        frames,
+        size,
+        ms,
+        frame_kb: bytes / 1e3,
+        outputs,
+        files,
+        files_mb: files_bytes as f64 / 1e6,
+    })
 }

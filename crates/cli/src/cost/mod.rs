@@ -170,6 +170,9 @@ fn workload(args: &Args, console: &Console) -> anyhow::Result<Workload> {
         assemble_ms: args.assemble_ms.unwrap_or(guessed.assemble_ms),
         frame_kb: args.frame_kb.or(measured.map(|measured| measured.frame_kb)).unwrap_or(guessed.frame_kb),
         gif_mb: args.gif_mb.unwrap_or(guessed.gif_mb),
+        outputs: measured.map_or(guessed.outputs, |measured| measured.outputs.clone()),
+        files: measured.map_or(0, |measured| measured.files),
+        files_mb: measured.map_or(0.0, |measured| measured.files_mb),
         sweep_minutes: args.sweep_minutes,
         customer_managed_key: args.customer_managed_key,
         ..guessed

@@ -3,7 +3,7 @@
 //! Invariants: free allowances are not subtracted, so a bill is never higher because of them. A quantity that is not
 //! known beforehand (requests per frame, sizes) is a named constant with its reason, or comes from the caller.
 
-use rayfold_scene::Screen;
+use rayfold_scene::{Container, Screen};
 use serde::Serialize;
 
 use super::prices::Prices;
@@ -35,6 +35,9 @@ const FRAME_BYTES_A_PIXEL: f64 = 0.15;
 
 /// The size of the GIF in bytes per pixel of a frame: about twice that of `scenes/hello`.
 const GIF_BYTES_A_PIXEL: f64 = 0.06;
+
+/// The size of a Y4M in bytes per pixel of a frame: its planes are as large as the frame.
+const Y4M_BYTES_A_PIXEL: f64 = 3.0;
 
 /// The time of the assemble function per pixel: decoding, quantising, encoding. Measured: 14 to 23 ns of processor
 /// time, more for small frames (`docs/decisions/gif-in-one-piece.md`); Lambda's processors may be slower.
@@ -104,6 +107,12 @@ pub struct Workload {
     pub frame_kb: f64,
     /// The size of the GIF.
     pub gif_mb: f64,
+    /// What is assembled.
+    pub outputs: Vec<Container>,
+    /// The number of the files that the scripts name, and of those that they refer to.
+    pub files: u64,
+    /// The size of all of these files.
+    pub files_mb: f64,
     /// The minutes between two sweeps.
     pub sweep_minutes: f64,
     /// The stack has a customer-managed key.
@@ -127,6 +136,9 @@ impl Workload {
             assemble_ms: pixels * ASSEMBLE_NS_A_PIXEL / 1e6,
             frame_kb: pixels * FRAME_BYTES_A_PIXEL / 1e3,
             gif_mb: frames as f64 * pixels * GIF_BYTES_A_PIXEL / 1e6,
+            outputs: vec![Container::Gif],
+            files: 0,
+            files_mb: 0.0,
             sweep_minutes: SWEEP_MINUTES,
             customer_managed_key: false,
         }
@@ -138,9 +150,28 @@ impl Workload {
         self.frames.div_ceil(places) as f64 * self.ms / 1e3
     }
 
-    /// Returns the running time of the assemble function, in seconds.
+    /// Returns the running time of the assemble function for an output, in seconds.
     pub fn assembling_s(&self) -> f64 {
         (self.frames as f64 * self.assemble_ms + ASSEMBLE_OVERHEAD_MS) / 1e3
+    }
+
+    /// Returns the size of an output in MB. What is lossless is at most as large as its frames as PNG.
+    fn output_mb(&self, output: Container) -> f64 {
+        let frames = self.frames as f64;
+        match output {
+            Container::Gif => self.gif_mb,
+            Container::Apng | Container::Webp => frames * self.frame_kb / 1e3,
+            Container::Y4m => frames * (self.width * self.height) as f64 * Y4M_BYTES_A_PIXEL / 1e6,
+        }
+    }
+
+    /// Returns the size of all outputs in MB.
+    fn outputs_mb(&self) -> f64 {
+        self.outputs.iter().map(|&output| self.output_mb(output)).sum()
+    }
+
+    fn is_gif_alone(&self) -> bool {
+        self.outputs == [Container::Gif]
     }
 }
 
@@ -209,7 +240,12 @@ fn gb_seconds(memory_mb: f64, ms: f64) -> f64 {
 fn making(work: &Workload, prices: &Prices) -> Section {
     let frames = work.frames as f64;
     let compute = gb_second(work, prices);
-    let uploads = (work.gif_mb / UPLOAD_PART_MB).ceil() + 2.0;
+    let outputs = work.outputs.len() as f64;
+    let parts = |&output: &Container| (work.output_mb(output) / UPLOAD_PART_MB).ceil() + 2.0;
+    let uploads = work.outputs.iter().map(parts).sum::<f64>() + work.files as f64;
+    // A process keeps the files for its next frames. The assembler reads each frame again for each further output.
+    let processes = work.frames.min(work.places.unwrap_or(PLACES));
+    let gets = frames * (GETS_A_FRAME + outputs - 1.0) + (processes * work.files) as f64;
     let invocations = frames + 1.0;
     let is_of_few = work.frames < FEW_FRAMES;
     let puts_and_lists = if is_of_few { PUTS_AND_LISTS_OF_FEW } else { PUTS_AND_LISTS_A_FRAME };
@@ -220,15 +256,20 @@ fn making(work: &Workload, prices: &Prices) -> Section {
             line("Lambda: rendering", frames * gb_seconds(work.memory_mb, work.ms), "GB-s", compute),
             line(
                 "Lambda: assembling",
-                gb_seconds(work.assemble_memory_mb, 1e3 * work.assembling_s()),
+                gb_seconds(work.assemble_memory_mb, 1e3 * outputs * work.assembling_s()),
                 "GB-s",
                 compute,
             ),
             line("S3: puts and lists", frames * puts_and_lists + uploads, "", prices.s3.put_copy_post_list),
-            line("S3: gets", frames * GETS_A_FRAME, "", prices.s3.get_and_other),
+            line("S3: gets", gets, "", prices.s3.get_and_other),
             line("Logs", invocations * LOG_BYTES / 1e9, "GB", prices.cloudwatch.log_gb),
             line("Traces", invocations * TRACED, "", prices.xray_trace),
-            line("Downloading the GIF once", work.gif_mb / 1e3, "GB", prices.transfer_out_gb),
+            line(
+                if work.is_gif_alone() { "Downloading the GIF once" } else { "Downloading outputs once" },
+                work.outputs_mb() / 1e3,
+                "GB",
+                prices.transfer_out_gb,
+            ),
         ],
     )
 }
@@ -237,14 +278,19 @@ fn keeping(work: &Workload, prices: &Prices) -> Section {
     let frames = work.frames as f64;
     let sweeps = MINUTES_A_MONTH / work.sweep_minutes;
     let pages = (frames / PAGE).ceil();
-    // The listings of all scripts, of its scripts and of its frames; then its manifest and the head of its GIF.
-    let (lists, gets) = (frames / PAGE + 2.0 * pages, 2.0);
+    // The listings of all scripts, of its scripts and of its frames; then its manifest and the head of each output.
+    let (lists, gets) = (frames / PAGE + 2.0 * pages, 1.0 + work.outputs.len() as f64);
+    let stored = if work.is_gif_alone() && work.files == 0 {
+        "S3: frames and GIF"
+    } else {
+        "S3: frames, outputs, files"
+    };
     Section::new(
         "Keeping it, each month",
         vec![
             line(
-                "S3: frames and GIF",
-                (frames * work.frame_kb / 1e3 + work.gif_mb) / 1e3,
+                stored,
+                (frames * work.frame_kb / 1e3 + work.outputs_mb() + work.files_mb) / 1e3,
                 "GB",
                 prices.s3.standard_gb_month,
             ),
@@ -297,6 +343,9 @@ mod tests {
             assemble_ms: 10.0,
             frame_kb: 30.0,
             gif_mb: 16.0,
+            outputs: vec![Container::Gif],
+            files: 0,
+            files_mb: 0.0,
             sweep_minutes: 15.0,
             customer_managed_key: false,
         }
@@ -350,6 +399,21 @@ mod tests {
         near(find(&keeping, "S3: lists of the sweep").amount, 2880.0 * 5.5);
         near(find(&keeping, "S3: gets of the sweep").amount, 2880.0 * 2.0);
         near(find(&keeping, "S3: frames and GIF").amount, (1500.0 * 0.03 + 16.0) / 1000.0);
+    }
+
+    /// By hand: 100 frames of 30 kB are an APNG of 3 MB in one part. 4 files are put once, and read by 100 processes.
+    #[test]
+    fn files_and_further_outputs_are_counted() {
+        let outputs = vec![Container::Gif, Container::Apng];
+        let more = Workload { outputs, files: 4, files_mb: 50.0, ..work(100, 1.0) };
+        let (once, months) = (making(&more, &prices()), keeping(&more, &prices()));
+        near(find(&once, "S3: puts and lists").amount, 100.0 * PUTS_AND_LISTS_A_FRAME + 4.0 + 3.0 + 4.0);
+        near(find(&once, "S3: gets").amount, 100.0 * (GETS_A_FRAME + 1.0) + 400.0);
+        near(find(&once, "Lambda: assembling").amount, 2.0 * 2.0 * 2.0);
+        near(find(&once, "Downloading outputs once").amount, 0.019);
+        near(find(&months, "S3: frames, outputs, files").amount, 0.003 + 0.019 + 0.05);
+        near(find(&months, "S3: gets of the sweep").amount, 2880.0 * 3.0);
+        near(more.output_mb(Container::Y4m), 100.0 * 512.0 * 512.0 * 3.0 / 1e6);
     }
 
     #[test]
