@@ -125,10 +125,11 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     Ok(if faults.errors() > 0 { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The endings of models, of the files that they refer to, and of skies. Other pictures may be those that were rendered.
-const NAMED: [&str; 8] = ["obj", "mtl", "ply", "stl", "gltf", "glb", "hdr", "exr"];
+/// The endings of models, of the files that they refer to, of fonts, and of skies. Other pictures may be those that were
+/// rendered.
+const NAMED: [&str; 10] = ["obj", "mtl", "ply", "stl", "gltf", "glb", "ttf", "otf", "hdr", "exr"];
 
-/// Returns the models and skies in a folder that no script names, in order.
+/// Returns the models, fonts and skies in a folder that no script names, in order.
 fn unused_files(folder: &Path) -> Vec<PathBuf> {
     let named = named_by_scripts();
     let is_meant = |path: &Path| {
