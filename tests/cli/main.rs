@@ -11,6 +11,7 @@ mod cost;
 mod documented;
 mod encode;
 mod encode_files;
+mod encode_foreign;
 mod encode_formats;
 #[cfg(unix)]
 mod files;

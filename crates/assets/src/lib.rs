@@ -41,7 +41,7 @@ pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, sam
 pub use letters::{Align, LetterError, Lettering};
 pub use library::{Library, Purpose};
 pub use model::{Colors, Look, Model, Smoothing};
-pub use picture::Picture;
+pub use picture::{Picture, jpeg_fault};
 pub use referred::Referred;
 
 /// The example of the README is compiled and run with the tests.

@@ -29,6 +29,7 @@ mod picture;
 mod source;
 mod tiff;
 mod video;
+mod webp;
 
 use picture::Picture;
 
@@ -123,7 +124,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         size: pictures.first().context("at least one frame")?.size()?,
         frames,
         fps,
-        plays: args.playback.plays(Plays::Endless),
+        plays: args.playback.plays(plays_of(&pictures)),
         last_delay_cs: args.playback.last_delay_cs(),
         exact: args.exact,
         alpha: args.matte.is_none() && pictures.iter().any(|picture| picture.has_alpha),
@@ -167,6 +168,14 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Err(error) => return Err(error),
     }
     Ok(Outcome::Done)
+}
+
+/// Returns how often a single animated file is shown; other files are shown for ever.
+fn plays_of(pictures: &[&Picture]) -> Plays {
+    match pictures {
+        [picture] => picture.plays().unwrap_or(Plays::Endless),
+        _ => Plays::Endless,
+    }
 }
 
 /// Returns the container to write, and its place.
@@ -235,7 +244,7 @@ fn window((width, height): (u32, u32)) -> usize {
 
 /// Adds the name of the faulty file to an error.
 fn explain(error: MovieError, name: &str) -> anyhow::Error {
-    let of_the_frame = matches!(error, MovieError::Gif(_));
+    let of_the_frame = matches!(error, MovieError::Gif(_) | MovieError::Size(_));
     let error = anyhow::Error::new(error);
     if of_the_frame { error.context(name.to_owned()) } else { error }
 }

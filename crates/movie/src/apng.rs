@@ -209,7 +209,13 @@ fn delay(fps: f64, number: u64) -> (u16, u16) {
 
 /// A time as so many parts of so many that a second has.
 fn in_parts(seconds: f64) -> (u16, u16) {
-    let parts = if seconds * 1_000.0 <= 65_535.0 { 1_000 } else { 100 };
+    let ms = seconds * 1_000.0;
+    if (ms - ms.round()).abs() > 1e-9 * ms
+        && let (time @ 1..=65_535, parts @ 1..=65_535) = fraction(seconds)
+    {
+        return (time as u16, parts as u16);
+    }
+    let parts = if ms <= 65_535.0 { 1_000 } else { 100 };
     ((seconds * f64::from(parts)).round() as u16, parts)
 }
 

@@ -53,6 +53,14 @@ pub enum Error {
     /// The GIF encoder's error, other than the writer's.
     #[error(transparent)]
     Gif(rayfold_gif::Error),
+    /// A frame is not as large as the animation.
+    #[error("the frame is {} x {} pixels, the frames before it are {} x {}", found.0, found.1, expected.0, expected.1)]
+    Size {
+        /// The columns and rows of the frame.
+        found: (u32, u32),
+        /// Those of the animation.
+        expected: (u32, u32),
+    },
     /// The state of an unfinished file cannot be read.
     #[error("the state of the unfinished file cannot be used: {0}")]
     State(&'static str),
@@ -79,6 +87,7 @@ pub struct Finished {
 /// Frames on their way into a file.
 pub struct Encoding<W: Write> {
     kind: Kind<W>,
+    size: (u32, u32),
     alpha: bool,
 }
 
@@ -109,7 +118,7 @@ impl<W: Write> Encoding<W> {
             Container::Webp => Kind::Webp(Box::new(WebP::new(out, movie)?)),
             Container::Y4m => Kind::Y4m(Y4m::new(out, size, fps)?),
         };
-        Ok(Self { kind, alpha })
+        Ok(Self { kind, size, alpha })
     }
 
     /// Returns the state of the unfinished file. [`resume`](Self::resume) continues from it, also in another process. Keep
@@ -132,7 +141,7 @@ impl<W: Write> Encoding<W> {
     /// # Errors
     /// Fails if the state is damaged, or of another version of the encoder: encode the animation from its beginning.
     pub fn resume(out: W, container: Container, movie: Movie, state: &[u8]) -> Result<Self, Error> {
-        let alpha = movie.alpha;
+        let Movie { size, alpha, .. } = movie;
         let kind = match container {
             Container::Gif => Kind::Gif(Box::new(Encoder::resume(out, state)?)),
             Container::Apng => {
@@ -146,7 +155,7 @@ impl<W: Write> Encoding<W> {
                 Kind::Y4m(Y4m::resume(out))
             }
         };
-        Ok(Self { kind, alpha })
+        Ok(Self { kind, size, alpha })
     }
 
     /// Takes the next frame, and its duration in seconds if that differs from that of the others. A [`Container::Y4m`]
@@ -154,9 +163,13 @@ impl<W: Write> Encoding<W> {
     /// [over black](over).
     ///
     /// # Errors
-    /// Fails if the writer does, or if the frame is beyond the limits of the container.
+    /// Fails if the writer does, if the frame is not as large as the animation, or if it is beyond the limits of the container.
     pub fn push(&mut self, frame: impl Into<DynamicImage>, seconds: Option<f64>) -> Result<(), Error> {
         let frame: DynamicImage = frame.into();
+        let found = (frame.width(), frame.height());
+        if found != self.size {
+            return Err(Error::Size { found, expected: self.size });
+        }
         let frame = match (frame.color().has_alpha(), &self.kind) {
             (true, Kind::Gif(_)) if self.alpha => frame.into_rgba8().into(),
             (has_alpha, Kind::Apng(_) | Kind::Webp(_)) if self.alpha => match has_alpha {

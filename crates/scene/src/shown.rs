@@ -33,14 +33,52 @@ pub(crate) fn grouped(count: u64) -> String {
     grouped
 }
 
-/// Returns the word that was probably meant: one with a similar spelling, in any letter case.
+/// Words of other tools, without hyphens, and what they are called here.
+const SYNONYMS: [(&str, &str); 24] = [
+    ("center", "centre"),
+    ("middle", "centre"),
+    ("ease", "smooth"),
+    ("sine", "smooth"),
+    ("easein", "in"),
+    ("easeout", "out"),
+    ("easeinout", "inout"),
+    ("spring", "elastic"),
+    ("hold", "step"),
+    ("constant", "step"),
+    ("loop", "cycle"),
+    ("roughness", "rough"),
+    ("color", "diffuse"),
+    ("colour", "diffuse"),
+    ("specular", "shine"),
+    ("phong", "shine"),
+    ("reflection", "mirror"),
+    ("reflective", "mirror"),
+    ("emission", "glow"),
+    ("emissive", "glow"),
+    ("transparent", "glass"),
+    ("refraction", "glass"),
+    ("texture", "image"),
+    ("checkerboard", "checker"),
+];
+
+/// Returns the word that was probably meant: what it is called in other tools, one that begins with it, or one with a similar
+/// spelling, in any letter case.
 pub(crate) fn nearest<'a>(word: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // A longer word is no typo, and the distance takes quadratic time.
     if word.len() > 40 {
         return None;
     }
     let word = word.to_lowercase();
-    let near = words.map(|known| (strsim::osa_distance(&word, &known.to_lowercase()), known));
+    let words: Vec<&str> = words.collect();
+    let bare = word.replace(['-', '_'], "");
+    let meant = SYNONYMS.iter().find(|(other, _)| *other == bare).map(|(_, meant)| *meant);
+    let is_start = |known: &&&str| word.len() > 2 && known.to_lowercase().starts_with(&word);
+    if let Some(known) =
+        words.iter().find(|known| meant == Some(**known)).or_else(|| words.iter().find(is_start))
+    {
+        return Some(known);
+    }
+    let near = words.into_iter().map(|known| (strsim::osa_distance(&word, &known.to_lowercase()), known));
     near.min_by_key(|(distance, _)| *distance)
         .filter(|(distance, known)| {
             *distance <= known.len().div_ceil(3).min(word.chars().count().saturating_sub(1))
@@ -51,6 +89,18 @@ pub(crate) fn nearest<'a>(word: &str, words: impl Iterator<Item = &'a str>) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_of_other_tools_and_starts_are_known() {
+        let modes = ["linear", "smooth", "in", "inout", "elastic"];
+        let check = |word, near| assert_eq!(nearest(word, modes.into_iter()), near, "{word}");
+        check("lin", Some("linear"));
+        check("Ease-In", Some("in"));
+        check("ease_in_out", Some("inout"));
+        check("smoth", Some("smooth"));
+        check("center", None);
+        check("wobble", None);
+    }
 
     #[test]
     fn what_cannot_be_seen_is_escaped() {

@@ -126,13 +126,21 @@ fn soft_lights_with_one_ray_per_pixel() {
     check(
         ball("Plight 1 1 1 0 5 0 (1:1 2:3)\nIlight 1 1 1 0 -1 0 5\n", ""),
         expect![[r#"
-        warning: the size of the light has no effect: there is one ray per pixel
-         --> a.txt:3:20
-          |
-        3 | Plight 1 1 1 0 5 0 (1:1 2:3)
-          |                    ^^^^^^^^^ expected `Samples` before the `Trace`
-          |
-          = help: write for example `Samples 64`"#]],
+            warning: the size of the light has no effect: there is one ray per pixel
+             --> a.txt:3:20
+              |
+            3 | Plight 1 1 1 0 5 0 (1:1 2:3)
+              |                    ^^^^^^^^^ expected `Samples` before the `Trace`
+              |
+              = help: write for example `Samples 64`
+
+            warning: this changes from frame to frame, but there is one frame only
+             --> a.txt:3:20
+              |
+            3 | Plight 1 1 1 0 5 0 (1:1 2:3)
+              |                    ^^^^^^^^^ expected `Frames` before the `Trace`
+              |
+              = help: write for example `Frames 1 50`"#]],
     );
     check(ball("Plight 1 1 1 0 5 0 1\nSamples 16\n", ""), expect![[""]]);
     check(
@@ -164,6 +172,14 @@ fn a_scene_without_light() {
     check(
         "Screen 4 3\nMaterial m diffuse (1:0 3:1) 0 0\nGroup g\nSphere 1 0 0 -5 m\nEnd\nUse g\nTrace",
         expect![[r#"
+            warning: this changes from frame to frame, but there is one frame only
+             --> a.txt:2:20
+              |
+            2 | Material m diffuse (1:0 3:1) 0 0
+              |                    ^^^^^^^^^ expected `Frames` before the `Trace`
+              |
+              = help: write for example `Frames 1 50`
+
             warning: there is no light: diffuse colours are black
              --> a.txt:7:1
               |
@@ -175,6 +191,14 @@ fn a_scene_without_light() {
     check(
         "Screen 4 3\nGroup g\nSphere (1:1 2:2) 0 0 -5 0 0 0 1 1 1\nEnd\nUse g\nClear\nTrace",
         expect![[r#"
+            warning: this changes from frame to frame, but there is one frame only
+             --> a.txt:3:8
+              |
+            3 | Sphere (1:1 2:2) 0 0 -5 0 0 0 1 1 1
+              |        ^^^^^^^^^ expected `Frames` before the `Trace`
+              |
+              = help: write for example `Frames 1 50`
+
             warning: this has no effect: a `Clear` removes it before a `Trace` shows it
              --> a.txt:5:1
               |
@@ -272,11 +296,19 @@ fn colours_as_levels() {
     check(
         ball("", "Sphere (1:1 2:2) 0 0 -5 0 0 0 (1:0 2:255) 20 2\n"),
         expect![[r#"
-        warning: this is far above 1, which is full brightness
-         --> a.txt:5:31
-          |
-        5 | Sphere (1:1 2:2) 0 0 -5 0 0 0 (1:0 2:255) 20 2
-          |                               ^^^^^^^^^^^^^^^^ expected numbers from 0 to 1"#]],
+            warning: this changes from frame to frame, but there is one frame only
+             --> a.txt:5:8
+              |
+            5 | Sphere (1:1 2:2) 0 0 -5 0 0 0 (1:0 2:255) 20 2
+              |        ^^^^^^^^^ expected `Frames` before the `Trace`
+              |
+              = help: write for example `Frames 1 50`
+
+            warning: this is far above 1, which is full brightness
+             --> a.txt:5:31
+              |
+            5 | Sphere (1:1 2:2) 0 0 -5 0 0 0 (1:0 2:255) 20 2
+              |                               ^^^^^^^^^^^^^^^^ expected numbers from 0 to 1"#]],
     );
     check(
         ball("Material m diffuse 255 0 300 shine 1 1 1 200\n", "Sphere 1 0 0 -5 m\n"),
@@ -401,16 +433,59 @@ fn files_that_are_no_text() {
 
 #[test]
 fn of_another_language_ten_errors_are_described() {
-    let model: String = (0..1_000).map(|i| format!("v {i} 0 0\n")).collect();
+    let other: String = (0..1_000).map(|i| format!("p {i} 0 0\n")).collect();
     let described = |text: &str| {
         let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
         assert!(parsed.script.is_none());
         parsed.diagnostics.iter().map(|d| d.message.clone()).collect::<Vec<_>>()
     };
-    let messages = described(&model);
+    let messages = described(&other);
     assert_eq!(messages.len(), 11);
     assert_eq!(messages[10], "991 more errors from here on");
     // In a script, every error is described.
     let script = format!("Screen 4 3\n{}{}Trace", BALL.repeat(10), "Sphere\n".repeat(15));
     assert_eq!(described(&script).len(), 15);
+}
+
+#[test]
+fn a_curve_without_frames_is_a_warning() {
+    let warnings = |frames: &str, curve: &str| {
+        let text = format!("Screen 4 3\n{frames}Sphere 1 {curve} 0 -5  1 0 0  0 0 0\nTrace\n");
+        let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+        parsed
+            .diagnostics
+            .iter()
+            .map(|d| format!("{}:{} {}", d.line, d.column, d.message))
+            .collect::<Vec<_>>()
+    };
+    let warning = ["3:10 this changes from frame to frame, but there is one frame only"];
+    assert_eq!(warnings("\n", "(1:0 9:3)"), warning);
+    assert!(warnings("\n", "(1:2 9:2)").is_empty(), "it does not change");
+    for frames in ["Frames 1 9\n", "Frames 3\n", "Samples 4\nShutter .5\n"] {
+        assert!(warnings(frames, "(1:0 9:3)").is_empty(), "{frames}");
+    }
+}
+
+#[test]
+fn names_may_be_used_in_faulty_lines() {
+    for line in
+        ["Text \"Logo\" .5 -.1 red", "Sphere 1 0 0 (1:0 red", "Text \"Logo\" .5 .1 red font \"none.ttf\""]
+    {
+        let text = format!("Screen 4 3\nMaterial red diffuse .8 .2 .1\n{line}\nTrace\n");
+        let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+        assert!(parsed.diagnostics.iter().all(|d| d.is_error()), "{:?}", parsed.diagnostics);
+    }
+}
+
+#[test]
+fn models_and_data_are_no_scripts() {
+    for (text, what) in [
+        ("# made by a modeller\nmtllib a.mtl\nv 0 0 0\n", "this is an OBJ model, not a scene script"),
+        ("{\"fps\": 25}", "this is JSON, not a scene script"),
+    ] {
+        let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+        let [diagnostic] = &parsed.diagnostics[..] else { panic!("{:?}", parsed.diagnostics) };
+        assert_eq!(diagnostic.message, what);
+        assert_eq!(diagnostic.help.is_some(), what.contains("model"));
+    }
 }

@@ -147,7 +147,7 @@ fn clauses() {
             4 | Material c colour 1 0 0
               |            ^^^^^^ expected a clause
               |
-              = help: the clauses are `ambient`, `diffuse`, `mirror`, `shine`, `glass`, `checker`, `stripes`, `noise`, `gradient`, `image`, `own`, `glow`, `rough`
+              = help: did you mean `diffuse`?
 
             error: a material has one `diffuse` only
              --> a.txt:5:26

@@ -49,7 +49,7 @@ fn all_faulty_fields_at_once() {
             6 |   "shutter": [
               |   ^^^^^^^^^ expected a field's name
               |
-              = help: the fields are `frames`, `fps`, `loop`, `bounce`, `durations`"#]],
+              = help: the fields are `frames`, `fps`, `loop`, `bounce`, `durations`, `outputs`"#]],
     );
 }
 

@@ -5,6 +5,17 @@ use crate::error::Fault;
 
 /// Checks the frames of a JPEG, and that it has an end.
 pub(super) fn check(bytes: &[u8]) -> Result<(), Fault> {
+    walk(bytes, check_frame)
+}
+
+/// Returns what is wrong with the markers of a JPEG whose end is missing.
+#[must_use]
+pub fn jpeg_fault(bytes: &[u8]) -> Option<String> {
+    walk(bytes, |_| Ok(())).err().map(|fault| fault.what)
+}
+
+/// Goes from marker to marker, and hands each frame's header to `frame`.
+fn walk(bytes: &[u8], frame: impl Fn(&[u8]) -> Result<(), Fault>) -> Result<(), Fault> {
     let cut_off = || Fault::new("the file is cut off");
     let mut rest = bytes;
     let mut has_frame = false;
@@ -24,7 +35,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), Fault> {
         let (segment, behind) =
             length.and_then(|length| rest.split_at_checked(length)).ok_or_else(cut_off)?;
         if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
-            check_frame(segment)?;
+            frame(segment)?;
             has_frame = true;
         }
         rest = behind;

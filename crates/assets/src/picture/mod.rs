@@ -12,6 +12,7 @@ use glam::DVec3;
 use image::metadata::Orientation;
 
 pub(crate) use decode::decode;
+pub use jpeg::jpeg_fault;
 
 use crate::srgb::decoded;
 

@@ -3,7 +3,7 @@
 //! The gamma and the orientation of a file are applied. Its transparency is kept.
 
 use std::cell::Cell;
-use std::io::Read;
+use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -15,11 +15,15 @@ use image::codecs::png::PngDecoder;
 use image::codecs::tiff::TiffDecoder;
 use image::codecs::webp::WebPDecoder;
 use image::metadata::Orientation;
-use image::{AnimationDecoder, DynamicImage, Frames, ImageDecoder, Limits};
+use image::{AnimationDecoder, DynamicImage, ImageDecoder, Limits, RgbaImage};
+use image_webp::LoopCount;
+use rayfold_movie::Plays;
+use rayfold_scene::assets::jpeg_fault;
 
 use super::source::{Reader, Source};
 use super::tiff::{self, PageReader};
 use super::video::{SIGNATURE, Video};
+use super::webp;
 use crate::interrupt;
 
 /// The gamma of the display. A gamma of a file that is so near to it makes no visible difference (libpng's threshold).
@@ -53,7 +57,7 @@ enum Kind {
     Jpeg,
     WebP,
     TiffPage { at: u64 },
-    Animated { format: Animated, gamma: Option<f64> },
+    Animated { format: Animated, gamma: Option<f64>, plays: Plays },
     Video(Video),
 }
 
@@ -63,6 +67,9 @@ enum Animated {
     Gif,
     WebP,
 }
+
+/// The frames of an animated file, each with its seconds.
+type Frames<'a> = Box<dyn Iterator<Item = anyhow::Result<(DynamicImage, f64)>> + 'a>;
 
 /// The function that takes the frames of a file in order, each with the seconds for which the file shows it.
 type Take<'a> = &'a mut dyn FnMut(DynamicImage, Option<f64>) -> anyhow::Result<()>;
@@ -76,7 +83,7 @@ impl Picture {
         let source = Source::File(path.to_path_buf());
         named(&source.name(), || {
             ensure!(!path.is_dir(), "it is a folder, expected its images, such as {0}/*.png", path.display());
-            Self::of(&source)
+            checked(Self::of(&source)?)
         })
     }
 
@@ -100,7 +107,7 @@ impl Picture {
             let is_video = bytes == SIGNATURE;
             let source = Source::Memory(bytes.into());
             if !is_video {
-                return Self::of(&source);
+                return checked(Self::of(&source)?);
             }
             let video = Video::read(Box::new(SIGNATURE.as_slice().chain(std::io::stdin())))?;
             Ok(vec![Self { source, frames: None, has_alpha: false, kind: Kind::Video(video) }])
@@ -110,9 +117,8 @@ impl Picture {
     fn of(source: &Source) -> anyhow::Result<Vec<Self>> {
         let of =
             |frames, has_alpha, kind| Self { source: source.clone(), frames: Some(frames), has_alpha, kind };
-        let animated = |frames, has_alpha, format, still, gamma| {
-            let kind = if frames > 1 { Kind::Animated { format, gamma } } else { still };
-            of(frames, has_alpha, kind)
+        let animated = |frames, has_alpha, animation, still| {
+            of(frames, has_alpha, if frames > 1 { animation } else { still })
         };
         let mut reader = source.open()?;
         // A shorter file has no picture.
@@ -126,17 +132,25 @@ impl Picture {
             let has_alpha = info.trns.is_some()
                 || matches!(info.color_type, png::ColorType::Rgba | png::ColorType::GrayscaleAlpha);
             let frames = info.animation_control.map_or(1, |animation| animation.num_frames.max(1));
-            vec![animated(frames.into(), has_alpha, Animated::Png, Kind::Png { gamma }, gamma)]
+            let plays = plays_of(info.animation_control.map_or(0, |animation| animation.num_plays));
+            let animation = Kind::Animated { format: Animated::Png, gamma, plays };
+            vec![animated(frames.into(), has_alpha, animation, Kind::Png { gamma })]
         } else if begins(JPEG_SIGNATURE) {
             JpegDecoder::new(reader)?;
             vec![of(1, false, Kind::Jpeg)]
         } else if begins(GIF_SIGNATURE) {
-            // Frames of an animation leave pixels out, so that this is not known before they are decoded.
-            vec![of(count_of_gif(reader)?, true, Kind::Animated { format: Animated::Gif, gamma: None })]
+            let (frames, plays) = survey_of_gif(reader)?;
+            // Frames of an animation leave pixels out, so that their alpha is not known before they are decoded.
+            vec![of(frames, true, Kind::Animated { format: Animated::Gif, gamma: None, plays })]
         } else if begins(WEBP_SIGNATURE) {
             let decoder = image_webp::WebPDecoder::new(reader)?;
             let frames = if decoder.is_animated() { decoder.num_frames().into() } else { 1 };
-            vec![animated(frames, decoder.has_alpha(), Animated::WebP, Kind::WebP, None)]
+            let plays = match decoder.loop_count() {
+                LoopCount::Forever => Plays::Endless,
+                LoopCount::Times(times) => plays_of(times.get().into()),
+            };
+            let animation = Kind::Animated { format: Animated::WebP, gamma: None, plays };
+            vec![animated(frames, decoder.has_alpha(), animation, Kind::WebP)]
         } else if begins(SIGNATURE) {
             vec![Self {
                 source: source.clone(),
@@ -170,12 +184,24 @@ impl Picture {
         }
     }
 
+    /// Returns how often an animated file is shown; other files do not say.
+    pub(super) fn plays(&self) -> Option<Plays> {
+        match self.kind {
+            Kind::Animated { plays, .. } if self.frames > Some(1) => Some(plays),
+            _ => None,
+        }
+    }
+
     /// Returns the columns and rows as the picture is shown.
     ///
     /// # Errors
     /// When the header cannot be read; the error names the file.
     pub(super) fn size(&self) -> anyhow::Result<(u32, u32)> {
-        named(&self.name(), || match &self.kind {
+        named(&self.name(), || self.stored_size())
+    }
+
+    fn stored_size(&self) -> anyhow::Result<(u32, u32)> {
+        match &self.kind {
             Kind::Png { .. } | Kind::Animated { format: Animated::Png, .. } => shown_size(self.png()?),
             Kind::Jpeg => shown_size(JpegDecoder::new(self.source.open()?)?),
             Kind::WebP | Kind::Animated { format: Animated::WebP, .. } => {
@@ -184,7 +210,7 @@ impl Picture {
             Kind::Animated { format: Animated::Gif, .. } => shown_size(GifDecoder::new(self.source.open()?)?),
             Kind::TiffPage { at } => shown_size(self.tiff(*at)?),
             Kind::Video(video) => Ok(video.size),
-        })
+        }
     }
 
     /// Decodes the picture if it is a single frame.
@@ -196,7 +222,15 @@ impl Picture {
             Ok(match &self.kind {
                 Kind::Animated { .. } | Kind::Video(_) => None,
                 Kind::Png { gamma } => Some(shown(self.png()?, *gamma)?),
-                Kind::Jpeg => Some(shown(JpegDecoder::new(self.source.open()?)?, None)?),
+                Kind::Jpeg => {
+                    let mut bytes = Vec::new();
+                    self.source.open()?.read_to_end(&mut bytes)?;
+                    // The decoder draws what is missing in grey.
+                    if let Some(fault) = jpeg_fault(&bytes) {
+                        bail!("{fault}");
+                    }
+                    Some(shown(JpegDecoder::new(Cursor::new(bytes))?, None)?)
+                }
                 Kind::WebP => Some(shown(WebPDecoder::new(self.source.open()?)?, None)?),
                 Kind::TiffPage { at } => Some(shown(self.tiff(*at)?, None)?),
             })
@@ -209,7 +243,7 @@ impl Picture {
     /// When the frames cannot be decoded, with the file's name, and the errors of `take`.
     pub(super) fn decode_each(&self, take: Take<'_>) -> anyhow::Result<()> {
         let (format, gamma) = match &self.kind {
-            Kind::Animated { format, gamma } => (*format, *gamma),
+            Kind::Animated { format, gamma, .. } => (*format, *gamma),
             Kind::Video(video) => {
                 let mut taken = Ok(());
                 let read = video.each(|image| {
@@ -226,12 +260,9 @@ impl Picture {
         let (orientation, mut frames) = named(&self.name(), || self.animation(format))?;
         for number in 1..=self.frames.unwrap_or_default() {
             let (next, seconds) = named(&self.name(), || {
-                let frame = frames.next().with_context(|| {
+                let (mut image, seconds) = frames.next().with_context(|| {
                     format!("frame {number} of {} is missing", self.frames.unwrap_or_default())
                 })??;
-                let (parts, whole) = frame.delay().numer_denom_ms();
-                let seconds = f64::from(parts) / f64::from(whole.max(1)) / 1_000.0;
-                let mut image = DynamicImage::ImageRgba8(frame.into_buffer());
                 image.apply_orientation(orientation);
                 Ok((levels(image, gamma), if seconds < LEAST_SECONDS { USUAL_SECONDS } else { seconds }))
             })?;
@@ -241,13 +272,19 @@ impl Picture {
     }
 
     fn animation(&self, format: Animated) -> anyhow::Result<(Orientation, Frames<'static>)> {
-        let reader = self.source.open()?;
+        let mut reader = self.source.open()?;
         Ok(match format {
-            Animated::Png => (self.png()?.orientation()?, self.png()?.apng()?.into_frames()),
-            Animated::Gif => (Orientation::NoTransforms, GifDecoder::new(reader)?.into_frames()),
+            Animated::Png => (self.png()?.orientation()?, frames(self.png()?.apng()?)),
+            Animated::Gif => (Orientation::NoTransforms, frames(GifDecoder::new(reader)?)),
             Animated::WebP => {
-                let mut decoder = WebPDecoder::new(reader)?;
-                (decoder.orientation()?, decoder.into_frames())
+                let mut decoder = WebPDecoder::new(self.source.open()?)?;
+                let (orientation, size) = (decoder.orientation()?, decoder.dimensions());
+                let mut bytes = Vec::new();
+                reader.read_to_end(&mut bytes)?;
+                let mut frames = webp::Frames::new(bytes, size);
+                let next = move || frames.next().transpose();
+                let shown = |(image, ms): (RgbaImage, u32)| (image.into(), f64::from(ms) / 1_000.0);
+                (orientation, Box::new(std::iter::from_fn(next).map(move |frame| frame.map(shown))))
             }
         })
     }
@@ -264,17 +301,61 @@ impl Picture {
     }
 }
 
-/// Counts the frames of a GIF without decoding them.
-fn count_of_gif(reader: Reader) -> anyhow::Result<u64> {
+/// Returns the frames of a decoder with their seconds.
+fn frames<'a>(decoder: impl AnimationDecoder<'a>) -> Frames<'a> {
+    Box::new(decoder.into_frames().map(|frame| {
+        let frame = frame?;
+        let (parts, whole) = frame.delay().numer_denom_ms();
+        // Rounded once, so that a time such as 1001/30000 s is known again.
+        let seconds = f64::from(parts) / (1_000.0 * f64::from(whole.max(1)));
+        Ok((frame.into_buffer().into(), seconds))
+    }))
+}
+
+/// Returns how often an animation is shown whose file says so: 0 is for ever.
+fn plays_of(times: u32) -> Plays {
+    match times {
+        0 => Plays::Endless,
+        1 => Plays::Once,
+        _ => Plays::repeated(u16::try_from(times - 1).unwrap_or(u16::MAX)),
+    }
+}
+
+/// Counts the frames of a GIF without decoding them, and returns how often it is shown.
+fn survey_of_gif(reader: Reader) -> anyhow::Result<(u64, Plays)> {
     let mut options = gif::DecodeOptions::new();
     options.skip_frame_decoding(true);
     let mut decoder = options.read_info(reader)?;
     let mut count = 0;
-    while decoder.next_frame_info()?.is_some() {
+    while let Some(frame) = decoder.next_frame_info()? {
+        check_size(frame.width.into(), frame.height.into())?;
         count += 1;
     }
     ensure!(count > 0, "it has no frame");
-    Ok(count)
+    let plays = match decoder.repeat() {
+        gif::Repeat::Infinite => Plays::Endless,
+        gif::Repeat::Finite(0) => Plays::Once,
+        gif::Repeat::Finite(times) => Plays::repeated(times),
+    };
+    Ok((count, plays))
+}
+
+/// Refuses pictures that are larger than a frame may be, before memory is spent on them.
+fn checked(pictures: Vec<Picture>) -> anyhow::Result<Vec<Picture>> {
+    for picture in &pictures {
+        let (width, height) = picture.stored_size()?;
+        check_size(width, height)?;
+    }
+    Ok(pictures)
+}
+
+fn check_size(width: u32, height: u32) -> anyhow::Result<()> {
+    let most = rayfold_scene::Limits::PIXELS;
+    ensure!(
+        u64::from(width) * u64::from(height) <= most,
+        "it has {width} x {height} pixels: expected at most {most}"
+    );
+    Ok(())
 }
 
 /// Runs `read`, and names the file in its error. A panic of a decoder, as of some on unusual files, is an error.

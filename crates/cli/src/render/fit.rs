@@ -72,7 +72,8 @@ pub(crate) fn write(
     }
     let Some((encoded, levels)) = best else {
         anyhow::bail!(
-            "it is larger than {} also with {} levels a channel: make it smaller with --size or --fps, or with fewer frames",
+            "the file would be larger than {} even with {} levels a channel: expected frames of fewer pixels, fewer frames, or a \
+             larger --max-size",
             Size(limit),
             LEVELS[LEVELS.len() - 1]
         );

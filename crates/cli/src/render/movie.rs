@@ -30,6 +30,9 @@ pub(crate) enum MovieError {
     Output(#[from] rayfold_files::Error),
     #[error(transparent)]
     Gif(rayfold_gif::Error),
+    /// A frame of another size.
+    #[error(transparent)]
+    Size(rayfold_movie::Error),
     /// The file is as large as it may be.
     #[error("the file is too large")]
     Full,
@@ -146,6 +149,7 @@ fn at(place: &Place, error: rayfold_movie::Error) -> MovieError {
     match error {
         rayfold_movie::Error::Write(source) => error_at(place, source),
         rayfold_movie::Error::Gif(error) => MovieError::Gif(error),
+        error @ rayfold_movie::Error::Size { .. } => MovieError::Size(error),
         error @ rayfold_movie::Error::State(_) => error_at(place, io::Error::other(error)),
     }
 }

@@ -142,6 +142,10 @@ impl<'a> Parser<'a> {
 
     pub(super) fn tell_unused_names(&mut self) {
         self.tell_unresolved();
+        // What uses them may be in a faulty line.
+        if self.has_errors() {
+            return;
+        }
         for named in self.materials.all().iter().filter(|named| !named.is_used) {
             self.report.warning(named.line, named.span.clone(), || wording::unused_name(Kinds::Materials));
         }

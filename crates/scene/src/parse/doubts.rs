@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use super::line::{Statement, decimal_comma};
+use super::visibility::Animated;
 use super::{Parser, wording};
 use crate::command::{Command, Effect};
 use crate::diagnostic::Code;
@@ -55,6 +56,8 @@ pub(super) struct Doubts<'a> {
     /// The line of the sky, until it is known whether it is seen; and whether there is fog.
     pub(super) sky: Option<Place<'a>>,
     pub(super) is_foggy: bool,
+    /// Whether the script says how many frames there are.
+    pub(super) has_frames: bool,
 }
 
 /// The properties of a material on which warnings depend.
@@ -245,6 +248,25 @@ impl<'a> Parser<'a> {
     pub(super) fn doubt_indirect(&mut self, s: &Statement<'a, '_>) {
         self.doubts.indirect = (self.recorder.indirect.bounces() > 0).then(|| s.place());
         self.doubts.is_indirect_new = true;
+    }
+
+    /// Warns of a curve in a script whose frames were probably forgotten: there is one moment only.
+    pub(super) fn doubt_curves(&mut self) {
+        let is_open = self.exposures.iter().any(|exposure| exposure.open > 0.0);
+        if self.doubts.has_frames || is_open || self.has_errors() {
+            return;
+        }
+        let changing = |animated: &Animated<'a>| {
+            let is_curve = |number: &Number| match number {
+                Number::Animated(curve) => curve.keys().windows(2).any(|pair| pair[0].value != pair[1].value),
+                Number::Constant(_) | Number::Level(_) => false,
+            };
+            let at = animated.row.numbers().iter().position(is_curve)?;
+            Some((animated.line, animated.spans.get(at)?.clone()))
+        };
+        if let Some((line, span)) = self.moving.iter().find_map(changing) {
+            self.report.warning(line, span, wording::curve_without_frames);
+        }
     }
 
     pub(super) fn doubt_no_more_of_scene(&mut self) {

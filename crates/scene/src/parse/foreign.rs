@@ -29,7 +29,28 @@ const MARKS: &[(usize, &[u8], &str)] = &[
     (0, b"\x7fELF", "a program"),
 ];
 
-/// Returns what a file is if it is no text.
+/// Words that begin the lines of a Wavefront OBJ. Commands of a script begin with a capital.
+const OF_OBJ: [&[u8]; 10] = [b"v", b"vn", b"vt", b"vp", b"f", b"o", b"g", b"s", b"mtllib", b"usemtl"];
+
+/// Returns which other format a text is of, by its first line that is neither empty nor a comment.
+fn other_text(bytes: &[u8]) -> Option<&'static str> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let lines = bytes[..bytes.len().min(LOOKED_AT)].split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let mut words = lines
+        .filter(|line| !line.is_empty() && !line.starts_with(b"#"))
+        .filter_map(|line| line.split(|byte| matches!(byte, b' ' | b'\t')).next());
+    match words.next()? {
+        word if OF_OBJ.contains(&word) && words.any(|word| word == b"v") || word == b"v" => {
+            Some("an OBJ model")
+        }
+        b"solid" => Some("an STL model"),
+        word if word.starts_with(b"{") || word.starts_with(b"[") => Some("JSON"),
+        word if word.starts_with(b"<") => Some("XML or HTML"),
+        _ => None,
+    }
+}
+
+/// Returns what a file is if it is no text, or that of another format.
 pub(super) fn not_text(bytes: &[u8]) -> Option<&'static str> {
     let has =
         |(at, mark, _): &&(usize, &[u8], _)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(mark));
@@ -40,7 +61,7 @@ pub(super) fn not_text(bytes: &[u8]) -> Option<&'static str> {
     let zeros = |parity: usize| start.iter().skip(parity).step_by(2).filter(|byte| **byte == 0).count();
     let (even, odd) = (zeros(0), zeros(1));
     match even + odd {
-        0 => None,
+        0 => other_text(bytes),
         // In UTF-16, one byte of each letter of a script is 0.
         zeros if zeros == even.max(odd) && zeros >= start.len() / 3 => Some(UTF_16),
         _ => Some("a binary file"),
@@ -62,5 +83,11 @@ mod tests {
         check(b"\0\0\0\x18ftypmp42", Some("a video"));
         check(b"S\0c\0r\0e\0", Some(UTF_16));
         check(b"Screen 4 3\n\0", Some("a binary file"));
+        check(b"# by a modeller\n\no ball\nv 0 0 0\nv 1 0 0\n", Some("an OBJ model"));
+        check(b"v 0 0 0\n", Some("an OBJ model"));
+        check(b"f 1 2 3\nSphere 1\n", None);
+        check(b"solid cube\n  facet normal 0 0 1\n", Some("an STL model"));
+        check(b"{\n  \"fps\": 25\n}", Some("JSON"));
+        check(b"<svg>", Some("XML or HTML"));
     }
 }

@@ -204,6 +204,7 @@ impl<'a> Parser<'a> {
         }
         self.tell_unused_names();
         self.settle_all();
+        self.doubt_curves();
         visibility::check(&self.moving, &self.exposures, &mut self.report);
         let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         // Of a file in another language, the first errors say all.
@@ -284,7 +285,10 @@ impl<'a> Parser<'a> {
                 self.set(s, |recorder, indirect| recorder.indirect = indirect);
                 self.doubt_indirect(s);
             }
-            Effect::Frames => self.set(s, |recorder, numbers| recorder.numbers = numbers),
+            Effect::Frames => {
+                self.set(s, |recorder, numbers| recorder.numbers = numbers);
+                self.doubts.has_frames = true;
+            }
             Effect::Material => self.material(s),
             Effect::Group => self.open_group(s),
             Effect::End => self.end_group(s),

@@ -39,6 +39,12 @@ impl<'a> Parser<'a> {
         let Some(subject) = s.subject.clone() else { return };
         let Some(name) = self.file(s, subject.clone()) else { return };
         let Some(picture) = self.picture_of(s, &subject, &name, Purpose::Sky) else { return };
+        let size @ [width, height] = [picture.width(), picture.height()];
+        if f64::from(width)
+            != (2.0 * f64::from(height)).clamp(0.95 * f64::from(width), 1.05 * f64::from(width))
+        {
+            self.report.warning(s.line, subject, || wording::no_panorama(&name, size));
+        }
         let Some((turn, moving)) = turn else { return };
         self.set_sky(s, SkyLine::Picture(PictureFile::new(&name, picture), turn), moving);
     }

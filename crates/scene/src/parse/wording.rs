@@ -40,8 +40,9 @@ pub(super) fn not_text(what: &str) -> Fault {
     if what == super::foreign::UTF_16 {
         return utf16();
     }
-    Fault::new(Code::NotText, format!("this is {what}, not a scene script"))
-        .expected("expected a text file with commands such as `Screen 640 480`")
+    let fault = Fault::new(Code::NotText, format!("this is {what}, not a scene script"))
+        .expected("expected a text file with commands such as `Screen 640 480`");
+    if what.ends_with("model") { fault.help("`Mesh \"FILE\"` in a script draws it") } else { fault }
 }
 
 pub(super) fn lone_carriage_return() -> Fault {
@@ -509,6 +510,20 @@ pub(super) fn needs_samples(what: &str) -> Fault {
     Fault::new(Code::NeedsSamples, format!("{what} has no effect: there is one ray per pixel"))
         .expected("expected `Samples` before the `Trace`")
         .help("write for example `Samples 64`")
+}
+
+pub(super) fn curve_without_frames() -> Fault {
+    Fault::new(Code::NoEffect, "this changes from frame to frame, but there is one frame only")
+        .expected("expected `Frames` before the `Trace`")
+        .help("write for example `Frames 1 50`")
+}
+
+pub(super) fn no_panorama(name: &str, [width, height]: [u32; 2]) -> Fault {
+    Fault::new(
+        Code::UnusedPart,
+        format!("`{name}` has {width} x {height} pixels, and is stretched around the scene"),
+    )
+    .expected("expected a panorama, twice as wide as high")
 }
 
 pub(super) fn no_light() -> Fault {
