@@ -146,6 +146,22 @@ fn a_single_animated_file_keeps_how_often_it_is_shown() {
 }
 
 #[test]
+fn other_settings_than_durations_are_reported() {
+    let folder = Folder::new();
+    for (name, color) in [("a.png", RED), ("b.png", BLUE)] {
+        square(color).save(folder.join(name)).unwrap();
+    }
+    folder.write("all.json", r#"{"fps": 5, "durations": {"2": 0.5}, "bounce": true}"#);
+    let run = folder.rayfold("encode a.png b.png -o o.gif --durations all.json").assert().code(0);
+    let text = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(text.contains("of all.json only \"durations\" is read, not bounce, fps"), "{text}");
+    folder.write("none.json", r#"{"fps": 5, "loop": 2}"#);
+    let run = folder.rayfold("encode a.png b.png -o o.gif --durations none.json").assert().code(1);
+    let text = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(text.contains("none.json has no \"durations\": expected seconds by frame"), "{text}");
+}
+
+#[test]
 fn times_of_an_apng_are_kept_as_fractions() {
     let folder =
         Folder::with("a.txt", "Screen 8 6\nFrames 1 4\nSphere 1 (1:1 4:7) 3 -5  1 0 0  0 0 0\nTrace\n");

@@ -73,7 +73,8 @@ pub(crate) struct Args {
     /// never the last [default: the times of an animated file, the rate of a .y4m, or 10]
     #[arg(long, value_name = "RATE", value_parser = values::rate, allow_negative_numbers = true)]
     fps: Option<f64>,
-    /// Durations of frames, as JSON: {"5": 0.5} shows the fifth for half a second. An animation.json is such a file, too
+    /// Durations of frames, as JSON: {"5": 0.5} shows the fifth for half a second. Of an animation.json, its
+    /// "durations" are read
     #[arg(long, value_name = "FILE")]
     durations: Option<PathBuf>,
     /// Colour behind what is transparent, such as '#ffffff'
@@ -106,7 +107,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         Encoder::new(std::io::sink(), Settings { fps, ..Settings::default() })
             .map_err(|error| Usage(format!("--fps {fps}: {error}")))?;
     }
-    let durations = args.durations.as_deref().map(durations::read).transpose()?.unwrap_or_default();
+    let durations =
+        args.durations.as_deref().map(|path| durations::read(path, console)).transpose()?.unwrap_or_default();
     tell_of_settings(args, console);
     let of_file = pictures(&args.frames, console)?;
     let pictures: Vec<&Picture> = in_order(args, console).iter().flat_map(|file| &of_file[file]).collect();

@@ -7,8 +7,8 @@ use crate::values;
 /// `--loop`, `--once` and `--final-delay`.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Playback {
-    /// How often to repeat the animation after it was shown once; 0, the default unless an animation.json says otherwise,
-    /// is for ever
+    /// How often to repeat the animation after it was shown once; 0 is for ever [default: as the animation.json beside the
+    /// scripts or a single animated file says, or 0]
     #[arg(long = "loop", value_name = "TIMES", value_parser = values::repetitions, allow_negative_numbers = true)]
     loops: Option<u16>,
     /// Show the animation once: do not repeat it

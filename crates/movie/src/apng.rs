@@ -52,7 +52,7 @@ impl<W: Write> Apng<W> {
 
     fn after(out: W, movie: Movie, thinning: Thinning) -> io::Result<Self> {
         let known = movie.frames.ok_or_else(|| {
-            io::Error::other("an .apng begins with the number of its frames, which a video does not say: make a .gif of it")
+            io::Error::other("an .apng begins with the number of its frames, which a video does not say: make a .gif or .webp of it")
         })?;
         let frames = thinning.left_of(known);
         Ok(Self { out, movie, thinning, frames, written: 0, pushed: 0, next: 0, last: None })

@@ -6,20 +6,37 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use rayfold_scene::parse_settings;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-/// Reads the times of frames in seconds, by frame from 1: a JSON object of them, or an animation.json.
+use crate::console::Console;
+
+/// The field of an animation.json that is read here, and those that are not.
+const DURATIONS: &str = "durations";
+const FIELDS: [&str; 5] = ["frames", "fps", "loop", "bounce", "outputs"];
+
+/// Reads the times of frames in seconds, by frame from 1: a JSON object of them, or the `durations` of an animation.json, whose
+/// other fields are reported as not read.
 ///
 /// # Errors
 /// When the file cannot be read, or says something else.
-pub(super) fn read(path: &Path) -> anyhow::Result<BTreeMap<u64, f64>> {
+pub(super) fn read(path: &Path, console: &Console) -> anyhow::Result<BTreeMap<u64, f64>> {
     let name = path.display().to_string();
     let mut text = String::new();
     rayfold_files::open(path)
         .and_then(|mut file| file.read_to_string(&mut text))
         .with_context(|| format!("cannot read {name}"))?;
-    let is_settings =
-        matches!(serde_json::from_str(&text), Ok(Value::Object(fields)) if fields.contains_key("durations"));
+    let fields = match serde_json::from_str(&text) {
+        Ok(Value::Object(fields)) => fields,
+        _ => Map::new(),
+    };
+    let others: Vec<&str> = fields.keys().map(String::as_str).filter(|key| FIELDS.contains(key)).collect();
+    let is_settings = fields.contains_key(DURATIONS) || !others.is_empty();
+    if !fields.contains_key(DURATIONS) && is_settings {
+        bail!("{name} has no \"{DURATIONS}\": expected seconds by frame, such as {{\"5\": 0.5}}");
+    }
+    if !others.is_empty() {
+        console.note(format_args!("of {name} only \"{DURATIONS}\" is read, not {}", others.join(", ")));
+    }
     if !is_settings {
         text = format!("{{\"durations\":\n{text}}}");
     }
