@@ -100,6 +100,39 @@ fn ctrl_c_leaves_only_whole_images() {
     }
 }
 
+#[test]
+fn ctrl_c_leaves_only_whole_passes_and_no_image_without_them() {
+    for (signal, format) in [("-INT", "exr"), ("-TERM", "png"), ("-KILL", "exr")] {
+        let script = BALL.replace("24, 16", "400, 300") + &"Trace\n".repeat(999);
+        let folder = Folder::with("a.txt", script);
+        std::fs::create_dir(folder.join("frames")).unwrap();
+        let out = ["-o", "frames/%d.png", "--pass", "depth,normal", "--pass-format", format];
+        let mut rayfold = Running::start(&folder, &[&["render", "a.txt"], &out[..]].concat());
+        wait_until("an image is there", || folder.join("frames/1.png").exists());
+        rayfold.signal(signal);
+        assert!(!rayfold.end().success());
+        let names: Vec<_> =
+            folder.list("frames").into_iter().filter(|name| !name.ends_with(".part")).collect();
+        for name in &names {
+            let file = folder.read(&format!("frames/{name}"));
+            if name.ends_with(".exr") {
+                let image =
+                    exr::prelude::read_first_flat_layer_from_file(folder.join(&format!("frames/{name}")));
+                assert_eq!(image.unwrap().layer_data.size, exr::prelude::Vec2(400, 300), "{name}");
+            } else {
+                let image = image::load_from_memory(&file).unwrap();
+                assert_eq!((image.width(), image.height()), (400, 300), "{name}");
+            }
+            if let Some(number) = name.strip_suffix(".png").filter(|number| number.parse::<u32>().is_ok()) {
+                for pass in ["depth", "normal"] {
+                    assert!(names.contains(&format!("{number}.{pass}.{format}")), "{name} without {pass}");
+                }
+            }
+        }
+        assert!(names.contains(&"1.png".to_owned()) && names.len() < 3000);
+    }
+}
+
 /// Runs `rayfold` with a limit on the size of files. The unit of `ulimit -f` is 512 or 1024 bytes, depending on the
 /// shell.
 fn with_file_limit(folder: &Folder, args: &str) -> std::process::Output {

@@ -21,6 +21,7 @@ mod models;
 mod movies;
 mod newcomer;
 mod pages;
+mod passes;
 mod render;
 mod split;
 mod timing;

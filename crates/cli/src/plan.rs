@@ -3,13 +3,14 @@
 //! Every script is parsed once to learn its faults and the shape of its frames. Small scripts are kept; beyond
 //! [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use rayfold_scene::{
-    AnimationSettings, Depth, Limits, SETTINGS_FILE, Samples, Scene, Screen, Script, Severity,
+    AnimationSettings, Depth, Limits, Origin, SETTINGS_FILE, Samples, Scene, Screen, Script, Severity,
 };
 use rayfold_tracer::{CutLight, Exposure, Precision, RenderOptions};
 
@@ -27,6 +28,9 @@ const AHEAD: u64 = 192 << 20;
 
 /// Bytes of a pixel while it is drawn: its samples, its levels, and its share of the encoded file.
 const OF_PIXEL: u64 = 48;
+
+/// Bytes of a pixel while its passes are made: its hit, and the numbers of four passes twice.
+const OF_PASSES: u64 = 96;
 
 /// The fewest frames at once: one is drawn while another is encoded.
 const FEWEST: usize = 2;
@@ -48,6 +52,8 @@ pub(crate) struct Plan {
     pub(crate) precision: Precision,
     /// The levels of the colour behind the objects of frames without background; `None` for alpha.
     pub(crate) matte: Option<[u8; 3]>,
+    /// Whether passes are made beside the pictures.
+    has_passes: bool,
 }
 
 /// A frame to draw.
@@ -92,6 +98,8 @@ pub(crate) struct Wishes {
     pub(crate) precision: Precision,
     /// The levels of the colour behind the objects of frames without background, which have alpha if it is not given.
     pub(crate) matte: Option<[u8; 3]>,
+    /// Whether passes are made beside the pictures.
+    pub(crate) has_passes: bool,
 }
 
 /// Why the frames cannot be drawn although each script is fine by itself.
@@ -201,6 +209,7 @@ impl Plan {
             settings,
             precision: wishes.precision,
             matte: wishes.matte,
+            has_passes: wishes.has_passes,
         };
         if plan.size.is_some()
             && let Some((frame, part, _)) = plan.runs().find(|(_, _, shape)| shape.orthographic)
@@ -252,8 +261,9 @@ impl Plan {
     pub(crate) fn window(&self) -> usize {
         let bytes = |shape: &Shape| {
             let pixels = self.size.unwrap_or(shape.screen).pixels();
+            let of_pixel = if self.has_passes { OF_PIXEL + OF_PASSES } else { OF_PIXEL };
             // The objects, and the structures that find them quickly.
-            OF_PIXEL * pixels + 400 * shape.objects as u64
+            of_pixel * pixels + 400 * shape.objects as u64
         };
         let largest = self.runs().map(|(_, _, shape)| bytes(shape)).max().unwrap_or(1);
         let most = 4 * rayon::current_num_threads();
@@ -312,6 +322,23 @@ impl Plan {
             scene.samples = samples;
         }
         Ok(scene)
+    }
+
+    /// Returns the origins of the objects of a frame, in their order.
+    ///
+    /// # Errors
+    /// The errors of [`Self::scene`].
+    pub(crate) fn origins(&self, job: &Job) -> anyhow::Result<Vec<Origin>> {
+        let part = &self.parts[job.part];
+        part.script(&self.limits)?.origins(job.index).ok_or_else(|| part.changed())
+    }
+
+    /// Returns the text of the script of a frame.
+    ///
+    /// # Errors
+    /// When it cannot be read again.
+    pub(crate) fn text(&self, job: &Job) -> anyhow::Result<Cow<'_, [u8]>> {
+        self.parts[job.part].file.read(&self.limits)
     }
 
     /// Draws a frame with `draw`, which gets it as it is in the middle of its exposure, and at other moments.

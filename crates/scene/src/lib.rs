@@ -54,7 +54,7 @@ pub use name::{Name, SETTINGS_FILE, script_name};
 pub use natural::natural_cmp;
 pub use parse::{Parsed, is_name, parse, parse_curve, parse_with_files, unquoted_word};
 pub use rayfold_assets as assets;
-pub use script::{Script, ShotSummary};
+pub use script::{Origin, Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};
 pub use shared_slice::SharedSlice;
 

@@ -293,6 +293,9 @@ proptest! {
         let again = again.unwrap();
         prop_assert_eq!(again.to_string(), written.clone());
         for k in 0..first.frame_count().min(4) {
+            let numbers: Vec<usize> = first.origins(k).unwrap().iter().map(|origin| origin.number).collect();
+            prop_assert_eq!(numbers.len(), first.frame(k).unwrap().objects.len());
+            prop_assert!(numbers.iter().all(|number| *number > 0) && numbers.is_sorted_by(|a, b| a < b));
             let frame = first.frame(k);
             prop_assert_eq!(bits(&again.frame(k)), bits(&frame));
             let only = first.only(k).unwrap();

@@ -192,6 +192,14 @@ impl Rays {
         self
     }
 
+    /// Returns the direction of the view axis, of length 1.
+    pub(crate) fn forward(&self) -> DVec3 {
+        match *self {
+            Self::Parallel => DVec3::NEG_Z,
+            Self::Pinhole { back, .. } => -unit(back),
+        }
+    }
+
     /// Returns the ray of column `i` from the left and row `j` from the bottom, which may be fractions.
     pub(crate) fn ray(&self, i: f64, j: f64) -> Ray {
         match *self {

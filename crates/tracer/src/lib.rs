@@ -25,6 +25,7 @@ mod cover;
 mod cut_light;
 mod exposure;
 mod fast;
+mod first_hits;
 mod meshes;
 #[cfg(feature = "accuracy")]
 mod nans;
@@ -42,6 +43,7 @@ pub use exposure::Exposure;
 #[cfg(feature = "accuracy")]
 pub use fast::Means;
 pub use fast::{Drawing, probe};
+pub use first_hits::{FirstHit, first_hits};
 #[cfg(feature = "accuracy")]
 pub use nans::take as take_nans;
 

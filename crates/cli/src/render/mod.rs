@@ -29,10 +29,12 @@ use crate::wording::{Size, number};
 
 pub(crate) mod fit;
 pub(crate) mod movie;
+mod passes;
 pub(crate) mod target;
 mod watch;
 
 use movie::{MovieError, Push};
+use passes::{PassArgs, Passes};
 use target::{Format, Pattern, Place, Target};
 
 /// Render scripts to an animation, to one image, or to many
@@ -50,6 +52,8 @@ Examples:
       one frame
   rayfold render scenes/hello -o 'frames/%04d.png'
       each frame: frames/0001.png and on
+  rayfold render scenes/hello -o 'frames/%04d.png' --pass depth,normal
+      with frames/0001.depth.exr and frames/0001.normal.exr beside it
   rayfold render my-scene -o my.gif --watch
       again whenever a script is saved
   rayfold render scenes/hello -o - | ffplay -
@@ -85,6 +89,8 @@ pub(crate) struct Args {
     /// Colour behind the objects where a script says Background none, such as '#ffffff' [default: transparent; black in a .y4m]
     #[arg(long, value_name = "#RRGGBB", value_parser = values::color)]
     matte: Option<[u8; 3]>,
+    #[command(flatten)]
+    passes: PassArgs,
     /// Draw every frame in this size, such as 640x480, instead of that of its Screen
     #[arg(long, value_name = "WxH", value_parser = values::size, allow_negative_numbers = true)]
     size: Option<Screen>,
@@ -136,12 +142,13 @@ type Frames = (Option<u64>, Option<u64>);
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let target = Target::parse(&args.output, args.format)?;
     check(args, &target)?;
+    let passes = args.passes.passes(&target)?;
     args.threads.tell(console);
     args.threads.start()?;
     if args.watch {
-        watch::draw_again(&args.input, console, || draw_all(args, &target, console))
+        watch::draw_again(&args.input, console, || draw_all(args, &target, &passes, console))
     } else {
-        draw_all(args, &target, console)?;
+        draw_all(args, &target, &passes, console)?;
         Ok(Outcome::Done)
     }
 }
@@ -199,7 +206,7 @@ pub(crate) fn check_max_size(max_size: Option<u64>, target: &Target) -> Result<(
     }
 }
 
-fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<()> {
+fn draw_all(args: &Args, target: &Target, passes: &Passes, console: &Console) -> anyhow::Result<()> {
     let wishes = Wishes {
         size: args.size,
         samples: args.samples,
@@ -210,32 +217,23 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
             Target::Animation(Container::Y4m, _) => Some(args.matte.unwrap_or_default()),
             _ => args.matte,
         },
+        has_passes: !passes.is_empty(),
     };
+    let files = files(target, passes);
     if args.no_clobber {
-        match target {
-            Target::Animation(_, Place::File(path)) | Target::Image(path, _) => must_be_new(path)?,
-            Target::Animation(_, Place::StandardOutput) | Target::Images(..) => {}
-        }
+        files.iter().try_for_each(|path| must_be_new(path))?;
     }
-    match target {
-        Target::Animation(_, Place::File(path)) | Target::Image(path, _) => probe(path)?,
-        Target::Animation(_, Place::StandardOutput) => {}
-        // If all frames are there already, nothing is written.
-        Target::Images(..) if args.skip_existing => {}
-        Target::Images(pattern, _) => pattern.probe(wishes.frames.0.unwrap_or(1))?,
+    files.iter().try_for_each(|path| probe(path))?;
+    let patterns = patterns(target, passes);
+    // If all frames are there already, nothing is written.
+    if !args.skip_existing {
+        patterns.iter().try_for_each(|pattern| pattern.probe(wishes.frames.0.unwrap_or(1)))?;
     }
     let limits = Limits { max_pixels: args.max_pixels, ..Limits::default() };
     let input = Input::animation(&args.input, &limits)?;
-    match target {
-        Target::Animation(_, Place::File(path)) | Target::Image(path, _) => {
-            must_not_replace(path, input.files())?;
-        }
-        Target::Animation(_, Place::StandardOutput) => {}
-        Target::Images(pattern, _) => {
-            if let Some(taken) = input.files().find(|file| pattern.names(file)) {
-                must_not_replace(taken, std::iter::once(taken))?;
-            }
-        }
+    files.iter().try_for_each(|path| must_not_replace(path, input.files()))?;
+    if let Some(taken) = input.files().find(|file| patterns.iter().any(|pattern| pattern.names(file))) {
+        must_not_replace(taken, std::iter::once(taken))?;
     }
     let plan = match Plan::new(&input, &limits, &wishes, console)? {
         Ok(plan) => plan,
@@ -254,12 +252,36 @@ fn draw_all(args: &Args, target: &Target, console: &Console) -> anyhow::Result<(
     }
     match target {
         Target::Animation(container, place) => animation(args, *container, place, &plan, console),
-        Target::Image(path, format) => image(path, *format, &plan, console),
+        Target::Image(path, format) => image(path, *format, passes, &plan, console),
         Target::Images(pattern, format) => {
             if args.no_clobber {
-                plan.jobs().try_for_each(|job| must_be_new(&pattern.path(job.number)))?;
+                let mut paths =
+                    plan.jobs().flat_map(|job| patterns.iter().map(move |of| of.path(job.number)));
+                paths.try_for_each(|path| must_be_new(&path))?;
             }
-            images(pattern, *format, args.skip_existing, &plan, console)
+            images((pattern, *format), passes, args.skip_existing, &plan, console)
+        }
+    }
+}
+
+/// Returns the files that are written, unless there are some for each frame.
+fn files(target: &Target, passes: &Passes) -> Vec<PathBuf> {
+    match target {
+        Target::Animation(_, Place::File(path)) => vec![path.clone()],
+        Target::Animation(_, Place::StandardOutput) | Target::Images(..) => Vec::new(),
+        Target::Image(path, _) => {
+            let beside = passes.beside(path).into_iter().map(|(_, path)| path);
+            std::iter::once(path.clone()).chain(beside).collect()
+        }
+    }
+}
+
+/// Returns the patterns of the files that are written for each frame.
+fn patterns(target: &Target, passes: &Passes) -> Vec<Pattern> {
+    match target {
+        Target::Animation(..) | Target::Image(..) => Vec::new(),
+        Target::Images(pattern, _) => {
+            std::iter::once(pattern.clone()).chain(passes.patterns(pattern)).collect()
         }
     }
 }
@@ -337,7 +359,7 @@ fn animation(
     Ok(())
 }
 
-fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow::Result<()> {
+fn image(path: &Path, format: Format, passes: &Passes, plan: &Plan, console: &Console) -> anyhow::Result<()> {
     let mut jobs = plan.jobs();
     let (Some(job), None) = (jobs.next(), jobs.next()) else {
         anyhow::bail!(
@@ -347,73 +369,99 @@ fn image(path: &Path, format: Format, plan: &Plan, console: &Console) -> anyhow:
         );
     };
     let progress = Progress::of_frames(console, 1);
+    let draw_image = || -> anyhow::Result<_> {
+        let file = format.encode(&draw(plan, &job, progress.drawn())?)?;
+        Ok((file, passes.encode(plan, &job, passes.beside(path))?))
+    };
     // On a thread of the pool, so that it is not idle while the image is drawn.
-    let drawing = || rayon::scope(|_| format.encode(&draw(plan, &job, progress.drawn())?));
-    let file = progress.watch(console, drawing)?;
+    let drawing = || rayon::scope(|_| draw_image());
+    let (file, beside) = progress.watch(console, drawing)?;
+    let sizes: Vec<_> = beside.iter().map(|(path, file)| (path.clone(), file.len() as u64)).collect();
+    passes::write(beside, true)?;
     OutputFile::write(path, &file, true)?;
     let took = progress.finish().as_secs_f64();
     console.note(format_args!("{}: {}, in {took:.2} s", path.display(), Size(file.len() as u64)));
+    for (path, size) in sizes {
+        console.note(format_args!("{}: {}", path.display(), Size(size)));
+    }
     Ok(())
 }
 
 /// The result of a frame that is to be a file.
 enum Drawn {
-    Written(u64),
+    /// The numbers of bytes of the image and of its passes.
+    Written(u64, u64),
     /// It was there already.
     Skipped,
 }
 
 fn images(
-    pattern: &Pattern,
-    format: Format,
+    (pattern, format): (&Pattern, Format),
+    passes: &Passes,
     skip_existing: bool,
     plan: &Plan,
     console: &Console,
 ) -> anyhow::Result<()> {
     pattern.make_folder()?;
     let progress = Progress::of_frames(console, plan.len());
-    let (mut done, mut bytes, mut skipped) = (0, 0, 0);
+    let (mut done, mut bytes, mut of_passes, mut skipped) = (0, 0, 0, 0);
     let files = AtomicU64::new(0);
+    let draw_frame = |job: Job| {
+        let path = pattern.path(job.number);
+        let mut beside = passes.beside(&path);
+        let mut is_there = false;
+        if skip_existing {
+            let screen = plan.scene(&job)?.screen;
+            is_there = is_drawn(&path, format, screen);
+            beside.retain(|(of, path)| !passes.is_whole(*of, path, screen));
+            if is_there && beside.is_empty() {
+                return Ok(Drawn::Skipped);
+            }
+            let missing = beside.iter().map(|(_, path)| path);
+            missing.chain((!is_there).then_some(&path)).try_for_each(|path| probe(path))?;
+        }
+        let image = match is_there {
+            true => None,
+            false => Some(format.encode(&draw(plan, &job, progress.drawn())?)?),
+        };
+        // An image is written after its passes: where it is, they are.
+        let of_passes = passes::write(passes.encode(plan, &job, beside)?, false)?;
+        let size = image.as_ref().map_or(0, Vec::len) as u64;
+        if let Some(image) = image {
+            OutputFile::write(path, &image, false)?;
+        }
+        files.fetch_add(1, Ordering::Relaxed);
+        Ok(Drawn::Written(size, of_passes))
+    };
     let drawing = || {
-        ahead::in_order(
-            plan.jobs(),
-            plan.window(),
-            |job| {
-                let path = pattern.path(job.number);
-                if skip_existing && is_drawn(&path, format, plan.scene(&job)?.screen) {
-                    return Ok(Drawn::Skipped);
-                }
-                if skip_existing {
-                    probe(&path)?;
-                }
-                let file = format.encode(&draw(plan, &job, progress.drawn())?)?;
-                OutputFile::write(path, &file, false)?;
-                files.fetch_add(1, Ordering::Relaxed);
-                Ok(Drawn::Written(file.len() as u64))
-            },
-            |drawn| {
-                match drawn {
-                    Drawn::Written(size) => bytes += size,
-                    Drawn::Skipped => skipped += 1,
-                }
-                done += 1;
-                progress.set(console, done);
-                Ok(())
-            },
-        )
+        ahead::in_order(plan.jobs(), plan.window(), draw_frame, |drawn| {
+            match drawn {
+                Drawn::Written(image, beside) => (bytes, of_passes) = (bytes + image, of_passes + beside),
+                Drawn::Skipped => skipped += 1,
+            }
+            done += 1;
+            progress.set(console, done);
+            Ok(())
+        })
     };
     let written = progress.watch(console, drawing);
     let took = progress.finish().as_secs_f64();
     written.with_context(|| format!("{} of {} written", files.into_inner(), number(plan.len(), "frame")))?;
     let number_of = |job: Option<Job>| job.map_or(1, |job| job.number);
+    let (first, last) = (number_of(plan.jobs().next()), number_of(plan.jobs().last()));
     let there = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
     console.note(format_args!(
         "{}: {}{there}, {}, in {took:.2} s",
-        pattern.range(number_of(plan.jobs().next()), number_of(plan.jobs().last())),
+        pattern.range(first, last),
         number(plan.len(), "frame"),
         Size(bytes)
     ));
+    if !passes.is_empty() {
+        let patterns = passes.patterns(pattern).map(|pattern| pattern.range(first, last));
+        console.note(format_args!("{}: {}", patterns.collect::<Vec<_>>().join(", "), Size(of_passes)));
+    }
     pattern.warn_of_older(plan.total(), console);
+    passes.patterns(pattern).for_each(|pattern| pattern.warn_of_older(plan.total(), console));
     Ok(())
 }
 

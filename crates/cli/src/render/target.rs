@@ -131,6 +131,12 @@ impl Pattern {
         Ok(Some(Self { folder, before: before.into(), digits, after: after.into() }))
     }
 
+    /// Returns the pattern of files beside those of this one, with another ending: `a%04d.depth.exr` for `a%04d.png`.
+    pub(crate) fn with_ending(&self, ending: &str) -> Self {
+        let after = self.after.rsplit_once('.').map_or("", |(after, _)| after);
+        Self { after: format!("{after}.{ending}"), ..self.clone() }
+    }
+
     /// Returns early the error that [`make_folder`](Self::make_folder) or writing a file would return later. Makes
     /// nothing.
     ///

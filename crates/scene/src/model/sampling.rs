@@ -131,6 +131,15 @@ impl Tone {
             Self::Srgb => libm::pow((share + 0.055) / 1.055, 2.4),
         }
     }
+
+    /// Returns the share of the highest level that shows light from 0 to 1. It is the inverse of [`Self::light`].
+    pub fn encoded(self, light: f64) -> f64 {
+        match self {
+            Self::Plain => light,
+            Self::Srgb if light <= 0.003_130_8 => 12.92 * light,
+            Self::Srgb => 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055,
+        }
+    }
 }
 
 impl Scripted for Tone {

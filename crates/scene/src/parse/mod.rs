@@ -259,6 +259,10 @@ impl<'a> Parser<'a> {
 
     fn run(&mut self, s: &Statement<'a, '_>) {
         let effect = s.command.effect();
+        self.recorder.line = s.line.number;
+        if let Some(group) = &mut self.group {
+            group.recorder.line = s.line.number;
+        }
         if self.group.is_some()
             && !matches!(effect, Effect::Object(_) | Effect::Mesh | Effect::Text | Effect::Use | Effect::End)
         {

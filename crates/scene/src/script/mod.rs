@@ -11,7 +11,9 @@
 
 mod moment;
 mod of_scene;
+mod origins;
 mod recorder;
+mod source_lines;
 mod write;
 
 use std::ops::Range;
@@ -24,7 +26,10 @@ use crate::model::{
 use crate::row::{Number, Row};
 use crate::shared_slice::SharedSlice;
 
+pub use origins::Origin;
+use origins::Origins;
 pub(crate) use recorder::{GroupRecorder, Recorder};
+use source_lines::SourceLines;
 
 /// A parsed script, with at least one frame.
 ///
@@ -134,6 +139,8 @@ pub(crate) struct Objects {
     list: Sequence<Object, Drawn>,
     /// The named material of the constant objects from an index on.
     surfaces: Vec<(usize, Option<usize>)>,
+    /// The lines of the constant objects and of the others.
+    lines: [SourceLines; 2],
 }
 
 /// A drawn item that is no constant object.
@@ -223,6 +230,25 @@ impl Script {
     pub fn frame_after(&self, k: usize, frames: f64) -> Option<Scene> {
         let (shot, number) = self.shot_of(k)?;
         self.scene(shot, number + frames).or_else(|_| self.scene(shot, number)).ok()
+    }
+
+    /// Returns the origins of the objects of [frame](Self::frame) `k`, in their order, or `None` after the last frame.
+    ///
+    /// ```
+    /// let text = b"Screen 4 3\nGroup pair\nSphere 1 0 0 0 1 0 0 0 0 0\nSphere 1 2 0 0 1 0 0 0 0 0\nEnd\n\
+    ///     Sphere (1:0 2:1) 0 0 -5 1 0 0 0 0 0\nUse pair 0 0 0\nFrames 2\nTrace";
+    /// let script = rayfold_scene::parse("a.txt", text, &Default::default()).script.unwrap();
+    /// let origins = script.origins(0).unwrap();
+    /// // The first sphere is hidden, but keeps its number.
+    /// assert_eq!(origins.iter().map(|origin| origin.number).collect::<Vec<_>>(), [2, 3]);
+    /// assert_eq!((&*origins[0].uses, origins[0].line), ([7].as_slice(), 3));
+    /// ```
+    pub fn origins(&self, k: usize) -> Option<Vec<Origin>> {
+        let (shot, number) = self.shot_of(k)?;
+        let mut origins = Origins::new(self);
+        let tone = self.views[shot.view].tone;
+        self.objects_at(&shot.objects, number, tone, Some(&mut origins)).ok()?;
+        Some(origins.all)
     }
 
     /// Returns the scenes of all frames in order. The iterator builds each on request.
@@ -384,7 +410,9 @@ impl Objects {
         {
             surfaces.insert(0, (0, Some(surface)));
         }
-        Self { list: self.list.part(extent), surfaces }
+        let [still, others] = &self.lines;
+        let lines = [still.part(extent.still.clone()), others.part(extent.others.clone())];
+        Self { list: self.list.part(extent), surfaces, lines }
     }
 
     /// Returns whether one of these objects is rough. `rough` says it of each material, and `groups` of each group.

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::origins::{Counter, Origins};
 use super::{Drawn, Extent, Group, NamedMaterial, Script, Shot, SkyLine, Template, Value};
 use crate::command::{Effect, Reader};
 use crate::form::{Numbers, Scripted};
@@ -34,6 +35,7 @@ struct Level {
     still: usize,
     other: usize,
     object: usize,
+    counter: Counter,
 }
 
 impl Script {
@@ -59,7 +61,7 @@ impl Script {
         scene.fog = view.fog.at(frame, view.tone, |_| Some(Scripted::read))?;
         (scene.samples, scene.shutter) = (view.samples, view.shutter);
         (scene.tone, scene.depth, scene.indirect) = (view.tone, view.depth, view.indirect);
-        scene.objects = self.objects_at(&shot.objects, frame, view.tone)?;
+        scene.objects = self.objects_at(&shot.objects, frame, view.tone, None)?;
         scene.hides_rough = self.is_rough(&shot.objects) && !scene.shows_rough();
         scene.lights = self.lights_at(&shot.lights, frame, view.tone)?;
         Ok(scene)
@@ -81,10 +83,21 @@ impl Script {
         Ok(lights.into())
     }
 
-    fn objects_at(&self, extent: &Extent, frame: f64, tone: Tone) -> Result<SharedSlice<Object>, Faults> {
+    /// Returns the objects of a frame, and adds their origins to `origins`.
+    pub(super) fn objects_at(
+        &self,
+        extent: &Extent,
+        frame: f64,
+        tone: Tone,
+        mut origins: Option<&mut Origins>,
+    ) -> Result<SharedSlice<Object>, Faults> {
         let list = &self.objects.list;
         let Extent { still, others } = extent.clone();
+        let mut counter = Counter::start();
         if others.is_empty() {
+            if let Some(origins) = origins {
+                counter.add_still(&self.objects, still.clone(), origins);
+            }
             return Ok(list.still.part(still));
         }
         let mut moment = Moment {
@@ -96,16 +109,33 @@ impl Script {
         };
         let mut objects = Vec::new();
         let mut next = still.start;
-        for (before, drawn) in &list.others[others] {
+        for (i, (before, drawn)) in others.clone().zip(&list.others[others]) {
             objects.extend_from_slice(&list.still[next..*before]);
+            if let Some(origins) = origins.as_deref_mut() {
+                counter.add_still(&self.objects, next..*before, origins);
+            }
             next = *before;
+            let count = objects.len();
             match drawn {
                 Drawn::Object { template, surface } => objects.extend(moment.object(template, *surface)?),
-                Drawn::Use { group, row } => moment.draw(*group, row, &mut objects)?,
+                Drawn::Use { group, row } => {
+                    let within = origins.as_deref_mut().map(|origins| {
+                        let inner = counter.enter(&self.objects, i, *group, origins);
+                        (inner, origins)
+                    });
+                    moment.draw(*group, row, &mut objects, within)?;
+                    continue;
+                }
                 Drawn::Mesh { mesh, surface, row } => objects.push(moment.mesh(mesh, *surface, row)?),
+            }
+            if let Some(origins) = origins.as_deref_mut() {
+                counter.add_other(&self.objects, i, objects.len() > count, origins);
             }
         }
         objects.extend_from_slice(&list.still[next..still.end]);
+        if let Some(origins) = origins {
+            counter.add_still(&self.objects, next..still.end, origins);
+        }
         Ok(objects.into())
     }
 }
@@ -170,16 +200,27 @@ impl Moment<'_> {
         Ok(self.groups[i].clone().unwrap_or_default())
     }
 
-    /// Adds the objects of a group as placed by `row`, in the order of the text.
-    fn draw(&mut self, group: usize, row: &Row, into: &mut Vec<Object>) -> Result<(), Faults> {
+    /// Adds the objects of a group as placed by `row`, in the order of the text, and their origins.
+    fn draw(
+        &mut self,
+        group: usize,
+        row: &Row,
+        into: &mut Vec<Object>,
+        origins: Option<(Counter, &mut Origins)>,
+    ) -> Result<(), Faults> {
         let Some(placement) = self.placement(group, row, None)? else { return Ok(()) };
-        let mut stack = vec![Level { group, placement, still: 0, other: 0, object: 0 }];
+        let (counter, mut origins) = match origins {
+            Some((counter, origins)) => (counter, Some(origins)),
+            None => (Counter::default(), None),
+        };
+        let mut stack = vec![Level { group, placement, still: 0, other: 0, object: 0, counter }];
         while let Some(level) = stack.last_mut() {
             let Group { objects, .. } = &self.script.groups[level.group];
             let other = objects.list.others.get(level.other);
             let still = other.map_or(objects.list.still.len(), |(before, _)| *before);
-            let mut count = still - level.still;
-            (level.still, level.other) = (still, level.other + 1);
+            let (first, nth) = (level.still, level.other);
+            let mut count = still - first;
+            (level.still, level.other) = (still, nth + 1);
             let is_seen = match other {
                 Some((_, Drawn::Object { template, .. })) => !template.is_hidden(self.frame, self.tone),
                 Some((_, Drawn::Mesh { .. })) => true,
@@ -194,12 +235,23 @@ impl Moment<'_> {
                 level.object = range.end;
                 into.extend(range.map(|i| Object::from(Instance::new(&own, i, &level.placement))));
             }
+            if let Some(origins) = origins.as_deref_mut() {
+                level.counter.add_still(objects, first..still, origins);
+                if matches!(other, Some((_, Drawn::Object { .. } | Drawn::Mesh { .. }))) {
+                    level.counter.add_other(objects, nth, is_seen, origins);
+                }
+            }
             match other {
                 Some((_, Drawn::Object { .. } | Drawn::Mesh { .. })) => {}
                 Some((_, Drawn::Use { group, row })) => {
                     let outer = Arc::clone(&level.placement);
+                    let counter = match origins.as_deref_mut() {
+                        Some(origins) => level.counter.enter(objects, nth, *group, origins),
+                        None => Counter::default(),
+                    };
                     if let Some(placement) = self.placement(*group, row, Some(&outer))? {
-                        stack.push(Level { group: *group, placement, still: 0, other: 0, object: 0 });
+                        let group = *group;
+                        stack.push(Level { group, placement, still: 0, other: 0, object: 0, counter });
                     }
                 }
                 None => {

@@ -1,7 +1,8 @@
 //! The recorder: applies commands to the state, and stores the shots.
 
 use super::{
-    Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, SkyLine, Template, Value, View,
+    Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, SkyLine, SourceLines, Template,
+    Value, View,
 };
 use crate::model::{
     Background, Camera, Depth, Fog, FrameNumbers, Indirect, Lens, Light, Object, Samples, Screen, Shutter,
@@ -15,6 +16,10 @@ pub(crate) struct Recorder {
     groups: Vec<Group>,
     objects: List<Object, Drawn>,
     surfaces: Surfaces,
+    /// The lines of the constant objects and of the others.
+    lines: [SourceLines; 2],
+    /// The line of what is added next, counted from 1; 0 if it comes from no text.
+    pub(crate) line: usize,
     lights: List<Light, Template>,
     camera: Value<Camera>,
     background: Value<Background>,
@@ -38,6 +43,10 @@ pub(crate) struct GroupRecorder {
     still: Vec<Object>,
     others: Vec<(usize, Drawn)>,
     surfaces: Surfaces,
+    /// The lines of the constant objects and of the others.
+    lines: [SourceLines; 2],
+    /// The line of what is added next, counted from 1; 0 if it comes from no text.
+    pub(crate) line: usize,
 }
 
 /// Runs of constant objects with the same named material.
@@ -61,17 +70,20 @@ impl Surfaces {
 impl GroupRecorder {
     pub(crate) fn add_object(&mut self, object: Object, surface: Option<usize>) {
         self.surfaces.add(self.still.len(), surface);
+        self.lines[0].add(self.still.len(), self.line);
         self.still.push(object);
     }
 
     pub(crate) fn add_drawn(&mut self, drawn: Drawn) {
+        self.lines[1].add(self.others.len(), self.line);
         self.others.push((self.still.len(), drawn));
     }
 
     /// Finishes the group. `drawn` is the largest number of objects that drawing it draws.
     pub(crate) fn finish(self, name: &str, drawn: usize) -> Group {
         let list = Sequence { still: self.still.into(), others: self.others };
-        Group { name: name.into(), objects: Objects { list, surfaces: self.surfaces.0 }, drawn }
+        let objects = Objects { list, surfaces: self.surfaces.0, lines: self.lines };
+        Group { name: name.into(), objects, drawn }
     }
 }
 
@@ -89,10 +101,12 @@ impl Recorder {
     /// Adds an object. `surface` is the number of its material if that is named.
     pub(crate) fn add_object(&mut self, object: Object, surface: Option<usize>) {
         self.surfaces.add(self.objects.still.len(), surface);
+        self.lines[0].add(self.objects.still.len(), self.line);
         self.objects.still.push(object);
     }
 
     pub(crate) fn add_drawn(&mut self, drawn: Drawn) {
+        self.lines[1].add(self.objects.others.len(), self.line);
         self.objects.others.push((self.objects.still.len(), drawn));
     }
 
@@ -138,6 +152,8 @@ impl Recorder {
     pub(crate) fn clear(&mut self) {
         self.objects.clear();
         self.surfaces.truncate(self.objects.still.len());
+        self.lines[0].truncate(self.objects.still.len());
+        self.lines[1].truncate(self.objects.others.len());
         self.lights.clear();
         self.background = Value::default();
         self.sky = None;
@@ -208,8 +224,8 @@ impl Recorder {
     /// Returns the script, or `None` if there are no frames.
     pub(crate) fn finish(mut self) -> Option<Script> {
         self.clear();
-        let Self { materials, groups, objects, surfaces, lights, views, shots, .. } = self;
-        let objects = Objects { list: objects.finish(), surfaces: surfaces.0 };
+        let Self { materials, groups, objects, surfaces, lines, lights, views, shots, .. } = self;
+        let objects = Objects { list: objects.finish(), surfaces: surfaces.0, lines };
         let mut script = Script { materials, groups, objects, lights: lights.finish(), views, shots };
         script.forget_unused();
         (!script.shots.is_empty()).then_some(script)

@@ -49,6 +49,7 @@ use crate::sampling::rough::Energies;
 use crate::{Exposure, Precision, RenderError, RenderOptions};
 
 pub(crate) use crate::fast::film::tone::encoded;
+pub(crate) use crate::fast::probe::Finder;
 
 /// The columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);

@@ -2,12 +2,15 @@
 //!
 //! Hard cases are about rays that no camera sends; here they can be sent one by one, to any kernel.
 
+use std::sync::Arc;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd};
 use glam::DVec3;
 use rayfold_scene::Scene;
 
 use super::bodies::ANY;
+use super::has_kernels;
 use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::{Lanes, Real, Vec3};
 use crate::fast::arithmetic::rounding::MARGIN;
@@ -22,6 +25,7 @@ use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::search::nearest;
 use crate::fast::transport::surfaces::surface;
+use crate::meshes::Faces;
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -54,9 +58,7 @@ pub fn nearest_hits(
     match resolve(options, &geometry, &ranked.scene) {
         Some(Precision::F64) => {
             let geometry = geometry.with_shared_planes(&ranked.scene).with_shared_surfaces(&ranked.scene);
-            probe::<f64>(ranked, &geometry, rays, options, |batch, level, out| {
-                on!(level, simd => batch.nearest(simd, out));
-            })
+            probe::<f64>(ranked, &geometry, rays, options, in_double)
         }
         Some(_) => {
             let geometry = geometry.with_shared_surfaces_if_single(&ranked.scene, options);
@@ -65,6 +67,53 @@ pub fn nearest_hits(
             })
         }
         None => Ok(one_by_one()),
+    }
+}
+
+/// The kernels in double precision. They are compiled here alone.
+fn in_double(batch: &Batch<f64>, level: Level, out: &mut Vec<Option<Found>>) {
+    on!(level, simd => batch.nearest(simd, out));
+}
+
+/// Finds the first objects along rays, for many rays, in double precision.
+pub(crate) struct Finder<'a> {
+    ranked: Ranked<'a>,
+    geometry: Geometry,
+    prepared: Prepared<f64>,
+    level: Level,
+}
+
+impl<'a> Finder<'a> {
+    /// Prepares a scene. Returns `None` if no kernel can hold its numbers.
+    ///
+    /// # Errors
+    /// Those of [`crate::render`].
+    pub(crate) fn new(scene: &'a Scene, options: &RenderOptions<'a>) -> Result<Option<Self>, RenderError> {
+        let ranked = Ranked::new(scene);
+        let geometry =
+            if has_kernels(options) { Geometry::new(&ranked.scene, options.tree).ok() } else { None };
+        let in_double = RenderOptions { precision: Precision::F64, ..*options };
+        let can_hold = |geometry: &Geometry| resolve(&in_double, geometry, &ranked.scene).is_some();
+        let Some(geometry) = geometry.filter(can_hold) else { return Ok(None) };
+        let geometry = geometry.with_shared_planes(&ranked.scene).with_shared_surfaces(&ranked.scene);
+        let prepared = Prepared::new(&ranked.scene, &geometry, options.tree, &GRID)?;
+        Ok(Some(Self { ranked, geometry, prepared, level: options.level.unwrap_or_else(Level::new) }))
+    }
+
+    /// Returns the scene in whose order the objects are, without meshes, and the faces that its triangles were.
+    pub(crate) fn scene(&self) -> (&Scene, Option<Arc<Faces>>) {
+        (&self.ranked.scene, self.ranked.faces.clone())
+    }
+
+    /// Returns the position in the script of the object at `order`.
+    pub(crate) fn in_script(&self, order: usize) -> usize {
+        self.ranked.in_script(order)
+    }
+
+    /// Replaces `found` by the first hit of each ray, `(origin, direction)` with a direction of length 1.
+    pub(crate) fn nearest(&self, rays: &[(DVec3, DVec3)], found: &mut Vec<Option<Found>>) {
+        found.clear();
+        in_double(&Batch { scene: &self.prepared, geometry: &self.geometry, rays }, self.level, found);
     }
 }
 

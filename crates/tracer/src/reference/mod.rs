@@ -15,6 +15,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod first;
 mod glass;
 mod light;
 mod noise;
@@ -34,6 +35,7 @@ use glam::DVec3;
 use image::RgbImage;
 use rayfold_scene::{Object, Scene};
 
+pub(crate) use first::{FirstSurface, FirstSurfaces};
 pub(crate) use glass::{Refraction, onward_normal, refract};
 pub(crate) use light::highlight;
 pub(crate) use pattern::coefficients;

@@ -10,6 +10,7 @@ use super::Hit;
 use super::shapes::{self, Surface};
 use crate::camera::{Ray, Rays, Single};
 use crate::meshes::{Expanded, FaceHit, Faces, Shading};
+use crate::parallel::map;
 use crate::pictures::Panorama;
 
 /// The world that rays are traced through.
@@ -65,7 +66,7 @@ impl<'a> World<'a> {
             Camera::Pinhole(pinhole) => pinhole.eye(),
             Camera::Look(look) => look.eye(),
         };
-        let objects = self.objects.iter().map(|object| shapes::seen_from(object, eye));
+        let objects = map(&self.objects, |object| shapes::seen_from(object, eye));
         let lights = self.lights.iter().map(|light| match light {
             Light::Directional(_) => Some(*light),
             Light::Lamp(lamp) => {
@@ -74,7 +75,7 @@ impl<'a> World<'a> {
             }
         });
         Some(Self {
-            objects: objects.collect::<Option<Vec<_>>>()?.into(),
+            objects: objects.into_iter().collect::<Option<Vec<_>>>()?.into(),
             lights: lights.collect::<Option<Vec<_>>>()?.into(),
             rays: self.rays.with_eye_at_origin(),
             center: eye,
