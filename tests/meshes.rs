@@ -450,3 +450,20 @@ fn light_goes_through_holes() {
         (0..60).map(|k| format!("Use g {} {} {} {} {} 0 .3\n", k % 8 - 3, k % 3, k % 7 - 4, 23 * k, 31 * k));
     compare(&format!("Group g\nMesh \"leaf.gltf\"\nEnd\n{}", many.collect::<String>()));
 }
+
+#[test]
+fn pictures_and_holes_are_the_same_bytes_for_all_tiles_and_trees() {
+    for lines in [
+        "Mesh \"leaf.gltf\"",
+        "Mesh \"turned.gltf\"",
+        "Samples 5 0\nMesh \"leaf.gltf\" red",
+        "Mesh \"quads.obj\"",
+    ] {
+        let scene = scene(&format!("Tone srgb\n{lines}\nSphere .4 .9 -.6 .8 chrome"));
+        let usual = drawn(&scene);
+        for (tile, tree) in [(Some((4, 4)), None), (Some((64, 4)), Some(true)), (None, Some(false))] {
+            let options = RenderOptions { tile, tree, ..RenderOptions::default() };
+            assert!(render(&scene, &options).unwrap() == usual, "{lines} {tile:?} {tree:?}");
+        }
+    }
+}

@@ -183,3 +183,27 @@ pub(crate) fn content(files: &dyn Files, name: &str) -> Result<Vec<u8>, AssetErr
     }
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use image::{ImageFormat, RgbImage};
+
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    /// A black picture of 2²⁶ pixels can be a file of some kilobytes.
+    #[test]
+    fn pictures_of_a_model_are_bounded_together() {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        RgbImage::new(4, 2).write_to(&mut bytes, ImageFormat::Png).unwrap();
+        let bytes = bytes.into_inner();
+        let files = MemoryFiles::from([("a.png", bytes.clone()), ("b.png", bytes.clone())]);
+        let mut referred = Referred::new(&files);
+        referred.pixels = limits::MODEL_PIXELS - 8;
+        assert!(referred.picture("a.png").unwrap().is_some());
+        assert!(referred.picture("a.png").unwrap().is_some(), "a picture counts once");
+        let beyond = "its pictures have more than 268435456 pixels together";
+        assert_eq!(referred.picture("b.png").unwrap_err().what, beyond);
+        assert_eq!(referred.embedded("a.glb", "image 0", &bytes).unwrap_err().what, beyond);
+    }
+}

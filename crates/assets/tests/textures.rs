@@ -335,29 +335,3 @@ fn what_is_wrong_with_a_picture_of_gltf_is_said() {
         assert!(error.help().is_some(), "{message}");
     }
 }
-
-/// A PNG of 2²⁶ pixels has some 8 kB if it is black and of 1 bit per pixel, so that a few bytes could ask for gigabytes.
-#[test]
-fn pictures_of_a_model_are_bounded_together() {
-    let side = 1 << 13;
-    let mut bytes = Vec::new();
-    let mut encoder = png_crate(&mut bytes, side);
-    encoder.write_image_data(&vec![0; (side * side / 8) as usize]).unwrap();
-    drop(encoder);
-    let maps = (0..5).map(|k| format!("newmtl m{k}\nmap_Kd {k}.png\n")).collect::<String>();
-    let faces = (0..5).map(|k| format!("usemtl m{k}\nf 1 2 3\n")).collect::<String>();
-    let mut files = MemoryFiles::from([
-        ("a.obj", format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}").into_bytes()),
-        ("a.mtl", maps.into_bytes()),
-    ]);
-    (0..5).for_each(|k| files.insert(&format!("{k}.png"), bytes.clone()));
-    let error = Library::new(files).model("a.obj", Smoothing::OfFile).unwrap_err().to_string();
-    assert!(error.contains("its pictures have more than 268435456 pixels together"), "{error}");
-}
-
-fn png_crate(bytes: &mut Vec<u8>, side: u32) -> png::Writer<&mut Vec<u8>> {
-    let mut encoder = png::Encoder::new(bytes, side, side);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::One);
-    encoder.write_header().unwrap()
-}

@@ -323,8 +323,8 @@ impl Faces {
             }
         }
         let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
-        let look = run.model.look(k);
-        if run.has_colors && run.model.is_varied(look) {
+        let look = || run.model.look(k);
+        if run.has_colors && run.model.is_varied(look()) {
             let level = run.level(k, weights, Slot::Color);
             color = run.model.color(k, weights, level, run.is_linear);
         }
@@ -338,8 +338,8 @@ impl Faces {
             let v = if run.model.has_uvs_from_top() { v } else { 1.0 - v };
             color *= factor_at(image.file().picture(), [u, v], true, run.is_linear);
         }
-        if run.glows && glows_apart(&run.model, look) {
-            glow = run.model.glow(look, run.level(k, weights, Slot::Glow), run.is_linear);
+        if run.glows && glows_apart(&run.model, look()) {
+            glow = run.model.glow(look(), run.level(k, weights, Slot::Glow), run.is_linear);
         }
         let glass = finish.and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));

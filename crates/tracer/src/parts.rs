@@ -52,7 +52,7 @@ parts! {
     patterns, "patterns", |scene| is_made(scene, |f| f.pattern.is_some());
     lamps, "lamps", |scene| scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)));
     skies, "skies", |scene| scene.surroundings().color().is_none();
-    // Pictures as the sky, on surfaces, and of models.
+    // Pictures as the sky, on surfaces, and of models; and holes of models.
     pictures, "pictures", |scene| {
         scene.sky_picture().is_some() || is_made(scene, |f| f.image.is_some()) || scene.objects.iter().any(is_textured)
     };
@@ -99,10 +99,11 @@ fn has(scene: &Scene, is_it: fn(&Object) -> bool) -> bool {
     })
 }
 
-/// Returns whether an object shows pictures of its model.
+/// Returns whether an object shows pictures of its model, or has holes.
 fn is_textured(object: &Object) -> bool {
     let is_own = object.material().finish().is_some_and(|finish| finish.own);
-    is_own && mesh(object).is_some_and(|mesh| mesh.model().has_pictures())
+    let model = mesh(object).map(|mesh| mesh.model());
+    model.is_some_and(|model| is_own && model.has_pictures() || model.has_holes())
 }
 
 fn is_made(scene: &Scene, has_it: fn(&Finish) -> bool) -> bool {

@@ -252,8 +252,6 @@ impl<E: Real> Body<E> {
                     nearest.offer(simd, hit, distance, self.order);
                 },
             );
-        } else if let Shape::Cutout(cutout) = &self.shape {
-            cutout.intersect(simd, ray, nearest);
         } else {
             simd.vectorize(
                 #[inline(always)]
@@ -265,7 +263,8 @@ impl<E: Real> Body<E> {
                         Shape::Capsule(capsule) => capsule.intersect(simd, local),
                         Shape::Roundbox(roundbox) => roundbox.intersect(simd, local),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
-                        Shape::Plane | Shape::Disc(_) | Shape::Cutout(_) => return,
+                        Shape::Cutout(cutout) => return cutout.intersect(simd, ray, nearest),
+                        Shape::Plane | Shape::Disc(_) => return,
                     };
                     nearest.offer(simd, hit, distance, self.order);
                 },
