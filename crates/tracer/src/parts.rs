@@ -6,7 +6,6 @@
 use rayfold_scene::model::Finish;
 use rayfold_scene::{Light, Object, Scene, Tone};
 
-use crate::meshes::mesh;
 use crate::reference::turns_axes_to_axes;
 use crate::{Exposure, RenderError};
 
@@ -101,9 +100,14 @@ fn has(scene: &Scene, is_it: fn(&Object) -> bool) -> bool {
 
 /// Returns whether an object shows pictures of its model, or has holes.
 fn is_textured(object: &Object) -> bool {
-    let is_own = object.material().finish().is_some_and(|finish| finish.own);
-    let model = mesh(object).map(|mesh| mesh.model());
-    model.is_some_and(|model| is_own && model.has_pictures() || model.has_holes())
+    match object {
+        Object::Instance(instance) => is_textured(instance.object()),
+        Object::Mesh(mesh) => {
+            let is_own = mesh.material().finish().is_some_and(|finish| finish.own);
+            is_own && mesh.model().has_pictures() || mesh.model().has_holes()
+        }
+        _ => false,
+    }
 }
 
 fn is_made(scene: &Scene, has_it: fn(&Finish) -> bool) -> bool {

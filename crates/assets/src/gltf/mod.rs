@@ -3,12 +3,14 @@
 //! The JSON is read by `serde`; its indices, ranges and nodes are checked here where they are used.
 
 mod accessor;
+mod address;
 mod document;
 mod pictures;
 
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec2};
 
 use self::accessor::Buffers;
+use self::address::{data, decoded_path};
 use self::document::{Document, Material, Node, Primitive, TextureInfo};
 use self::pictures::{Pictures, coordinates};
 use crate::error::Fault;
@@ -134,22 +136,6 @@ fn buffers(
         contents.push(content);
     }
     Ok(Buffers { contents })
-}
-
-/// Returns the path that a percent-encoded address is.
-fn decoded_path(uri: &str) -> Result<String, Fault> {
-    let path = percent_encoding::percent_decode_str(uri).decode_utf8();
-    Ok(path.map_err(|_| Fault::new(format!("`{uri}` is not UTF-8")))?.into_owned())
-}
-
-/// Returns the bytes of a `data:` address.
-fn data(uri: &str) -> Result<Vec<u8>, Fault> {
-    let (head, body) = uri.split_once(',').ok_or_else(|| Fault::new("a `data:` address has no comma"))?;
-    if !head.to_ascii_lowercase().ends_with(";base64") {
-        return Ok(percent_encoding::percent_decode_str(body).collect());
-    }
-    base64_simd::forgiving_decode_to_vec(body.as_bytes())
-        .map_err(|_| Fault::new("the data of a `data:` address is not Base64"))
 }
 
 /// Returns the colour and glow of a material, without its pictures.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::accessor::Buffers;
+use super::address::{data, decoded_path};
 use super::document::{Document, Image, Sampler, TextureInfo, TextureTransform};
-use super::{data, decoded_path};
 use crate::error::Fault;
 use crate::limits;
 use crate::picture::Picture;
