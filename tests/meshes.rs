@@ -71,13 +71,96 @@ fn library() -> Library {
         ("fine.obj", obj(&ball(40), true, false)),
         ("colored.obj", obj(&ball(6), true, true)),
         ("open.obj", obj(&open, true, false)),
+        ("quads.obj", QUADS.to_vec()),
+        (
+            "quads.mtl",
+            b"newmtl wood\nKd .9 .8 1\nmap_Kd textures\\my wood.png\nnewmtl plain\nKd .2 .3 .9\n".to_vec(),
+        ),
+        ("my wood.png", png(&levels(5, 3))),
+        ("quads.gltf", quads_gltf(r#""baseColorTexture":{"index":0}"#)),
+        ("turned.gltf", quads_gltf(TURNED)),
+        ("leaf.png", leaf()),
+        ("leaf.gltf", quads_gltf(LEAF)),
     ]))
+}
+
+/// Two squares that stand in the corner of a room, one of them with a picture; and normals that are those of no face.
+const QUADS: &[u8] = b"mtllib quads.mtl\nv -1 -1 -.4 1 1 .5\nv 1 -1 -.4 .6 1 1\nv 1 1 -.4\nv -1 1 -.4\nv 1 -1 1.2\nv 1 1 1.2\n\
+    vt -.3 .1\nvt 1.4 .2\nvt 1.2 1.7\nvt .1 .9\nvn .1 .2 1\nusemtl wood\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl plain\nf 2 5 6 3\n";
+
+/// The colour of a material whose picture is turned and mirrored, and glows.
+const TURNED: &str = r#""baseColorFactor":[0.9,0.7,0.8,1],"baseColorTexture":{"index":1,"texCoord":1,"extensions":
+    {"KHR_texture_transform":{"offset":[0.2,-0.1],"rotation":0.4,"scale":[1.5,-2.5]}}}},"emissiveFactor":[0.2,0.1,0.3],
+    "emissiveTexture":{"index":0},"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":2}"#;
+
+/// A material with holes.
+const LEAF: &str = r#""baseColorTexture":{"index":2},"baseColorFactor":[1,1,1,0.9]},"alphaMode":"MASK","alphaCutoff":0.4,"extras":{"#;
+
+/// Returns a picture whose alpha goes up and down.
+fn leaf() -> Vec<u8> {
+    let picture = image::RgbaImage::from_fn(9, 7, |x, y| {
+        let k = x + 9 * y;
+        image::Rgba([(k * 4) as u8, 200, (k * 29 % 256) as u8, (k * 101 % 256) as u8])
+    });
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// The address of data.
+fn data(bytes: &[u8]) -> String {
+    bytes.iter().fold("data:,".to_string(), |text, byte| text + &format!("%{byte:02x}"))
+}
+
+/// Returns a model of a square from (-1, -1) to (1, 1), with two sets of texture coordinates and colours, whose material is
+/// given. Texture 0 repeats, and texture 1 is mirrored across and clamped down.
+fn quads_gltf(material: &str) -> Vec<u8> {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0f32]];
+    let uvs = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0f32]];
+    let mut bytes: Vec<u8> = Vec::new();
+    for ([x, y], [u, v]) in corners.into_iter().zip(uvs) {
+        let vertex = [x, y, 0.0, u, v, 2.0 * u - 0.7, 1.5 * v - 0.2, 1.0, 0.5 + 0.5 * u, 1.0];
+        vertex.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    }
+    [0u16, 1, 2, 0, 2, 3].iter().for_each(|index| bytes.extend(index.to_le_bytes()));
+    let accessor = |offset: usize, kind: &str| {
+        format!(r#"{{"bufferView":0,"byteOffset":{offset},"componentType":5126,"count":4,"type":"{kind}"}}"#)
+    };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,
+        "TEXCOORD_0":1,"TEXCOORD_1":2,"COLOR_0":3}},"indices":4,"material":0}}]}}],"materials":
+        [{{"pbrMetallicRoughness":{{{material}}}}}],"textures":[{{"source":0}},{{"source":0,"sampler":0}},{{"source":1}}],"samplers":
+        [{{"wrapS":33648,"wrapT":33071}}],"images":[{{"uri":"my%20wood.png"}},{{"uri":"leaf.png"}}],"accessors":[{},{},{},{},
+        {{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}}],"bufferViews":[{{"buffer":0,"byteLength":160,
+        "byteStride":40}},{{"buffer":0,"byteOffset":160,"byteLength":12}}],"buffers":[{{"byteLength":172,"uri":"{}"}}]}}"#,
+        accessor(0, "VEC3"),
+        accessor(12, "VEC2"),
+        accessor(20, "VEC2"),
+        accessor(28, "VEC3"),
+        data(&bytes),
+    )
+    .into_bytes()
+}
+
+/// Returns a picture of all kinds of levels.
+fn levels(width: u32, height: u32) -> RgbImage {
+    RgbImage::from_fn(width, height, |x, y| {
+        let k = x + width * y;
+        image::Rgb([k * 97, k * 31 + 7, 2 * k * 53 + 90].map(|level| (level % 256) as u8))
+    })
+}
+
+fn png(picture: &RgbImage) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
 }
 
 const STAGE: &str = "Screen 80 60\nLook 3 2.5 5 0 .2 0 32\nBackground .9 .95 1 .3 .5 .9\nIlight .8 .8 .7 -1 -2 -1\nPlight .5 .4 .4 \
                      2 3 2\nMaterial floor ambient .1 .1 .1 diffuse .5 .5 .5\nMaterial red ambient .1 0 0 diffuse .8 .2 .1 shine .4 \
                      .4 .4 30\nMaterial chrome diffuse .1 .1 .1 mirror .8 .8 .8\nMaterial glassy glass .95 .97 1 1.5 shine .5 .5 .5 \
-                     60\nMaterial own diffuse 1 1 1 own\nMaterial checks diffuse .9 .9 .9 checker .3 floor\nPlane 0 -1.05 0 0.02 1 \
+                     60\nMaterial own diffuse 1 1 1 own\nMaterial checks diffuse .9 .9 .9 checker .3 floor\nMaterial mixed own ambient .2 .2 .2 diffuse .9 .8 .7 checker .3 floor \
+                     mirror .2 .2 .2\nPlane 0 -1.05 0 0.02 1 \
                      .01 floor\n";
 
 fn scene(lines: &str) -> Scene {
@@ -161,6 +244,16 @@ fn the_packets_draw_meshes_like_the_reference() {
             "Mesh \"flat.obj\" glassy",
             "Sphere .5 0 0 0 red\nMesh \"round.obj\" glassy",
             "Mesh \"round.obj\" .1 .1 .2 .5 .5 .9 .2 .2 .2 smooth 90",
+            "Mesh \"quads.obj\"",
+            "Mesh \"quads.obj\" own flat",
+            "Mesh \"quads.obj\" red",
+            "Mesh \"quads.gltf\"",
+            "Mesh \"turned.gltf\"",
+            "Mesh \"turned.gltf\" mixed",
+            "Mesh \"leaf.gltf\"",
+            "Mesh \"leaf.gltf\" red",
+            "Mesh \"leaf.gltf\" glassy",
+            "Sphere .5 0 0 -.9 red\nMesh \"leaf.gltf\" chrome",
         ] {
             compare(&format!("{tone}{mesh}"));
             compare(&format!(
@@ -265,5 +358,112 @@ trait Objects {
 impl Objects for Vec<Option<rayfold_tracer::probe::Found>> {
     fn map_objects(&self) -> Vec<Option<usize>> {
         self.iter().map(|found| found.as_ref().map(|found| found.object)).collect()
+    }
+}
+
+/// A model whose pixels are those of the screen, in each format, and its picture.
+fn screen_wide(picture: &RgbImage) -> Library {
+    let (right, top) = (f64::from(picture.width()) - 0.5, f64::from(picture.height()) - 0.5);
+    let obj = format!(
+        "mtllib a.mtl\nv -.5 -.5 -1\nv {right} -.5 -1\nv {right} {top} -1\nv -.5 {top} -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+         usemtl m\nf 1/1 2/2 3/3 4/4\n"
+    );
+    let gltf = String::from_utf8(quads_gltf(r#""baseColorTexture":{"index":0}"#)).unwrap();
+    let (across, up) = (0.5 * f64::from(picture.width()), 0.5 * f64::from(picture.height()));
+    let node =
+        format!(r#"{{"mesh":0,"scale":[{across},{up},1],"translation":[{},{},-1]}}"#, across - 0.5, up - 0.5);
+    let gltf = gltf.replace(r#"{"mesh":0}"#, &node).replace(r#","COLOR_0":3"#, "");
+    Library::new(MemoryFiles::from([
+        ("a.obj", obj.into_bytes()),
+        ("a.mtl", b"newmtl m\nmap_Kd my wood.png\n".to_vec()),
+        ("a.gltf", gltf.into_bytes()),
+        ("my wood.png", png(picture)),
+    ]))
+}
+
+#[test]
+fn pictures_of_models_are_exact_at_the_middles_of_their_pixels() {
+    let picture = levels(23, 17);
+    let library = screen_wide(&picture);
+    for (file, tone) in
+        ["a.obj", "a.gltf"].into_iter().flat_map(|file| ["plain", "srgb"].map(|tone| (file, tone)))
+    {
+        let text = format!(
+            "Screen 23 17\nOrthocamera\nTone {tone}\nMaterial shown own ambient 1 1 1\nMesh \"{file}\" shown\nTrace"
+        );
+        let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library);
+        let scene = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap();
+        assert!(drawn(&scene) == picture, "{file} {tone}");
+        assert!(reference::render(&scene, &RenderOptions::default()).unwrap() == picture, "{file} {tone}");
+    }
+}
+
+#[test]
+fn faces_have_no_hits_in_their_holes() {
+    // Every pixel of the screen is one of the picture; behind it is the background, and the light through the holes.
+    let gltf = String::from_utf8(quads_gltf(LEAF)).unwrap();
+    let node = r#"{"mesh":0,"scale":[4.5,3.5,1],"translation":[4,3,-1]}"#;
+    let gltf = gltf.replace(r#"{"mesh":0}"#, node).replace(r#","COLOR_0":3"#, "");
+    let library = Library::new(MemoryFiles::from([("a.gltf", gltf.into_bytes()), ("leaf.png", leaf())]));
+    let picture = image::load_from_memory(&leaf()).unwrap().to_rgba8();
+    for surface in ["shown", "own", "green"] {
+        let text = format!(
+            "Screen 9 7\nOrthocamera\nBackground 0 0 1\nMaterial shown own ambient 1 1 1\nMaterial own own ambient 1 1 1 \
+             diffuse 0 0 0\nMaterial green ambient 0 1 0\nMesh \"a.gltf\" {surface}\nTrace"
+        );
+        let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library);
+        let scene = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap();
+        let plain = reference::render(&scene, &RenderOptions::default()).unwrap();
+        assert!(drawn(&scene) == plain, "{surface}");
+        let mut holes = 0;
+        for (x, y, pixel) in picture.enumerate_pixels() {
+            let [r, g, b, alpha] = pixel.0;
+            let is_hole = 0.9 * f64::from(alpha) / 255.0 < 0.4;
+            let shown = if surface == "green" { [0, 255, 0] } else { [r, g, b] };
+            assert_eq!(plain.get_pixel(x, y).0, if is_hole { [0, 0, 255] } else { shown }, "{x} {y}");
+            holes += usize::from(is_hole);
+        }
+        assert!((20..50).contains(&holes), "{holes}");
+    }
+}
+
+#[test]
+fn light_goes_through_holes() {
+    // The shadow of a leaf on the floor, of a sun and of a lamp, through glass, in pictures of one sample and of several; and of
+    // many leaves, which no mask has bits for.
+    for lines in [
+        "Mesh \"leaf.gltf\" red",
+        "Box -2 1.5 -2 2 1.6 2 glassy\nMesh \"leaf.gltf\" red",
+        "Samples 4 0\nMesh \"leaf.gltf\"",
+    ] {
+        let of = |mesh: &str| {
+            let leaf = format!("{lines}\nEnd\nUse g 0 .3 0 -70 0 0 .7").replace("Mesh \"leaf.gltf\"", mesh);
+            let at = leaf.find("Mesh").unwrap();
+            scene(&format!("{}Group g\n{}", &leaf[..at], &leaf[at..]))
+        };
+        let (leaf, plate) = (drawn(&of("Mesh \"leaf.gltf\"")), drawn(&of("Mesh \"quads.gltf\"")));
+        assert!(difference(&leaf, &plate) > 1.0, "{lines}");
+    }
+    compare("Group g\nMesh \"leaf.gltf\" red\nEnd\nUse g 0 .3 0 -70 0 0 .7");
+    compare("Box -2 1.5 -2 2 1.6 2 glassy\nGroup g\nMesh \"leaf.gltf\" red\nEnd\nUse g 0 .3 0 -70 0 0 .7");
+    let many =
+        (0..60).map(|k| format!("Use g {} {} {} {} {} 0 .3\n", k % 8 - 3, k % 3, k % 7 - 4, 23 * k, 31 * k));
+    compare(&format!("Group g\nMesh \"leaf.gltf\"\nEnd\n{}", many.collect::<String>()));
+}
+
+#[test]
+fn pictures_and_holes_are_the_same_bytes_for_all_tiles_and_trees() {
+    for lines in [
+        "Mesh \"leaf.gltf\"",
+        "Mesh \"turned.gltf\"",
+        "Samples 5 0\nMesh \"leaf.gltf\" red",
+        "Mesh \"quads.obj\"",
+    ] {
+        let scene = scene(&format!("Tone srgb\n{lines}\nSphere .4 .9 -.6 .8 chrome"));
+        let usual = drawn(&scene);
+        for (tile, tree) in [(Some((4, 4)), None), (Some((64, 4)), Some(true)), (None, Some(false))] {
+            let options = RenderOptions { tile, tree, ..RenderOptions::default() };
+            assert!(render(&scene, &options).unwrap() == usual, "{lines} {tile:?} {tree:?}");
+        }
     }
 }

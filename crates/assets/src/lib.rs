@@ -33,6 +33,7 @@ mod ply;
 mod referred;
 mod srgb;
 mod stl;
+mod texture;
 
 pub use closure::Closure;
 pub use decode::decode;
@@ -43,6 +44,7 @@ pub use library::{Library, Purpose};
 pub use model::{Colors, Look, Model, Smoothing};
 pub use picture::{Picture, jpeg_fault};
 pub use referred::Referred;
+pub use texture::{Slot, Texture, Wrap};
 
 /// The example of the README is compiled and run with the tests.
 #[cfg(doctest)]

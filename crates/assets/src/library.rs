@@ -1,5 +1,6 @@
 //! Models and pictures by name, and letters by their words, each made once.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,6 +17,8 @@ use crate::referred::{Referred, absent, content};
 pub struct Library {
     files: Box<dyn Files>,
     kept: Mutex<Vec<Kept>>,
+    /// The files that faulty models refer to, by the names of the models.
+    faulty: Mutex<BTreeMap<String, Vec<(String, String)>>>,
     pictures: Mutex<Vec<KeptPicture>>,
     letters: Mutex<Letters>,
 }
@@ -77,6 +80,7 @@ impl Library {
         Self {
             files: Box::new(files),
             kept: Mutex::default(),
+            faulty: Mutex::default(),
             pictures: Mutex::default(),
             letters: Mutex::default(),
         }
@@ -199,31 +203,49 @@ impl Library {
     }
 
     /// Returns the names of the files that a model was made of, or lacks, with their paths in it: after itself those that it
-    /// refers to. There are none for a model that was not asked for, or is faulty.
+    /// refers to. Of a faulty model they are those that it refers to before the fault. There are none for a model that was not
+    /// asked for.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let sources = kept.iter().find(|kept| kept.name == name).map(|kept| &kept.sources[..]);
-        sources.unwrap_or_default().iter().map(|source| (source.name.clone(), source.path.clone())).collect()
+        let pair = |source: &Source| (source.name.clone(), source.path.clone());
+        match kept.iter().find(|kept| kept.name == name) {
+            Some(kept) => kept.sources.iter().map(pair).collect(),
+            None => {
+                let faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);
+                faulty.get(name).cloned().unwrap_or_default()
+            }
+        }
     }
 
     /// Drops the model and the picture of this name, as far as no script uses them. For files that are gone for good.
     pub fn forget(&self, name: &str) {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
+        self.faulty.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
         self.pictures.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
     }
 
     fn decode(&self, name: &str) -> Result<(Model, Vec<Source>), AssetError> {
         let info = self.look(name)?.ok_or_else(|| absent(&*self.files, name))?;
         let bytes = content(&*self.files, name)?;
-        let mut referred = Referred::new(&*self.files);
-        let model = decode(name, &bytes, &mut referred)?;
+        let picture = |name: &str| self.picture(name, Purpose::Surface);
+        let mut referred = Referred::with_pictures(&*self.files, &picture);
+        let model = decode(name, &bytes, &mut referred);
         let mut sources = vec![Source { name: name.into(), path: name.into(), info: Some(info) }];
         sources.extend(referred.sources().map(|(name, path, info)| Source {
             name: name.into(),
             path: path.into(),
             info,
         }));
-        Ok((model, sources))
+        let mut faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);
+        faulty.remove(name);
+        match model {
+            Ok(model) => Ok((model, sources)),
+            Err(error) => {
+                let referred = sources.into_iter().map(|source| (source.name, source.path)).collect();
+                faulty.insert(name.into(), referred);
+                Err(error)
+            }
+        }
     }
 
     fn look(&self, name: &str) -> Result<Option<FileInfo>, AssetError> {

@@ -15,6 +15,9 @@ pub(crate) const VERTICES: usize = 3 * TRIANGLES;
 /// The pixels of a picture.
 pub const PIXELS: u64 = 1 << 26;
 
+/// The pixels of all pictures of a model together.
+pub const MODEL_PIXELS: u64 = 1 << 28;
+
 /// The code points of a text, ends of lines counted.
 pub const CODE_POINTS: usize = 10_000;
 

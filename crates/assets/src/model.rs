@@ -9,6 +9,7 @@ use crate::error::Fault;
 use crate::limits;
 use crate::normals::smoothed;
 use crate::srgb::{decoded, encoded};
+use crate::texture::{Slot, Texture};
 
 /// The index of a normal or of texture coordinates that a corner does not have.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -36,19 +37,51 @@ pub enum Colors {
 }
 
 /// The colour of faces.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Look {
     /// The factor of the colour; `None` for faces to which the file gives no colour.
     pub factor: Option<DVec3>,
+    /// The picture that multiplies the colour.
+    pub texture: Option<Texture>,
+    /// Whether the colour is that of what has none, because a file with it is missing.
+    pub is_missing: bool,
     /// The light that the faces give off, linear.
     pub glow: DVec3,
+    /// The picture that multiplies that light.
+    pub glow_texture: Option<Texture>,
     /// Whether the faces show their colour whatever the light (`KHR_materials_unlit`).
     pub unlit: bool,
+    /// The factor of alpha.
+    pub alpha: f64,
+    /// The alpha below which the faces have no hits, if they have holes.
+    pub cutoff: Option<f64>,
 }
 
 impl Look {
     /// The look of faces to which the file gives no colour.
-    pub(crate) const PLAIN: Self = Self { factor: None, glow: DVec3::ZERO, unlit: false };
+    pub(crate) const PLAIN: Self = Self {
+        factor: None,
+        texture: None,
+        is_missing: false,
+        glow: DVec3::ZERO,
+        glow_texture: None,
+        unlit: false,
+        alpha: 1.0,
+        cutoff: None,
+    };
+
+    /// Returns whether alpha does not vary within the faces. `of_positions` are the alphas of the model's positions.
+    fn has_one_alpha(&self, of_positions: &[f32]) -> bool {
+        of_positions.is_empty() && self.texture.as_ref().is_none_or(|texture| texture.picture.is_opaque())
+    }
+
+    /// Returns the picture that the faces have for a use.
+    pub fn texture(&self, slot: Slot) -> Option<&Texture> {
+        match slot {
+            Slot::Color => self.texture.as_ref(),
+            Slot::Glow => self.glow_texture.as_ref(),
+        }
+    }
 }
 
 /// The colour of what has none of its own.
@@ -64,8 +97,12 @@ pub struct Model {
     normal_of: Vec<[u32; 3]>,
     uvs: Vec<Vec2>,
     uv_of: Vec<[u32; 3]>,
+    /// Texture coordinates at the positions for pictures that have their own, by their use; empty if there are none.
+    own_uvs: [Vec<Vec2>; 2],
     /// The colour factors of the positions; empty if there are none.
     colors: Vec<Vec3>,
+    /// The factors of alpha of the positions; empty if all are 1.
+    alphas: Vec<f32>,
     space: Colors,
     looks: Vec<Look>,
     /// The look of each triangle; empty if all have the first.
@@ -85,8 +122,12 @@ pub(crate) struct Parts {
     pub(crate) uvs: Vec<Vec2>,
     /// Empty, or one for each triangle.
     pub(crate) uv_of: Vec<[u32; 3]>,
+    /// By the use of a picture: empty, or one for each position.
+    pub(crate) own_uvs: [Vec<Vec2>; 2],
     /// Empty, or one for each position.
     pub(crate) colors: Vec<Vec3>,
+    /// Empty, or one for each position.
+    pub(crate) alphas: Vec<f32>,
     pub(crate) space: Colors,
     pub(crate) looks: Vec<Look>,
     /// Empty, or one for each triangle.
@@ -111,20 +152,32 @@ impl Model {
         if normals.iter().any(|n| !n.is_finite()) {
             return Err(Fault::new("a normal is not a finite number"));
         }
-        if uvs.iter().any(|uv| !uv.is_finite()) || colors.iter().any(|color| !color.is_finite()) {
+        let mut all_uvs = uvs.iter().chain(parts.own_uvs.iter().flatten());
+        let are_colors = colors.iter().all(|c| c.is_finite()) && parts.alphas.iter().all(|a| a.is_finite());
+        if all_uvs.any(|uv| !uv.is_finite()) || !are_colors {
             return Err(Fault::new("a texture coordinate or a colour is not a finite number"));
         }
         let within = |all: &[[u32; 3]], count: usize, optional: bool| {
             all.iter().flatten().all(|i| (*i as usize) < count || optional && *i == NONE)
         };
-        let is_good = within(triangles, positions.len(), false)
+        let are_own = parts.own_uvs.iter().all(|uvs| uvs.is_empty() || uvs.len() == positions.len());
+        let is_good = are_own
+            && within(triangles, positions.len(), false)
             && within(normal_of, normals.len(), true)
             && within(uv_of, uvs.len(), true)
             && look_of.iter().all(|look| (*look as usize) < looks.len().max(1));
         if !is_good {
             return Err(Fault::new("an index is out of range"));
         }
-        let kept: Vec<bool> = triangles.iter().map(|triangle| has_area(positions, *triangle)).collect();
+        let is_shown = |k: usize| {
+            let look = look_of.get(k).and_then(|look| looks.get(*look as usize)).unwrap_or(&Look::PLAIN);
+            !(look.has_one_alpha(&parts.alphas) && look.cutoff.is_some_and(|cutoff| look.alpha < cutoff))
+        };
+        let kept: Vec<bool> = triangles
+            .iter()
+            .enumerate()
+            .map(|(k, triangle)| is_shown(k) && has_area(positions, *triangle))
+            .collect();
         if kept.iter().any(|kept| !kept) {
             retain(&mut parts.triangles, &kept);
             retain(&mut parts.normal_of, &kept);
@@ -137,15 +190,15 @@ impl Model {
         if parts.uv_of.iter().flatten().all(|i| *i == NONE) {
             (parts.uvs, parts.uv_of) = (Vec::new(), Vec::new());
         }
-        let Parts { positions, triangles, normals, normal_of, uvs, uv_of, colors, space, .. } = parts;
-        let Parts { mut looks, look_of, warnings, .. } = Parts {
-            looks: parts.looks,
-            look_of: parts.look_of,
-            warnings: parts.warnings,
-            ..Parts::default()
-        };
+        let Parts { positions, triangles, normals, normal_of, uvs, uv_of, own_uvs, colors, space, .. } =
+            parts;
+        let (mut looks, look_of, warnings) = (parts.looks, parts.look_of, parts.warnings);
         if looks.is_empty() {
             looks.push(Look::PLAIN);
+        }
+        // Where nothing varies there are no holes.
+        for look in looks.iter_mut().filter(|look| look.cutoff.is_some()) {
+            look.cutoff = look.cutoff.filter(|_| !look.has_one_alpha(&parts.alphas));
         }
         let normals = normals.into_iter().map(unit).collect();
         let closure = OnceLock::new();
@@ -156,7 +209,9 @@ impl Model {
             normal_of,
             uvs,
             uv_of,
+            own_uvs,
             colors,
+            alphas: parts.alphas,
             space,
             looks,
             look_of,
@@ -179,7 +234,9 @@ impl Model {
             normal_of,
             uvs: self.uvs.clone(),
             uv_of: self.uv_of.clone(),
+            own_uvs: self.own_uvs.clone(),
             colors: self.colors.clone(),
+            alphas: self.alphas.clone(),
             space: self.space,
             looks: self.looks.clone(),
             look_of: self.look_of.clone(),
@@ -259,9 +316,44 @@ impl Model {
         Some(indices.map(|i| self.uvs.get(i as usize).copied().unwrap_or_default()))
     }
 
-    /// Returns whether the colour varies within triangles.
-    pub fn has_vertex_colors(&self) -> bool {
-        !self.colors.is_empty()
+    /// Returns the texture coordinates at the corners of a triangle for its picture, before the picture's transform.
+    ///
+    /// # Panics
+    /// Panics if there is no such triangle.
+    pub fn picture_uvs(&self, triangle: usize, slot: Slot) -> [Vec2; 3] {
+        let texture = self.looks[self.look(triangle)].texture(slot);
+        if texture.is_some_and(|texture| texture.has_own_uvs) {
+            let own = &self.own_uvs[slot as usize];
+            return self.triangles[triangle].map(|i| own.get(i as usize).copied().unwrap_or_default());
+        }
+        self.uvs(triangle).unwrap_or_default()
+    }
+
+    /// Returns the colour factors at the corners of a triangle, if the positions have some.
+    ///
+    /// # Panics
+    /// Panics if there is no such triangle.
+    pub fn vertex_colors(&self, triangle: usize) -> Option<[DVec3; 3]> {
+        let corners = self.triangles[triangle];
+        (!self.colors.is_empty()).then(|| corners.map(|i| self.colors[i as usize].as_dvec3()))
+    }
+
+    /// Returns the factors of alpha at the corners of a triangle.
+    ///
+    /// # Panics
+    /// Panics if there is no such triangle.
+    pub fn vertex_alphas(&self, triangle: usize) -> [f64; 3] {
+        self.triangles[triangle].map(|i| self.alphas.get(i as usize).map_or(1.0, |alpha| f64::from(*alpha)))
+    }
+
+    /// Returns whether any face may have holes.
+    pub fn has_holes(&self) -> bool {
+        self.looks.iter().any(|look| look.cutoff.is_some())
+    }
+
+    /// Returns the meaning of the factors of colours.
+    pub fn colors(&self) -> Colors {
+        self.space
     }
 
     /// Returns the looks of the faces, at least one.
@@ -274,51 +366,71 @@ impl Model {
         self.look_of.get(triangle).map_or(0, |look| *look as usize)
     }
 
-    /// Returns the colour of a triangle at a place, given by its barycentric weights, from 0 to 1 per channel. `linear` is
-    /// whether the picture is computed in linear light.
+    /// Returns whether the colour of faces of a look varies within them.
+    ///
+    /// # Panics
+    /// Panics if there is no such look.
+    pub fn is_varied(&self, look: usize) -> bool {
+        let look = &self.looks[look];
+        !look.is_missing && (!self.colors.is_empty() || look.texture.is_some())
+    }
+
+    /// Returns whether any look has a picture.
+    pub fn has_pictures(&self) -> bool {
+        self.looks.iter().any(|look| look.texture.is_some() || look.glow_texture.is_some())
+    }
+
+    /// Returns whether the levels of the pictures are decoded to linear light. `linear` is whether the picture that is drawn
+    /// is computed in linear light.
+    pub fn decodes_pictures(&self, linear: bool) -> bool {
+        linear || self.space == Colors::Linear
+    }
+
+    /// Returns the colour of a triangle at a place, given by its barycentric weights, from 0 to 1 per channel. `level` is that
+    /// of its picture there, and 1 without one; `linear` is whether the picture that is drawn is computed in linear light.
     ///
     /// # Panics
     /// Panics if there is no such triangle.
-    pub fn color(&self, triangle: usize, weights: [f64; 3], linear: bool) -> DVec3 {
-        let factor = self.looks[self.look(triangle)].factor;
-        if self.colors.is_empty() {
-            return self.look_color(self.look(triangle), linear);
-        }
-        let into = |color: DVec3| {
-            if self.decodes(linear) { color.map(|x| decoded(x.clamp(0.0, 1.0))) } else { color }
-        };
-        let corners = self.triangles[triangle].map(|i| into(self.colors[i as usize].as_dvec3()));
-        let mixed = corners.iter().zip(weights).map(|(color, weight)| *color * weight).sum::<DVec3>();
-        self.shown(mixed * factor.map_or(DVec3::ONE, into), linear)
+    pub fn color(&self, triangle: usize, weights: [f64; 3], level: DVec3, linear: bool) -> DVec3 {
+        let look = self.look(triangle);
+        let mixed = self.vertex_colors(triangle).map(|corners| {
+            let corners = corners.map(|color| self.read(color, linear));
+            corners.into_iter().zip(weights).map(|(color, weight)| color * weight).sum::<DVec3>()
+        });
+        self.product(look, mixed, level, linear)
     }
 
-    /// Returns the colour of a look whose faces have no colours at their vertices, from 0 to 1 per channel.
+    /// Returns the colour of a look whose faces have neither colours at their vertices nor a picture, from 0 to 1 per channel.
     ///
     /// # Panics
     /// Panics if there is no such look.
     pub fn look_color(&self, look: usize, linear: bool) -> DVec3 {
-        let Some(factor) = self.looks[look].factor else { return NEUTRAL };
-        let factor = if self.decodes(linear) { factor.map(|x| decoded(x.clamp(0.0, 1.0))) } else { factor };
-        self.shown(factor, linear)
+        self.product(look, None, DVec3::ONE, linear)
     }
 
-    /// Returns the light that the faces of a look give off. An unlit one gives off its colour.
+    /// Returns the light that the faces of a look give off, where their picture of it has this `level`; it is 1 without one.
     ///
     /// # Panics
     /// Panics if there is no such look.
-    pub fn glow(&self, look: usize, linear: bool) -> DVec3 {
-        let glow = self.looks[look].glow;
+    pub fn glow(&self, look: usize, level: DVec3, linear: bool) -> DVec3 {
+        let glow = self.looks[look].glow * level;
         // Above 1 the curve goes on as a power, so that bright light stays bright.
         if linear { glow } else { glow.map(|x| encoded(x.max(0.0))) }
     }
 
-    fn decodes(&self, linear: bool) -> bool {
-        linear && self.space == Colors::Levels
+    /// Returns a factor of a colour in the numbers in which factors are multiplied. Above 1 the curve goes on.
+    fn read(&self, factor: DVec3, linear: bool) -> DVec3 {
+        if linear && self.space == Colors::Levels { factor.map(decoded) } else { factor }
     }
 
-    /// Returns the product of factors as the picture's numbers.
-    fn shown(&self, product: DVec3, linear: bool) -> DVec3 {
-        let product = product.clamp(DVec3::ZERO, DVec3::ONE);
+    /// Returns the product of factors as the picture's numbers. `mixed` are colours at vertices, already read.
+    fn product(&self, look: usize, mixed: Option<DVec3>, level: DVec3, linear: bool) -> DVec3 {
+        let Look { factor, texture, is_missing, .. } = &self.looks[look];
+        if *is_missing || factor.is_none() && texture.is_none() && mixed.is_none() {
+            return NEUTRAL;
+        }
+        let factor = factor.map_or(DVec3::ONE, |factor| self.read(factor, linear));
+        let product = (factor * level * mixed.unwrap_or(DVec3::ONE)).clamp(DVec3::ZERO, DVec3::ONE);
         if !linear && self.space == Colors::Linear { product.map(encoded) } else { product }
     }
 
@@ -336,8 +448,9 @@ impl Model {
     pub(crate) fn bytes(&self) -> usize {
         24 * self.positions.len()
             + 12 * (self.triangles.len() + self.normals.len() + self.normal_of.len() + self.uv_of.len())
-            + 8 * self.uvs.len()
+            + 8 * (self.uvs.len() + self.own_uvs.iter().map(Vec::len).sum::<usize>())
             + 12 * self.colors.len()
+            + 4 * self.alphas.len()
             + 4 * self.look_of.len()
     }
 }

@@ -1,6 +1,6 @@
-//! Wavefront OBJ, and the colours of its MTL files.
+//! Wavefront OBJ, and the colours and pictures of its MTL files.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -8,6 +8,7 @@ use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
 use crate::referred::Referred;
+use crate::texture::Texture;
 
 /// A line of the text, with those that a backslash joins to it: its number and its words.
 struct Lines<'a> {
@@ -107,12 +108,41 @@ fn index(line: usize, text: &[u8]) -> Result<i64, Fault> {
     Ok(sign * digits.iter().fold(0, |n, digit| 10 * n + i64::from(digit - b'0')))
 }
 
+/// A picture that a material names: the library of materials, the line in it, and the path.
+struct Map {
+    library: String,
+    line: usize,
+    path: String,
+}
+
+/// The options of a map.
+const OPTIONS: [&[u8]; 13] = [
+    b"-blendu",
+    b"-blendv",
+    b"-boost",
+    b"-bm",
+    b"-cc",
+    b"-clamp",
+    b"-colorspace",
+    b"-imfchan",
+    b"-mm",
+    b"-o",
+    b"-s",
+    b"-t",
+    b"-texres",
+];
+
 #[derive(Default)]
 struct Reader {
     parts: Parts,
     /// The colour of each position, and whether any has one.
     has_colors: bool,
     names: HashMap<Vec<u8>, u32>,
+    /// The pictures of looks.
+    pictures: HashMap<u32, Map>,
+    /// The looks that a library of materials defines, and whether a library is missing.
+    defined: HashSet<u32>,
+    lacks_library: bool,
     look: u32,
     has_looks: bool,
     has_normals: bool,
@@ -129,6 +159,7 @@ pub(crate) fn read(bytes: &[u8], refer: &mut Referred<'_>) -> Result<Parts, Faul
     for (number, line) in (Lines { rest: bytes, number: 0 }) {
         reader.line(number, &line, refer)?;
     }
+    reader.paint(refer)?;
     let Reader { mut parts, has_colors, has_normals, has_uvs, lacks_uvs, has_looks, left_out, .. } = reader;
     if !has_colors {
         parts.colors = Vec::new();
@@ -138,6 +169,9 @@ pub(crate) fn read(bytes: &[u8], refer: &mut Referred<'_>) -> Result<Parts, Faul
     }
     if !has_uvs {
         parts.uv_of = Vec::new();
+        if parts.looks.iter().any(|look| look.texture.is_some()) {
+            parts.warnings.push("its pictures are seen at (0, 0): it has no texture coordinates".into());
+        }
     } else if lacks_uvs {
         parts.warnings.push("corners without texture coordinates have (0, 0)".into());
     }
@@ -260,8 +294,9 @@ impl Reader {
         }
         for name in names {
             match refer.read(&name)? {
-                Some(bytes) => self.read_materials(&name, &bytes)?,
+                Some(bytes) => self.read_materials(&name, &bytes, refer)?,
                 None => {
+                    self.lacks_library = true;
                     let warning = format!("there is no file `{name}`: what has its materials is grey");
                     self.parts.warnings.push(warning);
                 }
@@ -270,15 +305,39 @@ impl Reader {
         Ok(())
     }
 
-    fn read_materials(&mut self, file: &str, bytes: &[u8]) -> Result<(), Fault> {
-        let within = |fault: Fault| {
-            Fault::new(match fault.line {
-                Some(line) => format!("in `{file}`, line {line}: {}", fault.what),
-                None => format!("in `{file}`: {}", fault.what),
-            })
-        };
+    /// Gives the looks that faces have their pictures, and the colour of what has none to those whose file is missing.
+    fn paint(&mut self, refer: &mut Referred<'_>) -> Result<(), Fault> {
+        let mut is_used = vec![false; self.parts.looks.len()];
+        self.parts.look_of.iter().for_each(|look| is_used[*look as usize] = true);
+        for number in (0..self.parts.looks.len() as u32).filter(|look| is_used[*look as usize]) {
+            let Some(Map { library, line, path }) = self.pictures.get(&number) else {
+                let is_named = number > 0 && !self.defined.contains(&number);
+                self.parts.looks[number as usize].is_missing = self.lacks_library && is_named;
+                continue;
+            };
+            let look = &mut self.parts.looks[number as usize];
+            match refer
+                .picture(path)
+                .map_err(|fault| within(library, Fault { line: Some(*line), ..fault }))?
+            {
+                Some(picture) => look.texture = Some(Texture::new(picture)),
+                None => {
+                    look.is_missing = true;
+                    let warning = format!("there is no file `{path}`: what has this picture is grey");
+                    if !self.parts.warnings.contains(&warning) {
+                        self.parts.warnings.push(warning);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn read_materials(&mut self, file: &str, bytes: &[u8], refer: &Referred<'_>) -> Result<(), Fault> {
+        let within = |fault: Fault| within(file, fault);
         let mut look: Option<u32> = None;
-        for (line, text) in (Lines { rest: bytes, number: 0 }) {
+        let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        for (line, text) in (Lines { rest, number: 0 }) {
             let mut words = words(&text);
             match words.next() {
                 Some(b"newmtl") => {
@@ -289,6 +348,7 @@ impl Reader {
                         self.parts.looks.push(Look::PLAIN);
                         bounded_looks(line, self.parts.looks.len()).map_err(within)?;
                     }
+                    self.defined.insert(place);
                     look = Some(place);
                 }
                 Some(b"Kd") => {
@@ -303,15 +363,17 @@ impl Reader {
                     }
                 }
                 Some(b"map_Kd") => {
-                    if words.next().is_some_and(|word| word.len() > 1 && word[0] == b'-') {
+                    let path = rest_of(&text, b"map_Kd");
+                    let begins = words.clone().next().is_some_and(|word| word.len() > 1 && word[0] == b'-');
+                    let has_option = words.any(|word| OPTIONS.contains(&word));
+                    if begins || has_option && !refer.exists(&path).map_err(within)? {
                         return Err(within(Fault::at(
                             line,
                             "an option of `map_Kd`: expected a file name alone",
                         )));
                     }
-                    let warning = "pictures of models are not read: what has one is grey".to_string();
-                    if !self.parts.warnings.contains(&warning) {
-                        self.parts.warnings.push(warning);
+                    if let Some(look) = look {
+                        self.pictures.insert(look, Map { library: file.into(), line, path });
                     }
                 }
                 _ => {}
@@ -319,6 +381,14 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+/// Returns a fault of a library of materials.
+fn within(library: &str, fault: Fault) -> Fault {
+    Fault::new(match fault.line {
+        Some(line) => format!("in `{library}`, line {line}: {}", fault.what),
+        None => format!("in `{library}`: {}", fault.what),
+    })
 }
 
 fn bounded(line: usize, count: usize, what: &str) -> Result<(), Fault> {

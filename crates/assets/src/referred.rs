@@ -1,14 +1,24 @@
-//! The files that a model refers to: paths, names, and what was read of them.
+//! The files that a model refers to: paths, names, and what was read of them; and its pictures.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::error::{AssetError, Fault};
 use crate::files::{FileInfo, Files, file_name, same_but_for_case};
 use crate::limits;
+use crate::picture::{self, Picture};
+
+/// A function that makes the picture in the file of a name.
+type Pictures<'a> = &'a dyn Fn(&str) -> Result<Arc<Picture>, AssetError>;
 
 /// The files that a model refers to, and all that was read of them.
 pub struct Referred<'a> {
     files: &'a dyn Files,
+    /// The pictures of a library, which keeps them.
+    pictures: Option<Pictures<'a>>,
+    /// The pictures in files so far, and the pixels of these and of embedded ones.
+    made: BTreeMap<String, Arc<Picture>>,
+    pixels: u64,
     /// The last part of each path, with the whole path and what is known about the file.
     by_name: BTreeMap<String, (String, Option<FileInfo>)>,
     /// An error that a decoder is to pass on as it is.
@@ -18,7 +28,19 @@ pub struct Referred<'a> {
 impl<'a> Referred<'a> {
     /// Starts without any.
     pub fn new(files: &'a dyn Files) -> Self {
-        Self { files, by_name: BTreeMap::new(), error: None }
+        Self {
+            files,
+            pictures: None,
+            made: BTreeMap::new(),
+            pixels: 0,
+            by_name: BTreeMap::new(),
+            error: None,
+        }
+    }
+
+    /// Starts without any. Pictures are those that `pictures` makes.
+    pub(crate) fn with_pictures(files: &'a dyn Files, pictures: Pictures<'a>) -> Self {
+        Self { pictures: Some(pictures), ..Self::new(files) }
     }
 
     /// Returns the names of the files that were referred to, each with its path in the model, and what is known about the
@@ -38,6 +60,53 @@ impl<'a> Referred<'a> {
 
     /// Returns the content of the file for a path, or `None` if there is none.
     pub(crate) fn read(&mut self, path: &str) -> Result<Option<Vec<u8>>, Fault> {
+        let Some(name) = self.refer(path)? else { return Ok(None) };
+        content(self.files, &name).map_err(|error| self.give_up(error)).map(Some)
+    }
+
+    /// Returns the picture in the file for a path, or `None` if there is no such file.
+    pub(crate) fn picture(&mut self, path: &str) -> Result<Option<Arc<Picture>>, Fault> {
+        let Some(name) = self.refer(path)? else { return Ok(None) };
+        if let Some(known) = self.made.get(&name) {
+            return Ok(Some(known.clone()));
+        }
+        let picture = match self.pictures {
+            Some(pictures) => pictures(&name),
+            None => content(self.files, &name)
+                .and_then(|bytes| picture::surface(&name, picture::decode(&name, &bytes)?).map(Arc::new)),
+        };
+        let picture = picture.map_err(|error| self.give_up(error))?;
+        self.count(&picture)?;
+        self.made.insert(name, picture.clone());
+        Ok(Some(picture))
+    }
+
+    /// Returns the picture that a part of the file `name` is. `what` names the part.
+    pub(crate) fn embedded(&mut self, name: &str, what: &str, bytes: &[u8]) -> Result<Arc<Picture>, Fault> {
+        let picture = picture::decode(name, bytes).and_then(|picture| picture::surface(name, picture));
+        let picture = picture.map_err(|error| {
+            let what = match error {
+                AssetError::Picture { what: fault, .. } => format!("{what}: {fault}"),
+                _ => format!("{what} is a picture of light (HDR or EXR)"),
+            };
+            self.give_up(AssetError::Picture { name: name.into(), what })
+        })?;
+        self.count(&picture)?;
+        Ok(Arc::new(picture))
+    }
+
+    /// Counts the pixels of a picture, so that many small files do not fill the memory.
+    fn count(&mut self, picture: &Picture) -> Result<(), Fault> {
+        self.pixels += u64::from(picture.width()) * u64::from(picture.height());
+        if self.pixels > limits::MODEL_PIXELS {
+            let limit = limits::MODEL_PIXELS;
+            return Err(Fault::new(format!("its pictures have more than {limit} pixels together")));
+        }
+        Ok(())
+    }
+
+    /// Notes a file that is referred to. Returns its name, or `None` if there is none.
+    fn refer(&mut self, path: &str) -> Result<Option<String>, Fault> {
         let path = path.replace('\\', "/");
         let mut path = path.as_str();
         while let Some(rest) = path.strip_prefix("./") {
@@ -61,10 +130,7 @@ impl<'a> Referred<'a> {
                 info
             }
         };
-        if info.is_none() {
-            return Ok(None);
-        }
-        content(self.files, name).map_err(|error| self.give_up(error)).map(Some)
+        Ok(info.map(|_| name.into()))
     }
 
     /// Returns the error for a file that a model cannot do without.
@@ -116,4 +182,28 @@ pub(crate) fn content(files: &dyn Files, name: &str) -> Result<Vec<u8>, AssetErr
         return Err(AssetError::TooLarge { name: name.into(), bytes: bytes.len() as u64 });
     }
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{ImageFormat, RgbImage};
+
+    use super::*;
+    use crate::files::MemoryFiles;
+
+    /// A black picture of 2²⁶ pixels can be a file of some kilobytes.
+    #[test]
+    fn pictures_of_a_model_are_bounded_together() {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        RgbImage::new(4, 2).write_to(&mut bytes, ImageFormat::Png).unwrap();
+        let bytes = bytes.into_inner();
+        let files = MemoryFiles::from([("a.png", bytes.clone()), ("b.png", bytes.clone())]);
+        let mut referred = Referred::new(&files);
+        referred.pixels = limits::MODEL_PIXELS - 8;
+        assert!(referred.picture("a.png").unwrap().is_some());
+        assert!(referred.picture("a.png").unwrap().is_some(), "a picture counts once");
+        let beyond = "its pictures have more than 268435456 pixels together";
+        assert_eq!(referred.picture("b.png").unwrap_err().what, beyond);
+        assert_eq!(referred.embedded("a.glb", "image 0", &bytes).unwrap_err().what, beyond);
+    }
 }

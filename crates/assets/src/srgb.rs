@@ -1,6 +1,6 @@
 //! The transfer function of sRGB (IEC 61966-2-1).
 
-/// Returns the linear value of an encoded one, both from 0 to 1.
+/// Returns the linear value of an encoded one, both from 0 to 1. Beyond 1 the curve goes on.
 pub(crate) fn decoded(x: f64) -> f64 {
     if x <= 0.04045 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }
 }

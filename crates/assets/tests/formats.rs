@@ -155,14 +155,14 @@ fn polygons_are_fans_and_indices_may_be_negative() {
 #[test]
 fn colours_are_what_the_formats_say() {
     let colored = model("a.ply", ply_binary(true));
-    let color = colored.color(0, [0.2, 0.3, 0.5], false);
+    let color = colored.color(0, [0.2, 0.3, 0.5], DVec3::ONE, false);
     assert!((color - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-6, "{color}");
-    let linear = colored.color(0, [0.2, 0.3, 0.5], true);
+    let linear = colored.color(0, [0.2, 0.3, 0.5], DVec3::ONE, true);
     assert!((linear.y - 0.0331).abs() < 1e-4, "levels are decoded: {linear}");
     let gltf = model("a.glb", glb(r#"{"mesh":0}"#));
-    assert_eq!(gltf.color(0, [1.0, 0.0, 0.0], true), DVec3::new(0.5, 0.25, 1.0));
-    assert!((gltf.color(0, [1.0, 0.0, 0.0], false).x - 0.735).abs() < 1e-3, "encoded");
-    assert_eq!(gltf.glow(gltf.look(0), true), DVec3::Y);
+    assert_eq!(gltf.color(0, [1.0, 0.0, 0.0], DVec3::ONE, true), DVec3::new(0.5, 0.25, 1.0));
+    assert!((gltf.color(0, [1.0, 0.0, 0.0], DVec3::ONE, false).x - 0.735).abs() < 1e-3, "encoded");
+    assert_eq!(gltf.glow(gltf.look(0), DVec3::ONE, true), DVec3::Y);
     let plain = model("a.obj", obj());
     assert_eq!(
         (plain.look_color(0, false), plain.look_color(0, true)),
@@ -170,7 +170,7 @@ fn colours_are_what_the_formats_say() {
     );
     let half = model("a.obj", b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec());
     assert_eq!(
-        half.color(0, [0.0, 1.0, 0.0], true),
+        half.color(0, [0.0, 1.0, 0.0], DVec3::ONE, true),
         DVec3::ONE,
         "a vertex without a colour beside others is white"
     );

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use exr::prelude::{Compression, Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
 use proptest::prelude::*;
-use rayfold_assets::{Align, LetterError, Lettering, Library, MemoryFiles, Purpose, Smoothing};
+use rayfold_assets::{Align, LetterError, Lettering, Library, MemoryFiles, Purpose, Slot, Smoothing};
 
 fn error(bytes: impl Into<Vec<u8>>) -> String {
     let library = Library::new(MemoryFiles::from([("x", bytes.into())]));
@@ -15,13 +15,22 @@ fn error(bytes: impl Into<Vec<u8>>) -> String {
 }
 
 fn attempt(bytes: &[u8]) {
-    let library = Library::new(MemoryFiles::from([("x", bytes.to_vec())]));
+    let library = Library::new(MemoryFiles::from([
+        ("x", bytes.to_vec()),
+        ("m", b"newmtl a\nKd 1 .5 0\nmap_Kd p\n".to_vec()),
+        ("p", PICTURES[0].clone()),
+    ]));
     for smoothing in [Smoothing::OfFile, Smoothing::Within(30.0)] {
         if let Ok(model) = library.model("x", smoothing) {
             for triangle in 0..model.triangle_count() {
                 assert!(model.corners(triangle).iter().all(|p| p.is_finite()));
                 assert!(model.normals(triangle).is_none_or(|n| n.iter().all(|n| n.is_finite())));
-                let color = model.color(triangle, [0.25, 0.25, 0.5], true);
+                for slot in [Slot::Color, Slot::Glow] {
+                    let uvs = model.picture_uvs(triangle, slot);
+                    assert!(uvs.iter().all(|uv| uv.is_finite()));
+                }
+                assert!(model.vertex_alphas(triangle).iter().all(|alpha| alpha.is_finite()));
+                let color = model.color(triangle, [0.25, 0.25, 0.5], glam::DVec3::splat(0.7), true);
                 assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{color}");
             }
             let _ = model.closure();
@@ -39,12 +48,22 @@ const GLTF: &[u8] = br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0},{"childre
 {"bufferView":0}}}],"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteLength":1,"byteOffset":4}],"buffers":[{"uri":
 "data:;base64,AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/","byteLength":36}]}"#;
 
+/// A triangle with pictures and holes.
+const SHOWN: &[u8] = br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,
+"TEXCOORD_1":1,"COLOR_0":2},"material":0}]}],"materials":[{"alphaMode":"MASK","alphaCutoff":0.2,"pbrMetallicRoughness":
+{"baseColorTexture":{"index":0,"texCoord":1,"extensions":{"KHR_texture_transform":{"scale":[2,3]}}}},"emissiveFactor":[1,1,1],
+"emissiveTexture":{"index":1}}],"textures":[{"source":0,"sampler":0},{"extensions":{"EXT_texture_webp":{"source":1}}}],
+"samplers":[{"wrapS":33071,"wrapT":33648}],"images":[{"uri":"p"},{"uri":"./p"}],"accessors":[{"bufferView":0,
+"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"},{"bufferView":0,
+"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"uri":
+"data:;base64,AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/","byteLength":36}]}"#;
+
 const OBJ: &[u8] =
-    b"v 0 0 0\nv 1 0 0 1 .5 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 -1//-1\nl 1 2\n";
+    b"mtllib m\nv 0 0 0\nv 1 0 0 1 .5 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2/1/1 -1//-1\nl 1 2\n";
 
 #[test]
 fn the_samples_are_models() {
-    for bytes in [PLY, GLTF, OBJ] {
+    for bytes in [PLY, GLTF, OBJ, SHOWN] {
         let library = Library::new(MemoryFiles::from([("x", bytes.to_vec())]));
         let model = library.model("x", Smoothing::OfFile).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(model.triangle_count(), 1);
@@ -301,7 +320,7 @@ proptest! {
 
     #[test]
     fn changed_bytes_do_no_harm(
-        sample in prop::sample::select(vec![PLY, GLTF, OBJ]),
+        sample in prop::sample::select(vec![PLY, GLTF, OBJ, SHOWN]),
         cut in 0.0..1.0f64,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
     ) {

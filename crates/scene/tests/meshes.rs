@@ -8,6 +8,9 @@ use rayfold_scene::{Limits, Object, Parsed, Source, parse, parse_with_files};
 const CORNER: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n";
 const COLORED: &[u8] = b"mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\n";
 
+const SHOWN: &[u8] =
+    b"mtllib shown.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n";
+
 fn library() -> Library {
     Library::new(MemoryFiles::from([
         ("corner.obj", CORNER.to_vec()),
@@ -16,6 +19,11 @@ fn library() -> Library {
         ("with \"quotes\", #1.obj", CORNER.to_vec()),
         ("lacks.obj", b"mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec()),
         ("U\u{308}.obj", CORNER.to_vec()),
+        ("shown.obj", SHOWN.to_vec()),
+        ("shown.mtl", b"newmtl a\nmap_Kd maps/a b.png\nnewmtl b\nmap_Kd unused.png\n".to_vec()),
+        ("broken.obj", String::from_utf8_lossy(SHOWN).replace("shown.mtl", "broken.mtl").into_bytes()),
+        ("broken.mtl", b"newmtl a\nmap_Kd c.png\n".to_vec()),
+        ("c.png", b"GIF89a".to_vec()),
     ]))
 }
 
@@ -194,6 +202,16 @@ fn files_that_models_refer_to_are_named_too() {
         parsed("Mesh \"colored.obj\"\nMesh \"lacks.obj\"").files,
         ["colored.obj", "colours.mtl", "lacks.obj", "none.mtl"]
     );
+    // A picture is among them although it is missing, or spoils the model.
+    assert_eq!(parsed("Mesh \"shown.obj\"").files, ["a b.png", "shown.mtl", "shown.obj"]);
+    assert_eq!(parsed("Mesh \"broken.obj\"").files, ["broken.mtl", "broken.obj", "c.png"]);
+}
+
+#[test]
+fn pictures_of_models_are_missed_and_refused() {
+    let missed = "`shown.obj`: there is no file `maps/a b.png`: what has this picture is grey";
+    check("Mesh \"shown.obj\"", &[(3, 6, missed)]);
+    check("Mesh \"broken.obj\"", &[(3, 6, "`c.png`: it is a GIF")]);
 }
 
 #[test]

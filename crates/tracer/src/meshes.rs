@@ -2,21 +2,22 @@
 //!
 //! A mesh is expanded before a scene is prepared, to the very triangles that a script could write out. So a flat mesh has
 //! the pixels of its triangles, bit for bit. A mesh in a group is expanded once, however often the group is drawn.
-//! Normals, colours at vertices and the inside of closed glass are looked up by the position of a triangle among all
+//! Normals, colours at vertices, pictures and the inside of closed glass are looked up by the position of a triangle among all
 //! objects ([`Faces`]), when a ray has hit it.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::DVec3;
-use rayfold_scene::assets::{Closure, Look, Model};
+use glam::{DVec2, DVec3};
+use rayfold_scene::assets::{Closure, Look, Model, Slot, Texture};
 use rayfold_scene::{
     Coefficients, Finish, ImageMap, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone,
     Triangle,
 };
 
-use crate::pictures::factor_at;
+use crate::parts;
+use crate::pictures::{alpha_at, factor_at, level_at};
 use crate::reference::onward_normal;
 
 /// A scene without meshes, and the faces that its triangles were.
@@ -45,14 +46,16 @@ struct Run {
     placement: Option<Arc<Placement>>,
     /// Whether colours are linear light.
     is_linear: bool,
-    /// Whether the colours at its vertices multiply its coefficients.
+    /// Whether colours of its file that vary within faces, by vertices or pictures, multiply its coefficients.
     has_colors: bool,
-    /// Whether it also glows with the light of its file. Without colours at vertices that is a part of its materials.
+    /// Whether it also glows with the light of its file, where that is no part of its materials.
     glows: bool,
     /// Whether it has a picture by texture coordinates.
     has_image: bool,
     /// Whether it is a closed body of glass.
     is_filled: bool,
+    /// Whether faces can have holes, where they have no hits.
+    has_holes: bool,
 }
 
 /// The normals and colours that a face adds to the surface of a hit.
@@ -161,7 +164,8 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
         };
         let model = mesh.model();
         let finish = mesh.material().finish();
-        let has_colors = finish.is_some_and(|finish| finish.own) && model.has_vertex_colors();
+        let looks = || 0..model.looks().len();
+        let is_own = finish.is_some_and(|finish| finish.own);
         faces.runs.push(Run {
             first,
             count: all.len() - first,
@@ -169,15 +173,23 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
             model: model.clone(),
             placement,
             is_linear,
-            has_colors,
-            glows: has_colors && !mesh.has_material() && model.looks().iter().any(|l| l.glow != DVec3::ZERO),
+            has_colors: is_own && looks().any(|look| model.is_varied(look)),
+            glows: is_own && !mesh.has_material() && looks().any(|look| glows_apart(model, look)),
             has_image: finish
                 .is_some_and(|finish| finish.image.as_ref().is_some_and(|image| image.map() == ImageMap::Uv)),
             is_filled: finish.is_some_and(|finish| finish.glass.is_some())
                 && *model.closure() == Closure::Closed,
+            has_holes: model.has_holes(),
         });
     }
     (all, faces)
+}
+
+/// Returns whether the light that faces of a look give off is looked up where they are hit: because it varies, or because
+/// the colour does.
+fn glows_apart(model: &Model, look: usize) -> bool {
+    let Look { glow, glow_texture, .. } = &model.looks()[look];
+    *glow != DVec3::ZERO && (glow_texture.is_some() || model.is_varied(look))
 }
 
 /// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
@@ -198,8 +210,8 @@ fn material(mesh: &Mesh, look: usize, colors: Colors) -> Material {
     let Some(finish) = material.finish().filter(|finish| finish.own) else { return material.clone() };
     let model = mesh.model();
     let Look { unlit, .. } = model.looks()[look];
-    // Colours at vertices are looked up where they are hit.
-    let color = if model.has_vertex_colors() { DVec3::ONE } else { model.look_color(look, is_linear) };
+    // Colours that vary are looked up where they are hit.
+    let color = if model.is_varied(look) { DVec3::ONE } else { model.look_color(look, is_linear) };
     let tinted = |own: Coefficients| {
         let made = Coefficients::new(own.ambient() * color, own.diffuse() * color, own.mirror());
         made.unwrap_or(own)
@@ -210,7 +222,10 @@ fn material(mesh: &Mesh, look: usize, colors: Colors) -> Material {
         false => own,
     });
     if !mesh.has_material() {
-        let glow = if model.has_vertex_colors() { DVec3::ZERO } else { model.glow(look, is_linear) };
+        let glow = match glows_apart(model, look) {
+            true => DVec3::ZERO,
+            false => model.glow(look, DVec3::ONE, is_linear),
+        };
         let made = if unlit {
             Coefficients::new(color, DVec3::ZERO, DVec3::ZERO)
         } else {
@@ -229,6 +244,11 @@ impl Faces {
         self.runs.iter().any(Run::is_shaded)
     }
 
+    /// Returns whether the colour of any face varies, so that equal materials are not equal colours.
+    pub(crate) fn have_colors(&self) -> bool {
+        self.runs.iter().any(|run| run.has_colors || run.glows || run.has_image)
+    }
+
     /// Returns the position before meshes were expanded of the object at `order`.
     pub(crate) fn origin(&self, order: usize) -> usize {
         match self.runs[..self.runs.partition_point(|run| run.first <= order)].last() {
@@ -236,6 +256,33 @@ impl Faces {
             Some(run) if order < run.first + run.count => run.object,
             Some(run) => order - (run.first + run.count) + run.object + 1,
         }
+    }
+
+    /// Returns whether any face can have holes.
+    pub(crate) fn have_holes(&self) -> bool {
+        parts::BUILT.pictures && self.runs.iter().any(|run| run.has_holes)
+    }
+
+    /// Returns whether the object at `order` is a face that can have holes.
+    pub(crate) fn can_have_holes(&self, order: usize) -> bool {
+        let run = self.run_of(order).filter(|run| run.has_holes);
+        run.is_some_and(|run| run.model.looks()[run.model.look(order - run.first)].cutoff.is_some())
+    }
+
+    /// Returns whether the object at `order` has a hole at a point, which is in coordinates in which a point p of the world is
+    /// at `(p - center) * scale`.
+    pub(crate) fn is_hole(&self, order: usize, point: DVec3, (center, scale): (DVec3, f64)) -> bool {
+        let Some(run) = self.run_of(order).filter(|run| run.has_holes) else { return false };
+        let (model, k) = (&run.model, order - run.first);
+        let look = &model.looks()[model.look(k)];
+        let Some(cutoff) = look.cutoff else { return false };
+        let weights = weights(run.corners(k, center, scale), point);
+        let of_vertices: f64 = model.vertex_alphas(k).iter().zip(weights).map(|(alpha, b)| alpha * b).sum();
+        let of_picture = match &look.texture {
+            Some(texture) => alpha_at(texture, run.place_on(texture, k, weights, Slot::Color)),
+            None => 1.0,
+        };
+        look.alpha * of_picture * of_vertices < cutoff
     }
 
     /// Returns whether the object at `order` is a face of a closed body of glass.
@@ -254,11 +301,7 @@ impl Faces {
         let run = self.run_of(order).filter(|run| run.is_shaded())?;
         let k = order - run.first;
         let FaceHit { point, center, scale, direction, face } = hit;
-        let into = |p: DVec3| match &run.placement {
-            Some(placement) => (placement.point(p) - center) * scale,
-            None => (p - center) * scale,
-        };
-        let corners = run.model.corners(k).map(into);
+        let corners = run.corners(k, center, scale);
         let weights = weights(corners, point);
         let outwards = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let within = run.is_filled && outwards.dot(direction) > 0.0;
@@ -280,8 +323,10 @@ impl Faces {
             }
         }
         let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
-        if run.has_colors {
-            color = run.model.color(k, weights, run.is_linear);
+        let look = || run.model.look(k);
+        if run.has_colors && run.model.is_varied(look()) {
+            let level = run.level(k, weights, Slot::Color);
+            color = run.model.color(k, weights, level, run.is_linear);
         }
         let finish = material.finish();
         if run.has_image
@@ -293,8 +338,8 @@ impl Faces {
             let v = if run.model.has_uvs_from_top() { v } else { 1.0 - v };
             color *= factor_at(image.file().picture(), [u, v], true, run.is_linear);
         }
-        if run.glows {
-            glow = run.model.glow(run.model.look(k), run.is_linear);
+        if run.glows && glows_apart(&run.model, look()) {
+            glow = run.model.glow(look(), run.level(k, weights, Slot::Glow), run.is_linear);
         }
         let glass = finish.and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));
@@ -305,7 +350,32 @@ impl Faces {
 
 impl Run {
     fn is_shaded(&self) -> bool {
-        self.model.has_normals() || self.has_colors || self.has_image || self.is_filled
+        self.model.has_normals() || self.has_colors || self.glows || self.has_image || self.is_filled
+    }
+
+    /// Returns the corners of a face in coordinates in which a point p of the world is at `(p - center) * scale`.
+    fn corners(&self, k: usize, center: DVec3, scale: f64) -> [DVec3; 3] {
+        self.model.corners(k).map(|p| match &self.placement {
+            Some(placement) => (placement.point(p) - center) * scale,
+            None => (p - center) * scale,
+        })
+    }
+
+    /// Returns the level of a face's picture at a place; 1 without one.
+    fn level(&self, k: usize, weights: [f64; 3], slot: Slot) -> DVec3 {
+        let model = &self.model;
+        let texture = model.looks()[model.look(k)].texture(slot);
+        let Some(texture) = texture.filter(|_| parts::BUILT.pictures) else { return DVec3::ONE };
+        let place = self.place_on(texture, k, weights, slot);
+        level_at(texture, place, model.decodes_pictures(self.is_linear))
+    }
+
+    /// Returns the place of a point of a face on its picture, from the upper left corner.
+    fn place_on(&self, texture: &Texture, k: usize, weights: [f64; 3], slot: Slot) -> DVec2 {
+        let uvs = self.model.picture_uvs(k, slot);
+        let mixed = uvs.iter().zip(weights).map(|(uv, b)| b * uv.as_dvec2()).sum::<DVec2>();
+        let DVec2 { x, y } = texture.transformed(mixed);
+        DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
 }
 

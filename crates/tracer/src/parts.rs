@@ -51,8 +51,10 @@ parts! {
     patterns, "patterns", |scene| is_made(scene, |f| f.pattern.is_some());
     lamps, "lamps", |scene| scene.lights.iter().any(|light| matches!(light, Light::Lamp(_)));
     skies, "skies", |scene| scene.surroundings().color().is_none();
-    // Pictures as the sky, and on surfaces.
-    pictures, "pictures", |scene| scene.sky_picture().is_some() || is_made(scene, |f| f.image.is_some());
+    // Pictures as the sky, on surfaces, and of models; and holes of models.
+    pictures, "pictures", |scene| {
+        scene.sky_picture().is_some() || is_made(scene, |f| f.image.is_some()) || scene.objects.iter().any(is_textured)
+    };
     srgb, "srgb", |scene| scene.tone == Tone::Srgb;
     samples, "samples", is_sampled;
     lenses, "lenses", |scene| is_sampled(scene) && scene.lens.radius() > 0.0;
@@ -94,6 +96,18 @@ fn has(scene: &Scene, is_it: fn(&Object) -> bool) -> bool {
         Object::Instance(instance) => is_it(instance.object()),
         object => is_it(object),
     })
+}
+
+/// Returns whether an object shows pictures of its model, or has holes.
+fn is_textured(object: &Object) -> bool {
+    match object {
+        Object::Instance(instance) => is_textured(instance.object()),
+        Object::Mesh(mesh) => {
+            let is_own = mesh.material().finish().is_some_and(|finish| finish.own);
+            is_own && mesh.model().has_pictures() || mesh.model().has_holes()
+        }
+        _ => false,
+    }
 }
 
 fn is_made(scene: &Scene, has_it: fn(&Finish) -> bool) -> bool {

@@ -6,8 +6,8 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use glam::DVec3;
-use rayfold_scene::assets::Picture;
+use glam::{DVec2, DVec3};
+use rayfold_scene::assets::{Picture, Texture, Wrap};
 use rayfold_scene::{Axes, Image, ImageMap, Object, Scene, Tone};
 
 /// A picture all around the scene.
@@ -77,26 +77,60 @@ pub(crate) fn factor_at(picture: &Picture, place: [f64; 2], repeats_down: bool, 
     mean(picture, place, repeats_down, |column, row| picture.factor(column, row, is_linear))
 }
 
+/// Returns the level of a picture of a model at a place that counts from its upper left corner.
+pub(crate) fn level_at(texture: &Texture, place: DVec2, is_linear: bool) -> DVec3 {
+    let picture = texture.picture();
+    interpolated(picture, place.into(), texture.wraps(), |column, row| picture.level(column, row, is_linear))
+}
+
+/// Returns the alpha of a picture of a model at a place that counts from its upper left corner.
+pub(crate) fn alpha_at(texture: &Texture, place: DVec2) -> f64 {
+    let picture = texture.picture();
+    let alpha = |column, row| DVec3::splat(picture.alpha(column, row));
+    interpolated(picture, place.into(), texture.wraps(), alpha).x
+}
+
 /// Returns the interpolated value at a place on a picture. The picture repeats across, and down as well if `repeats_down`;
 /// otherwise its first and last row go on.
 #[inline]
 pub(crate) fn mean(
     picture: &Picture,
-    [u, v]: [f64; 2],
+    place: [f64; 2],
     repeats_down: bool,
     value: impl Fn(u32, u32) -> DVec3,
 ) -> DVec3 {
-    let (columns, x) = neighbours(u, picture.width(), true);
-    let (rows, y) = neighbours(v, picture.height(), repeats_down);
+    let down = if repeats_down { Wrap::Repeat } else { Wrap::Clamp };
+    interpolated(picture, place, [Wrap::Repeat, down], value)
+}
+
+/// Returns the interpolated value at a place on a picture that goes on by `wraps` across and down.
+#[inline]
+fn interpolated(
+    picture: &Picture,
+    [u, v]: [f64; 2],
+    wraps: [Wrap; 2],
+    value: impl Fn(u32, u32) -> DVec3,
+) -> DVec3 {
+    let (columns, x) = neighbours(u, picture.width(), wraps[0]);
+    let (rows, y) = neighbours(v, picture.height(), wraps[1]);
     let of_row = |row: u32| mixed(value(columns[0], row), value(columns[1], row), x);
     mixed(of_row(rows[0]), of_row(rows[1]), y)
 }
 
 /// Returns the two pixels, of so many, whose middles are around a place, and the share of the second.
-fn neighbours(place: f64, count: u32, repeats: bool) -> ([u32; 2], f64) {
+fn neighbours(place: f64, count: u32, wrap: Wrap) -> ([u32; 2], f64) {
     // A place that is no number, of an object at the end of all numbers, is the corner.
     let place = if place.is_finite() { place } else { 0.0 };
-    let place = if repeats { place - place.floor() } else { place.clamp(0.0, 1.0) };
+    let repeats = wrap == Wrap::Repeat;
+    let place = match wrap {
+        Wrap::Repeat => place - place.floor(),
+        Wrap::Clamp => place.clamp(0.0, 1.0),
+        // From 0 to 2, and back from the middle. There the pixels at an edge are their own neighbours.
+        Wrap::Mirror => {
+            let place = place - 2.0 * (0.5 * place).floor();
+            if place > 1.0 { 2.0 - place } else { place }
+        }
+    };
     let at = place * f64::from(count) - 0.5;
     let before = at.floor();
     let pixels = [before, before + 1.0].map(|pixel| {
@@ -122,19 +156,26 @@ mod tests {
 
     #[test]
     fn pixels_are_those_whose_middles_are_around_a_place() {
-        assert_eq!(neighbours(0.5, 1, true), ([0, 0], 0.0));
-        assert_eq!(neighbours(0.375, 4, true), ([1, 2], 0.0));
-        assert_eq!(neighbours(0.5, 4, false), ([1, 2], 0.5));
-        assert_eq!(neighbours(0.0, 4, true), ([3, 0], 0.5));
-        assert_eq!(neighbours(1.0, 4, true), ([3, 0], 0.5));
-        assert_eq!(neighbours(-1e-20, 4, true), ([3, 0], 0.5));
-        assert_eq!(neighbours(0.0, 4, false), ([0, 0], 0.5));
-        assert_eq!(neighbours(1.0, 4, false), ([3, 3], 0.5));
-        assert_eq!(neighbours(-3.0, 4, false), ([0, 0], 0.5));
-        assert_eq!(neighbours(f64::NAN, 4, true).0, [3, 0]);
+        assert_eq!(neighbours(0.5, 1, Wrap::Repeat), ([0, 0], 0.0));
+        assert_eq!(neighbours(0.375, 4, Wrap::Repeat), ([1, 2], 0.0));
+        assert_eq!(neighbours(0.5, 4, Wrap::Clamp), ([1, 2], 0.5));
+        assert_eq!(neighbours(0.0, 4, Wrap::Repeat), ([3, 0], 0.5));
+        assert_eq!(neighbours(1.0, 4, Wrap::Repeat), ([3, 0], 0.5));
+        assert_eq!(neighbours(-1e-20, 4, Wrap::Repeat), ([3, 0], 0.5));
+        assert_eq!(neighbours(0.0, 4, Wrap::Clamp), ([0, 0], 0.5));
+        assert_eq!(neighbours(1.0, 4, Wrap::Clamp), ([3, 3], 0.5));
+        assert_eq!(neighbours(-3.0, 4, Wrap::Clamp), ([0, 0], 0.5));
+        assert_eq!(neighbours(1.125, 4, Wrap::Mirror), ([3, 3], 0.0));
+        assert_eq!(neighbours(1.375, 4, Wrap::Mirror), ([2, 3], 0.0));
+        assert_eq!(neighbours(-0.125, 4, Wrap::Mirror), ([0, 1], 0.0));
+        assert_eq!(neighbours(2.0, 4, Wrap::Mirror), ([0, 0], 0.5));
+        assert_eq!(neighbours(1.0, 4, Wrap::Mirror), ([3, 3], 0.5));
+        assert_eq!(neighbours(f64::NAN, 4, Wrap::Repeat).0, [3, 0]);
         for place in [1e300, -1e300, 1e17, 0.1, -0.1] {
-            let ([a, b], share) = neighbours(place, 7, true);
-            assert!(a < 7 && b < 7 && (0.0..1.0).contains(&share), "{place}");
+            for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+                let ([a, b], share) = neighbours(place, 7, wrap);
+                assert!(a < 7 && b < 7 && (0.0..1.0).contains(&share), "{place}");
+            }
         }
     }
 }

@@ -62,17 +62,18 @@ struct Items<'a> {
     stride: usize,
 }
 
+/// Returns the fault of a part of a file that is outside of its buffer.
+fn outside(what: &str) -> impl Fn() -> Fault {
+    move || Fault::new(format!("{what} is outside of its buffer: the file is cut off, or damaged"))
+}
+
 impl Buffers {
-    /// Returns `count` items of `size` bytes each, from `offset` within a view.
-    fn items(
-        &self,
-        document: &Document,
-        (view, offset): (usize, u64),
-        count: u64,
-        size: usize,
-        strided: bool,
-    ) -> Result<Items<'_>, Fault> {
-        let outside = || Fault::new("an accessor is outside of its buffer: the file is cut off, or damaged");
+    /// Returns the bytes of a view.
+    pub(super) fn view(&self, document: &Document, view: usize) -> Result<&[u8], Fault> {
+        self.within(document, view, &outside("a picture"))
+    }
+
+    fn within(&self, document: &Document, view: usize, outside: &impl Fn() -> Fault) -> Result<&[u8], Fault> {
         let number = view;
         let view = document
             .buffer_views
@@ -85,10 +86,22 @@ impl Buffers {
         let start = usize::try_from(view.byte_offset).map_err(|_| outside())?;
         let length = usize::try_from(view.byte_length).map_err(|_| outside())?;
         let end = start.checked_add(length).ok_or_else(outside)?;
-        let bytes = buffer.get(start..end).ok_or_else(outside)?;
+        buffer.get(start..end).ok_or_else(outside)
+    }
+
+    /// Returns `count` items of `size` bytes each, from `offset` within a view.
+    fn items(
+        &self,
+        document: &Document,
+        (view, offset): (usize, u64),
+        count: u64,
+        size: usize,
+        strided: bool,
+    ) -> Result<Items<'_>, Fault> {
+        let outside = outside("an accessor");
         let offset = usize::try_from(offset).map_err(|_| outside())?;
-        let bytes = bytes.get(offset..).ok_or_else(outside)?;
-        let stride = match view.byte_stride {
+        let bytes = self.within(document, view, &outside)?.get(offset..).ok_or_else(&outside)?;
+        let stride = match document.buffer_views.get(view).and_then(|view| view.byte_stride) {
             Some(stride) if strided => usize::try_from(stride).map_err(|_| outside())?,
             _ => size,
         };
@@ -98,7 +111,7 @@ impl Buffers {
         let count = usize::try_from(count).map_err(|_| outside())?;
         let needed = match count {
             0 => 0,
-            _ => (count - 1).checked_mul(stride).and_then(|n| n.checked_add(size)).ok_or_else(outside)?,
+            _ => (count - 1).checked_mul(stride).and_then(|n| n.checked_add(size)).ok_or_else(&outside)?,
         };
         if needed > bytes.len() {
             return Err(outside());

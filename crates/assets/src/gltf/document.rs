@@ -1,5 +1,7 @@
 //! The JSON of a glTF file, as far as it is drawn. Fields without meaning here are skipped.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -12,6 +14,9 @@ pub(super) struct Document {
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) materials: Vec<Material>,
+    pub(super) textures: Vec<Texture>,
+    pub(super) images: Vec<Image>,
+    pub(super) samplers: Vec<Sampler>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     pub(super) buffers: Vec<Buffer>,
@@ -70,6 +75,9 @@ pub(super) struct Attributes {
     pub(super) uv: Option<usize>,
     #[serde(rename = "COLOR_0")]
     pub(super) color: Option<usize>,
+    /// Further texture coordinates, among others.
+    #[serde(flatten)]
+    pub(super) others: BTreeMap<String, Value>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -77,7 +85,7 @@ pub(super) struct Attributes {
 pub(super) struct Material {
     pub(super) pbr_metallic_roughness: Pbr,
     pub(super) emissive_factor: Option<[f64; 3]>,
-    pub(super) emissive_texture: Option<Value>,
+    pub(super) emissive_texture: Option<TextureInfo>,
     pub(super) normal_texture: Option<Value>,
     pub(super) occlusion_texture: Option<Value>,
     pub(super) alpha_mode: Option<String>,
@@ -89,10 +97,70 @@ pub(super) struct Material {
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Pbr {
     pub(super) base_color_factor: Option<[f64; 4]>,
-    pub(super) base_color_texture: Option<Value>,
+    pub(super) base_color_texture: Option<TextureInfo>,
     pub(super) metallic_factor: Option<f64>,
     pub(super) roughness_factor: Option<f64>,
     pub(super) metallic_roughness_texture: Option<Value>,
+}
+
+/// The use of a texture by a material.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct TextureInfo {
+    pub(super) index: usize,
+    pub(super) tex_coord: u32,
+    pub(super) extensions: TextureInfoExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct TextureInfoExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(super) transform: Option<TextureTransform>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct TextureTransform {
+    pub(super) offset: [f64; 2],
+    pub(super) rotation: f64,
+    pub(super) scale: Option<[f64; 2]>,
+    pub(super) tex_coord: Option<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Texture {
+    pub(super) source: Option<usize>,
+    pub(super) sampler: Option<usize>,
+    pub(super) extensions: TextureExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct TextureExtensions {
+    #[serde(rename = "EXT_texture_webp")]
+    pub(super) webp: Option<WebP>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct WebP {
+    pub(super) source: Option<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Image {
+    pub(super) uri: Option<String>,
+    pub(super) buffer_view: Option<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Sampler {
+    pub(super) wrap_s: Option<u32>,
+    pub(super) wrap_t: Option<u32>,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -3,16 +3,21 @@
 //! The JSON is read by `serde`; its indices, ranges and nodes are checked here where they are used.
 
 mod accessor;
+mod address;
 mod document;
+mod pictures;
 
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec2};
 
 use self::accessor::Buffers;
-use self::document::{Document, Material, Node, Primitive};
+use self::address::{data, decoded_path};
+use self::document::{Document, Material, Node, Primitive, TextureInfo};
+use self::pictures::{Pictures, coordinates};
 use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
 use crate::referred::Referred;
+use crate::texture::Slot;
 
 /// The extensions that a file may require.
 const KNOWN: [&str; 5] = [
@@ -66,12 +71,24 @@ fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<
     }
     let buffers = buffers(&document, binary, referred)?;
     let mut parts = Parts { space: Colors::Linear, ..Parts::default() };
-    parts.looks = document.materials.iter().map(|material| look(material, &mut parts.warnings)).collect();
+    parts.looks = document.materials.iter().map(look).collect();
     parts.looks.push(Look { factor: Some(DVec3::ONE), ..Look::PLAIN });
     let mut maker =
         Maker { document: &document, buffers: &buffers, parts, has_normals: false, left_out: false };
     maker.scene()?;
     let Maker { mut parts, has_normals, left_out, .. } = maker;
+    for own in parts.own_uvs.iter_mut().filter(|own| !own.is_empty()) {
+        own.resize(parts.positions.len(), Vec2::ZERO);
+    }
+    if !parts.colors.is_empty() {
+        parts.colors.resize(parts.positions.len(), glam::Vec3::ONE);
+    }
+    if parts.alphas.iter().all(|alpha| *alpha == 1.0) {
+        parts.alphas.clear();
+    } else {
+        parts.alphas.resize(parts.positions.len(), 1.0);
+    }
+    paint(name, (&document, &buffers), referred, &mut parts)?;
     if !has_normals {
         parts.normal_of = Vec::new();
     }
@@ -98,8 +115,7 @@ fn buffers(
             (None, _) => return Err(Fault::new(format!("buffer {number} has neither a file nor data"))),
             (Some(uri), _) if uri.starts_with("data:") => data(uri)?,
             (Some(uri), _) => {
-                let path = percent_encoding::percent_decode_str(uri);
-                let path = path.decode_utf8().map_err(|_| Fault::new(format!("`{uri}` is not UTF-8")))?;
+                let path = decoded_path(uri)?;
                 match referred.read(&path)? {
                     Some(content) => content,
                     None => return Err(referred.absent(&path)),
@@ -122,44 +138,65 @@ fn buffers(
     Ok(Buffers { contents })
 }
 
-/// Returns the bytes of a `data:` address.
-fn data(uri: &str) -> Result<Vec<u8>, Fault> {
-    let (head, body) = uri.split_once(',').ok_or_else(|| Fault::new("a `data:` address has no comma"))?;
-    if !head.to_ascii_lowercase().ends_with(";base64") {
-        return Ok(percent_encoding::percent_decode_str(body).collect());
+/// Returns the colour and glow of a material, without its pictures.
+fn look(material: &Material) -> Look {
+    let [r, g, b, alpha] = material.pbr_metallic_roughness.base_color_factor.unwrap_or([1.0; 4]);
+    let unlit = material.extensions.unlit.is_some();
+    let strength = material.extensions.strength.as_ref().and_then(|strength| strength.emissive_strength);
+    let glow = DVec3::from(material.emissive_factor.unwrap_or_default()) * strength.unwrap_or(1.0).max(0.0);
+    // Light without end would be none.
+    let glow = glow.clamp(DVec3::MIN, DVec3::MAX);
+    // The colour of what is unlit replaces its light.
+    Look {
+        factor: Some([r, g, b].into()),
+        glow: if unlit { DVec3::ZERO } else { glow },
+        unlit,
+        alpha,
+        cutoff: cutoff(material),
+        ..Look::PLAIN
     }
-    base64_simd::forgiving_decode_to_vec(body.as_bytes())
-        .map_err(|_| Fault::new("the data of a `data:` address is not Base64"))
 }
 
-/// Returns the colour and glow of a material.
-fn look(material: &Material, warnings: &mut Vec<String>) -> Look {
-    let pbr = &material.pbr_metallic_roughness;
-    let finite = |v: [f64; 3]| {
-        let v = DVec3::from(v);
-        if v.is_finite() { v } else { DVec3::ZERO }
-    };
-    let [r, g, b, _] = pbr.base_color_factor.unwrap_or([1.0; 4]);
-    let mut factor = Some(finite([r, g, b]));
-    let mut glow = finite(material.emissive_factor.unwrap_or_default());
-    if let Some(strength) = &material.extensions.strength {
-        glow *= strength.emissive_strength.filter(|x| x.is_finite()).unwrap_or(1.0).max(0.0);
+/// Returns the texture of a material for a use, if it counts.
+fn texture(material: &Material, slot: Slot) -> Option<&TextureInfo> {
+    match slot {
+        Slot::Color => material.pbr_metallic_roughness.base_color_texture.as_ref(),
+        Slot::Glow => material.emissive_texture.as_ref().filter(|_| look(material).glow != DVec3::ZERO),
     }
-    let mut without = |what: &str| {
-        let warning = format!("pictures of models are not read: {what}");
-        if !warnings.contains(&warning) {
-            warnings.push(warning);
+}
+
+/// Gives the looks that faces have their pictures.
+fn paint(
+    name: &str,
+    (document, buffers): (&Document, &Buffers),
+    referred: &mut Referred<'_>,
+    parts: &mut Parts,
+) -> Result<(), Fault> {
+    let mut is_used = vec![false; parts.looks.len()];
+    parts.look_of.iter().for_each(|look| is_used[*look as usize] = true);
+    let mut pictures = Pictures::new(name, document, buffers, referred);
+    let used = document.materials.iter().zip(&mut parts.looks).zip(is_used).filter(|(_, is_used)| *is_used);
+    let mut blends = false;
+    for ((material, look), _) in used {
+        blends |= material.alpha_mode.as_deref() == Some("BLEND");
+        if let Some(info) = texture(material, Slot::Color) {
+            look.texture = pictures.texture(info, "what has this picture is grey")?;
+            look.is_missing = look.texture.is_none();
         }
-    };
-    if pbr.base_color_texture.is_some() {
-        factor = None;
-        without("what has one is grey");
+        if let Some(info) = texture(material, Slot::Glow) {
+            look.glow_texture = pictures.texture(info, "what has this picture of its glow does not glow")?;
+            if look.glow_texture.is_none() {
+                look.glow = DVec3::ZERO;
+            }
+        }
     }
-    if material.emissive_texture.is_some() && glow != DVec3::ZERO {
-        glow = DVec3::ZERO;
-        without("what has one of its glow does not glow");
+    parts.warnings.extend(pictures.into_warnings());
+    if blends {
+        let warning =
+            "what blends (alphaMode BLEND) is opaque where its alpha is .5 or more, and has holes elsewhere";
+        parts.warnings.push(warning.into());
     }
-    Look { factor, glow, unlit: material.extensions.unlit.is_some() }
+    Ok(())
 }
 
 /// Names the parts of a file that are not used.
@@ -273,6 +310,11 @@ impl Maker<'_> {
             same("normals", normals)?;
             self.has_normals = true;
         }
+        let look = match primitive.material {
+            None => document.materials.len(),
+            Some(material) if material < document.materials.len() => material,
+            Some(material) => return Err(Fault::new(format!("there is no material {material}"))),
+        };
         let first_uv = parts.uvs.len();
         if let Some(uv) = primitive.attributes.uv {
             let uvs = buffers.each(document, uv, &[("VEC2", 2)], |[u, v]: [f64; 2]| {
@@ -280,23 +322,55 @@ impl Maker<'_> {
             })?;
             same("texture coordinates", uvs)?;
         }
+        if let Some(material) = document.materials.get(look) {
+            for slot in [Slot::Color, Slot::Glow] {
+                let Some(info) = texture(material, slot) else { continue };
+                let set = coordinates(info);
+                let accessor = match set {
+                    0 => primitive.attributes.uv,
+                    _ => primitive
+                        .attributes
+                        .others
+                        .get(&format!("TEXCOORD_{set}"))
+                        .and_then(|n| n.as_u64().and_then(|n| usize::try_from(n).ok())),
+                };
+                if accessor.is_none() {
+                    let warning = format!("what has no TEXCOORD_{set} shows its picture at (0, 0)");
+                    if !parts.warnings.contains(&warning) {
+                        parts.warnings.push(warning);
+                    }
+                }
+                if set == 0 {
+                    continue;
+                }
+                let own = &mut parts.own_uvs[slot as usize];
+                own.resize(first, Vec2::ZERO);
+                if let Some(accessor) = accessor {
+                    let uvs = buffers.each(document, accessor, &[("VEC2", 2)], |[u, v]: [f64; 2]| {
+                        own.push(Vec2::new(u as f32, v as f32));
+                    })?;
+                    same("texture coordinates", uvs)?;
+                }
+                own.resize(first + count, Vec2::ZERO);
+            }
+        }
         if let Some(color) = primitive.attributes.color {
             parts.colors.resize(first, glam::Vec3::ONE);
             let kinds = [("VEC3", 3), ("VEC4", 4)];
-            let colors = buffers.each(document, color, &kinds, |[r, g, b, _]: [f64; 4]| {
+            let has_alpha = document.accessors.get(color).is_some_and(|accessor| accessor.kind == "VEC4");
+            let is_cut = has_alpha && document.materials.get(look).is_some_and(|m| cutoff(m).is_some());
+            if is_cut {
+                parts.alphas.resize(first, 1.0);
+            }
+            let colors = buffers.each(document, color, &kinds, |[r, g, b, alpha]: [f64; 4]| {
                 parts.colors.push(DVec3::new(r, g, b).as_vec3());
+                if is_cut {
+                    parts.alphas.push(alpha as f32);
+                }
             })?;
             same("colours", colors)?;
         } else if !parts.colors.is_empty() {
             parts.colors.resize(parts.positions.len(), glam::Vec3::ONE);
-        }
-        let look = match primitive.material {
-            None => document.materials.len(),
-            Some(material) if material < document.materials.len() => material,
-            Some(material) => return Err(Fault::new(format!("there is no material {material}"))),
-        };
-        if document.materials.get(look).is_some_and(is_invisible) {
-            return Ok(());
         }
         let mut order: Vec<u32> = Vec::new();
         match primitive.indices {
@@ -342,15 +416,13 @@ impl Maker<'_> {
     }
 }
 
-/// Returns whether faces of this material have no hits, because their alpha is below the cutoff.
-fn is_invisible(material: &Material) -> bool {
-    let cutoff = match material.alpha_mode.as_deref() {
-        Some("MASK") => material.alpha_cutoff.unwrap_or(0.5),
-        Some("BLEND") => 0.5,
-        _ => return false,
-    };
-    let has_picture = material.pbr_metallic_roughness.base_color_texture.is_some();
-    !has_picture && material.pbr_metallic_roughness.base_color_factor.is_some_and(|factor| factor[3] < cutoff)
+/// Returns the alpha below which faces of a material have no hits.
+fn cutoff(material: &Material) -> Option<f64> {
+    match material.alpha_mode.as_deref() {
+        Some("MASK") => Some(material.alpha_cutoff.unwrap_or(0.5)),
+        Some("BLEND") => Some(0.5),
+        _ => None,
+    }
 }
 
 /// Returns the transform of a node.

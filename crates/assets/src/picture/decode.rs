@@ -1,6 +1,7 @@
 //! A picture from the bytes of its file, whose content decides what it is.
 
 use std::io::Cursor;
+use std::sync::OnceLock;
 
 use image::codecs::jpeg::JpegDecoder;
 use image::codecs::png::PngDecoder;
@@ -123,7 +124,14 @@ fn read_encoded(
     } else {
         Levels::Bytes(count, read)
     };
-    Ok(Picture { stored: [width, height], levels, orientation, largest: 1.0, warnings: Vec::new() })
+    Ok(Picture {
+        stored: [width, height],
+        levels,
+        orientation,
+        largest: 1.0,
+        warnings: Vec::new(),
+        is_opaque: OnceLock::new(),
+    })
 }
 
 fn fault(error: ImageError) -> Fault {

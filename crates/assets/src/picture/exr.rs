@@ -1,6 +1,7 @@
 //! OpenEXR: the first part with the channels R, G and B.
 
 use std::io::Cursor;
+use std::sync::OnceLock;
 
 use exr::error::Error;
 use exr::meta::MetaData;
@@ -92,7 +93,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     let orientation = Orientation::NoTransforms;
     let stored = [width as u32, height as u32];
     let largest = levels.iter().flatten().fold(1.0, |most: f32, level| most.max(*level)).into();
-    Ok(Picture { stored, levels: Levels::Floats(levels), orientation, largest, warnings })
+    Ok(Picture {
+        stored,
+        levels: Levels::Floats(levels),
+        orientation,
+        largest,
+        warnings,
+        is_opaque: OnceLock::new(),
+    })
 }
 
 fn unread(compression: &str) -> Fault {

@@ -1,5 +1,7 @@
 //! Radiance HDR: bytes of red, green and blue with a common exponent.
 
+use std::sync::OnceLock;
+
 use image::metadata::Orientation;
 
 use super::size::check_size;
@@ -49,7 +51,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
     let orientation = Orientation::NoTransforms;
     let most = levels.iter().map(|[r, g, b, exponent]| f64::from(*r.max(g).max(b)) * unit(*exponent));
     let largest = most.fold(1.0, f64::max);
-    Ok(Picture { stored, levels: Levels::Shared(levels), orientation, largest, warnings: Vec::new() })
+    Ok(Picture {
+        stored,
+        levels: Levels::Shared(levels),
+        orientation,
+        largest,
+        warnings: Vec::new(),
+        is_opaque: OnceLock::new(),
+    })
 }
 
 /// Reads the line of the size: `-Y rows +X columns`.

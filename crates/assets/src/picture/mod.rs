@@ -6,7 +6,7 @@ mod hdr;
 mod jpeg;
 mod size;
 
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 use glam::DVec3;
 use image::metadata::Orientation;
@@ -14,6 +14,7 @@ use image::metadata::Orientation;
 pub(crate) use decode::decode;
 pub use jpeg::jpeg_fault;
 
+use crate::error::AssetError;
 use crate::srgb::decoded;
 
 /// A picture. Its rows go down from its top, its columns from its left edge to the right.
@@ -26,6 +27,7 @@ pub struct Picture {
     /// The largest level.
     largest: f64,
     warnings: Vec<String>,
+    is_opaque: OnceLock<bool>,
 }
 
 /// The levels in the order of the file, a few numbers for each pixel.
@@ -47,6 +49,11 @@ static WORDS: LazyLock<Vec<f64>> = LazyLock::new(|| linear(65535));
 
 fn linear(most: u32) -> Vec<f64> {
     (0..=most).map(|level| decoded(f64::from(level) / f64::from(most))).collect()
+}
+
+/// Returns a picture if it can lie on a surface: if its levels are from 0 to 1.
+pub(crate) fn surface(name: &str, picture: Picture) -> Result<Picture, AssetError> {
+    if picture.is_light() { Err(AssetError::Light { name: name.into() }) } else { Ok(picture) }
 }
 
 impl Picture {
@@ -82,6 +89,27 @@ impl Picture {
         let (level, alpha) = self.pixel(column, row, linear);
         // Without alpha the level itself, to the last bit.
         if alpha == 1.0 { level } else { (1.0 - alpha) + alpha * level }
+    }
+
+    /// Returns the alpha of a pixel, from 0 to 1.
+    ///
+    /// # Panics
+    /// Panics if there is no such pixel.
+    pub fn alpha(&self, column: u32, row: u32) -> f64 {
+        self.pixel(column, row, false).1
+    }
+
+    /// Returns whether the alpha of all pixels is 1.
+    pub(crate) fn is_opaque(&self) -> bool {
+        *self.is_opaque.get_or_init(|| match &self.levels {
+            Levels::Bytes(count @ (2 | 4), levels) => {
+                levels.chunks_exact(*count).all(|p| p[count - 1] == u8::MAX)
+            }
+            Levels::Words(count @ (2 | 4), levels) => {
+                levels.chunks_exact(*count).all(|p| p[count - 1] == u16::MAX)
+            }
+            Levels::Bytes(..) | Levels::Words(..) | Levels::Shared(_) | Levels::Floats(_) => true,
+        })
     }
 
     /// Returns a bound of all levels, at least 1.

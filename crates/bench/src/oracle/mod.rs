@@ -21,6 +21,7 @@ mod hit;
 mod image;
 mod light;
 mod line;
+mod model_color;
 mod noise;
 mod pattern;
 mod real;

@@ -295,6 +295,10 @@ impl<'a> Parser<'a> {
             Ok(model) => model,
             Err(error) => {
                 self.note_absent(&error);
+                // A changed file that it refers to may mend it.
+                for (name, _) in self.library.sources(name) {
+                    self.named.files.entry(name).or_default();
+                }
                 self.report.error(s.line, span.clone(), || wording::unusable_file(&error));
                 return None;
             }

@@ -94,8 +94,8 @@ impl<'a> Drawing<'a> {
             ));
         }
         let Ranked { scene: ranked, faces, .. } = &Ranked::new(scene);
-        let geometry = if has_kernels(options) { Geometry::new(ranked, options.tree).ok() } else { None };
-        let geometry = geometry.map(|geometry| geometry.with_faces(faces.as_ref()));
+        let geometry = || Geometry::with_faces(ranked, faces.as_ref(), options.tree).ok();
+        let geometry = if has_kernels(options) { geometry() } else { None };
         let precision = |geometry| Some((precision::resolve(options, &geometry, ranked)?, geometry));
         Ok(Self(match geometry.and_then(precision) {
             Some((Precision::F64, geometry)) => {
@@ -335,8 +335,8 @@ fn sampled_backend<'a>(
         .unzip();
     let energies = if parts::BUILT.paths { Energies::of(&moments) } else { Energies::default() };
     let geometries = moments.iter().zip(&faces).map(|(moment, faces)| {
-        let geometry = Geometry::new(moment, options.tree);
-        geometry.map(|geometry| geometry.with_faces(faces.as_ref()).with_energies(&energies))
+        let geometry = Geometry::with_faces(moment, faces.as_ref(), options.tree);
+        geometry.map(|geometry| geometry.with_energies(&energies))
     });
     let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let precisions = geometries.iter().zip(&moments);
@@ -374,7 +374,7 @@ fn has_kernels(_: &RenderOptions) -> bool {
 /// Returns the precision that [`Precision::Auto`] selects for a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
     let Ranked { scene, faces, .. } = &Ranked::new(scene);
-    let geometry = Geometry::new(scene, None).ok().map(|geometry| geometry.with_faces(faces.as_ref()));
+    let geometry = Geometry::with_faces(scene, faces.as_ref(), None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
     resolved.unwrap_or(Precision::F64)

@@ -54,7 +54,7 @@ pub fn nearest_hits(
     let one_by_one =
         || rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect();
     let ranked = &Ranked::new(scene);
-    let geometry = Geometry::new(&ranked.scene, options.tree)?.with_faces(ranked.faces.as_ref());
+    let geometry = Geometry::with_faces(&ranked.scene, ranked.faces.as_ref(), options.tree)?;
     match resolve(options, &geometry, &ranked.scene) {
         Some(Precision::F64) => {
             let geometry = geometry.with_shared_planes(&ranked.scene).with_shared_surfaces(&ranked.scene);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
-use rayfold_scene::{Lamp, Light, Object, Shine};
+use rayfold_scene::{Lamp, Light, Shine};
 
 use super::shapes::{self, Surface};
 use super::world::{World, glass};
@@ -61,7 +61,8 @@ impl IncidentLight {
     /// occludes the light.
     pub(super) fn let_through(&self, world: &World, start: DVec3) -> Option<DVec3> {
         if !world.has_glass {
-            let hidden = world.objects.iter().any(|object| self.is_hidden_by(object, self.ray(start)));
+            let hidden =
+                (0..world.objects.len()).any(|index| self.is_hidden_by(world, index, self.ray(start)));
             return (!hidden).then_some(DVec3::ONE);
         }
         let mut left = DVec3::ONE;
@@ -83,9 +84,10 @@ impl IncidentLight {
         Ray { origin: start, direction: self.lamp.map_or(self.towards, |lamp| unit(lamp - start)) }
     }
 
-    fn is_hidden_by(&self, object: &Object, ray: Ray) -> bool {
-        shapes::distance(object, ray).is_some_and(|distance| {
-            self.lamp.is_none() || self.is_before(ray, distance, &shapes::surface(object, ray, distance))
+    fn is_hidden_by(&self, world: &World, index: usize, ray: Ray) -> bool {
+        world.distance(index, ray).is_some_and(|distance| {
+            let surface = || shapes::surface(&world.objects[index], ray, distance);
+            self.lamp.is_none() || self.is_before(ray, distance, &surface())
         })
     }
 

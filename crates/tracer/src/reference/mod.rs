@@ -49,7 +49,7 @@ pub(crate) use shapes::{
 pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
-use crate::meshes::{Colors, Expanded, expanded, mesh};
+use crate::meshes::{Colors, Expanded, Faces, expanded, mesh};
 use crate::parallel::{CHANNELS, bands};
 use crate::{RenderError, RenderOptions};
 use shading::Shader;
@@ -116,15 +116,19 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     if objects.iter().any(|object| mesh(object).is_some()) {
         let (objects, faces) = expanded(objects, Colors::default());
-        let hit = nearest(&objects, origin, direction)?;
+        let hit = nearest_of(&objects, Ray { origin, direction }, Some(&faces))?;
         return Some(Hit { object: faces.origin(hit.object), ..hit });
     }
-    let ray = Ray { origin, direction };
+    nearest_of(objects, Ray { origin, direction }, None)
+}
+
+/// Returns the nearest hit among objects that are no meshes.
+fn nearest_of(objects: &[Object], ray: Ray, faces: Option<&Faces>) -> Option<Hit> {
     if objects.iter().any(|object| matches!(object, Object::Instance(_))) {
         let objects: Vec<Object> = objects.iter().map(|o| shapes::in_world(o).into_owned()).collect();
-        world::nearest(&objects, ray, DVec3::ZERO)
+        world::nearest(&objects, ray, DVec3::ZERO, faces)
     } else {
-        world::nearest(objects, ray, DVec3::ZERO)
+        world::nearest(objects, ray, DVec3::ZERO, faces)
     }
 }
 

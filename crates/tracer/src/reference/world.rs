@@ -115,7 +115,12 @@ impl<'a> World<'a> {
     }
 
     pub(super) fn nearest(&self, ray: Ray) -> Option<Hit> {
-        nearest(&self.objects, ray, self.center)
+        nearest(&self.objects, ray, self.center, self.faces)
+    }
+
+    /// Returns the distance to the nearest hit of a ray with the object at `index`.
+    pub(super) fn distance(&self, index: usize, ray: Ray) -> Option<f64> {
+        distance(&self.objects[index], ray, (index, self.center, self.faces))
     }
 
     /// Returns the object, which is not an instance, and the hit point and its normal in the coordinates of the
@@ -149,17 +154,30 @@ const PARALLEL: f64 = 1.0 / (1u64 << 20) as f64;
 /// The distance, relative to the numbers in the computation, above which hits are not compared further.
 const APART: f64 = 1.0 / (1u64 << 30) as f64;
 
+/// Returns the distance to the nearest hit of a ray with an object, of which `index` is the position; none in the hole of a face.
+fn distance(
+    object: &Object,
+    ray: Ray,
+    (index, center, faces): (usize, DVec3, Option<&Faces>),
+) -> Option<f64> {
+    let distance = shapes::distance(object, ray)?;
+    let is_hole = faces.filter(|faces| faces.can_have_holes(index)).is_some_and(|faces| {
+        faces.is_hole(index, shapes::surface(object, ray, distance).point, (center, 1.0))
+    });
+    (!is_hole).then_some(distance)
+}
+
 /// Returns the nearest hit; see [`super::nearest`]. No object is an instance that could be expanded into the world. The
 /// objects' own numbers were rounded when they were moved by `center`.
 ///
 /// Hits are equal to the nearest if they are no farther from its surface than the offsets of new rays from both, and
 /// the surfaces are parallel there. The start of a new ray is outside all of them.
-pub(super) fn nearest(objects: &[Object], ray: Ray, center: DVec3) -> Option<Hit> {
+pub(super) fn nearest(objects: &[Object], ray: Ray, center: DVec3, faces: Option<&Faces>) -> Option<Hit> {
     let rank = |index: usize| (glass(&objects[index]).is_some(), index);
     let mut best: Option<(usize, f64)> = None;
     let mut others: Vec<(usize, f64)> = vec![];
     for (index, object) in objects.iter().enumerate() {
-        let Some(distance) = shapes::distance(object, ray) else { continue };
+        let Some(distance) = distance(object, ray, (index, center, faces)) else { continue };
         let is_before =
             |(other, least): (usize, f64)| distance < least || distance == least && rank(index) < rank(other);
         match best {

@@ -7,6 +7,7 @@ use rayfold_scene::{Material, Mesh, Object, Placement, Triangle};
 use super::Shape;
 use crate::oracle::hit::Hit;
 use crate::oracle::line::Line;
+use crate::oracle::model_color::At;
 use crate::oracle::real::{Real, Vector};
 
 /// The surface of a face of a mesh, as light sees it.
@@ -29,11 +30,29 @@ fn triangle(mesh: &Mesh, k: usize) -> Triangle {
         .unwrap_or_else(|_| unreachable!("positions of a model are finite"))
 }
 
+/// Returns the hit of a line with a triangle of the model beyond `start`, if the triangle has no hole there.
+fn first_on(mesh: &Mesh, k: usize, line: &Line, start: &Real) -> Option<Real> {
+    let t = triangle(mesh, k).first(line, start)?;
+    let model = mesh.model();
+    let weights = weights(model.corners(k), &line.at(&t)).map(|weight| weight.to_f64());
+    let is_hole = model.has_holes() && At { model, triangle: k, weights, linear: false }.is_hole();
+    (!is_hole).then_some(t)
+}
+
+/// Returns the barycentric weights of a point of a triangle.
+fn weights(corners: [DVec3; 3], point: &Vector) -> [Real; 3] {
+    let [a, b, c] = &corners.map(Vector::from);
+    let area = b.minus(a).cross(&c.minus(a));
+    let whole = area.dot(&area);
+    let weight = |p: &Vector, q: &Vector| area.dot(&p.minus(point).cross(&q.minus(point))).over(&whole);
+    [weight(b, c), weight(c, a), weight(a, b)]
+}
+
 /// Returns the first triangle that a line hits at `t`.
 fn hit_at(mesh: &Mesh, line: &Line, t: &Real) -> usize {
     let near = t - &t.magnitude().shifted(-380);
     (0..mesh.model().triangle_count())
-        .find(|k| triangle(mesh, *k).first(line, &near).is_some_and(|first| first <= t + &t.shifted(-380)))
+        .find(|k| first_on(mesh, *k, line, &near).is_some_and(|first| first <= t + &t.shifted(-380)))
         .unwrap_or_default()
 }
 
@@ -47,7 +66,7 @@ impl Shape for Mesh {
     }
 
     fn first(&self, line: &Line, start: &Real) -> Option<Real> {
-        let all = (0..self.model().triangle_count()).filter_map(|k| triangle(self, k).first(line, start));
+        let all = (0..self.model().triangle_count()).filter_map(|k| first_on(self, k, line, start));
         all.reduce(|a, b| if b < a { b } else { a })
     }
 
@@ -73,13 +92,7 @@ pub(in crate::oracle) fn is_of_file(object: &Object) -> bool {
 pub(in crate::oracle) fn texture(object: &Object, line: &Line, hit: &Hit) -> Option<([f64; 2], bool)> {
     let (mesh, local, _) = mesh_of(object, line)?;
     let (model, k) = (mesh.model(), hit_at(mesh, &local, &hit.t));
-    let [a, b, c] = &model.corners(k).map(Vector::from);
-    let point = local.at(&hit.t);
-    let area = b.minus(a).cross(&c.minus(a));
-    let whole = area.dot(&area);
-    let weight =
-        |p: &Vector, q: &Vector| area.dot(&p.minus(&point).cross(&q.minus(&point))).over(&whole).to_f64();
-    let weights = [weight(b, c), weight(c, a), weight(a, b)];
+    let weights = weights(model.corners(k), &local.at(&hit.t)).map(|weight| weight.to_f64());
     let uvs = model.uvs(k)?;
     let sum = |axis: usize| uvs.iter().zip(weights).map(|(uv, weight)| weight * f64::from(uv[axis])).sum();
     Some(([sum(0), sum(1)], model.has_uvs_from_top()))
@@ -105,9 +118,7 @@ pub(in crate::oracle) fn shaded(object: &Object, line: &Line, hit: &Hit, linear:
     let point = local.at(&hit.t);
     let [a, b, c] = &corners;
     let area = b.minus(a).cross(&c.minus(a));
-    let whole = area.dot(&area);
-    let weight = |p: &Vector, q: &Vector| area.dot(&p.minus(&point).cross(&q.minus(&point))).over(&whole);
-    let weights = [weight(b, c), weight(c, a), weight(a, b)];
+    let weights = weights(model.corners(k), &point);
     let faces_away = |v: &Vector| v.dot(&local.direction).sign() > 0;
     let face = if faces_away(&area) { area.opposite() } else { area.clone() };
     let onto = |n: &Vector| if n.dot(&face).sign() < 0 { n.opposite() } else { n.clone() };
@@ -142,14 +153,11 @@ pub(in crate::oracle) fn shaded(object: &Object, line: &Line, hit: &Hit, linear:
         lift = nothing.plus(&Real::from(placement.scale()), &turned(&lift));
     }
     let is_own = mesh.material().finish().is_some_and(|finish| finish.own);
-    let color = match is_own {
-        true => model.color(k, weights.map(|weight| weight.to_f64()), linear),
-        false => DVec3::ONE,
-    };
-    let look = model.look(k);
     let is_of_file = is_own && !mesh.has_material();
-    let glow = if is_of_file { model.glow(look, linear) } else { DVec3::ZERO };
-    Some(Shaded { normal, lift, color, glow, unlit: is_of_file && model.looks()[look].unlit })
+    let at = At { model, triangle: k, weights: weights.map(|weight| weight.to_f64()), linear };
+    let color = if is_own { at.color() } else { DVec3::ONE };
+    let glow = if is_of_file { at.glow() } else { DVec3::ZERO };
+    Some(Shaded { normal, lift, color, glow, unlit: is_of_file && model.looks()[model.look(k)].unlit })
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, capsules, boxes with
-//! round edges, and rotated boxes.
+//! round edges, and rotated boxes; and triangles with holes.
 //!
 //! Each shape has its own file, with its intersection and its surface in the shape's coordinates. The common parts are
 //! here: the transformation into these coordinates and back, the offset of new rays, and the search. None of it is part
@@ -15,11 +15,14 @@ mod body_culler;
 mod capsule;
 mod cone;
 mod cuboid;
+mod cutout;
 mod disc;
 mod plane;
 mod roundbox;
 mod solid;
 mod torus;
+
+use std::sync::Arc;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -30,6 +33,8 @@ use self::body_culler::BodyCuller;
 use self::capsule::{Capsule, CapsuleForm};
 use self::cone::{Cone, ConeForm};
 use self::cuboid::{Cuboid, CuboidForm};
+use self::cutout::{Cutout, CutoutForm};
+pub(super) use self::cutout::{Holes, cutout};
 use self::disc::{Disc, DiscForm};
 use self::plane::PlaneForm;
 use self::roundbox::{Roundbox, RoundboxForm};
@@ -70,6 +75,7 @@ enum AnyForm {
     Capsule(CapsuleForm),
     Roundbox(RoundboxForm),
     Cuboid(CuboidForm),
+    Cutout(CutoutForm),
 }
 
 impl AnyForm {
@@ -112,12 +118,13 @@ impl AnyForm {
             Self::Capsule(form) => form,
             Self::Roundbox(form) => form,
             Self::Cuboid(form) => form,
+            Self::Cutout(form) => form,
         }
     }
 }
 
 /// A shape in its own coordinates, as the kernels use it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 enum Shape<E> {
     Plane,
     Disc(Disc<E>),
@@ -127,6 +134,8 @@ enum Shape<E> {
     Capsule(Capsule<E>),
     Roundbox(Roundbox<E>),
     Cuboid(Cuboid<E>),
+    /// In the coordinates of the scene.
+    Cutout(Box<Cutout<E>>),
 }
 
 impl<E> Shape<E> {
@@ -141,12 +150,13 @@ impl<E> Shape<E> {
             Self::Capsule(_) => BUILT.capsules,
             Self::Roundbox(_) => BUILT.roundboxes,
             Self::Cuboid(_) => BUILT.turned_boxes,
+            Self::Cutout(_) => BUILT.pictures && BUILT.meshes,
         }
     }
 }
 
 /// A body as the kernels use it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Body<E> {
     /// Orthonormal axes. The last is the axis of symmetry of round shapes.
     axes: [[E; 3]; 3],
@@ -159,7 +169,8 @@ pub(super) struct Body<E> {
 }
 
 impl<E: Real> Body<E> {
-    fn new(solid: &Solid) -> Self {
+    /// Makes a body. `holes` are those of the triangles that have some.
+    fn new(solid: &Solid, holes: Option<&Arc<Holes>>) -> Self {
         let shape = match solid.form {
             AnyForm::Plane(_) => Shape::Plane,
             AnyForm::Disc(DiscForm { radius }) => Shape::Disc(Disc::new(radius)),
@@ -172,6 +183,10 @@ impl<E: Real> Body<E> {
             }
             AnyForm::Roundbox(RoundboxForm { half, radius }) => Shape::Roundbox(Roundbox::new(half, radius)),
             AnyForm::Cuboid(CuboidForm { half }) => Shape::Cuboid(Cuboid::new(half)),
+            AnyForm::Cutout(form) => match holes {
+                Some(holes) => Shape::Cutout(Box::new(Cutout::new(form, solid.order, holes.clone()))),
+                None => unreachable!("triangles are bodies for their holes alone"),
+            },
         };
         Self {
             axes: solid.frame.axes.map(|axis| axis.to_array().map(E::narrow)),
@@ -248,6 +263,7 @@ impl<E: Real> Body<E> {
                         Shape::Capsule(capsule) => capsule.intersect(simd, local),
                         Shape::Roundbox(roundbox) => roundbox.intersect(simd, local),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
+                        Shape::Cutout(cutout) => return cutout.intersect(simd, ray, nearest),
                         Shape::Plane | Shape::Disc(_) => return,
                     };
                     nearest.offer(simd, hit, distance, self.order);
@@ -299,6 +315,7 @@ impl<E: Real> Body<E> {
                     Shape::Cuboid(cuboid) => {
                         self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
                     }
+                    Shape::Cutout(cutout) => return cutout.surface(simd, ray, distance),
                 };
                 let BodyHit { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
@@ -337,7 +354,8 @@ enum Way<E> {
 }
 
 impl<E: Real> Bodies<E> {
-    pub(super) fn new(solids: &[Solid]) -> Self {
+    /// `holes` are those of the triangles that have some.
+    pub(super) fn new(solids: &[Solid], holes: Option<&Arc<Holes>>) -> Self {
         let (mut planes, mut bounded): (Vec<Solid>, Vec<Solid>) =
             solids.iter().copied().partition(|solid| solid.bounds().is_none());
         let branches = group(&mut bounded, Some(true), Copies::Kept);
@@ -350,7 +368,7 @@ impl<E: Real> Bodies<E> {
             Some(tree) => Way::Both(tree),
             None => Way::Planes,
         };
-        Self { bodies: planes.iter().map(Body::new).collect(), planes: count, way, few }
+        Self { bodies: planes.iter().map(|solid| Body::new(solid, holes)).collect(), planes: count, way, few }
     }
 
     /// Returns, for each body, its order in the script and its index here.

@@ -107,6 +107,10 @@ pub(super) fn flat(normal: DVec3, center: DVec3, radius: f64, plain: Plain) -> S
 }
 
 impl Solid {
+    pub(super) fn new(frame: Frame, form: AnyForm, order: u32) -> Self {
+        Self { frame, form, order, reach: 0.0 }
+    }
+
     /// Returns at least the largest of its coordinates and lengths.
     pub(super) fn extent(&self) -> f64 {
         self.frame.center.abs().max_element() + self.form.form().size()

@@ -31,7 +31,8 @@ impl<E: Real> Extensions<E> {
     /// Returns `None` for a scene that uses none of these features.
     pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         is_needed(geometry).then(|| Self {
-            bodies: (!geometry.bodies.is_empty()).then(|| Bodies::new(&geometry.bodies)),
+            bodies: (!geometry.bodies.is_empty())
+                .then(|| Bodies::new(&geometry.bodies, geometry.holes.as_ref())),
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
             glass: Glass::new(scene, geometry.faces.as_deref()),

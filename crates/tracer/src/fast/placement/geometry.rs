@@ -54,6 +54,8 @@ pub(crate) struct Geometry {
     pub(crate) shared: Option<SharedSurfaces>,
     /// The faces that triangles are, if they have more than triangles.
     pub(crate) faces: Option<Arc<Faces>>,
+    /// The holes of faces, if any can have some. Those faces are among the bodies.
+    pub(crate) holes: Option<Arc<bodies::Holes>>,
     /// A length of the scene times this is a length in these coordinates.
     pub(crate) scale: f64,
     /// The origin of these coordinates in the scene: `(point - center) * scale` is a point in these coordinates.
@@ -61,11 +63,23 @@ pub(crate) struct Geometry {
 }
 
 impl Geometry {
-    /// Converts a scene. `tree` sets whether objects are found by a tree, if it matters.
+    /// Converts a scene whose triangles are no faces of meshes. `tree` sets whether objects are found by a tree, if it matters.
     ///
     /// # Errors
     /// If the scene is so large that its size is not a finite number.
     pub(crate) fn new(scene: &Scene, tree: Option<bool>) -> Result<Self, RenderError> {
+        Self::with_faces(scene, None, tree)
+    }
+
+    /// Converts a scene, of which some triangles may be faces of meshes.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub(crate) fn with_faces(
+        scene: &Scene,
+        faces: Option<&Arc<Faces>>,
+        tree: Option<bool>,
+    ) -> Result<Self, RenderError> {
         let center = match &scene.camera {
             Camera::Pinhole(pinhole) => pinhole.eye(),
             Camera::Look(look) => look.eye(),
@@ -94,13 +108,16 @@ impl Geometry {
         let solids = shapes.into_iter().enumerate();
         let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
         let mut solids: Vec<Solid> = solids.collect();
+        let holes = faces.filter(|faces| faces.have_holes());
+        let holes = holes.map(|faces| Arc::new(bodies::Holes { faces: faces.clone(), center, scale }));
+        let cutouts = holes.iter().flat_map(|holes| take_cutouts(&mut solids, &holes.faces)).collect();
         let is_finished = scene.objects.iter().any(|object| object.material().finish().is_some());
         // If objects are at the same distance, one that is not glass is visible.
         let copies = if is_finished { Copies::Kept } else { Copies::Dropped };
         let branches = group(&mut solids, tree, copies);
         let orders = scene.objects.iter().filter(|_| has_bodies).zip(0..);
-        let bodies =
-            orders.filter_map(|(object, order)| bodies::body(object, order, center, scale)).collect();
+        let bodies = orders.filter_map(|(object, order)| bodies::body(object, order, center, scale));
+        let bodies = merged(bodies.collect(), cutouts);
         let lamps = lamps(scene).map(|lamp| Place::new(lamp, center, scale)).collect();
         let suns = scene.lights.iter().filter_map(|light| match light {
             Light::Directional(light) => Some(Direction {
@@ -123,7 +140,8 @@ impl Geometry {
             goes_round: scene.goes_round(),
             is_foggy: scene.fog.get().is_some(),
             shared: None,
-            faces: None,
+            faces: faces.filter(|faces| faces.are_shaded()).cloned(),
+            holes,
             scale,
             center,
         })
@@ -131,11 +149,6 @@ impl Geometry {
 }
 
 impl Geometry {
-    /// Adds what the faces of meshes have beyond triangles.
-    pub(crate) fn with_faces(self, faces: Option<&Arc<Faces>>) -> Self {
-        Self { faces: faces.filter(|faces| faces.are_shaded()).cloned(), ..self }
-    }
-
     /// Adds the microfacets of rough objects.
     pub(crate) fn with_energies(self, energies: &Energies) -> Self {
         Self { energies: energies.clone(), ..self }
@@ -143,12 +156,16 @@ impl Geometry {
 
     /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.
     pub(crate) fn with_shared_planes(mut self, scene: &Scene) -> Self {
-        let first = scene.objects.first().map(Object::material);
-        if scene.objects.iter().any(|object| Some(object.material()) != first) {
+        if self.are_distinct() || !have_one_material(scene) {
             let solids: &mut Vec<Solid> = Arc::make_mut(&mut self.solids);
             planes::share(solids);
         }
         self
+    }
+
+    /// Returns whether surfaces of one material can have unlike colours.
+    pub(crate) fn are_distinct(&self) -> bool {
+        self.faces.as_ref().is_some_and(|faces| faces.have_colors())
     }
 
     /// Returns a lower bound of the distance between the origin and a solid's surface.
@@ -174,6 +191,34 @@ impl Geometry {
             None => self.solids.iter().map(|solid| solid.shape.bounds()).reduce(join).unwrap_or_default(),
         }
     }
+}
+
+/// Takes the triangles that can have holes out of solids.
+fn take_cutouts(solids: &mut Vec<Solid>, faces: &Faces) -> Vec<bodies::Solid> {
+    let mut cutouts = Vec::new();
+    solids.retain(|solid| match solid.shape {
+        Shape::Triangle(triangle) if faces.can_have_holes(solid.order as usize) => {
+            cutouts.push(bodies::cutout(triangle, solid.order));
+            false
+        }
+        Shape::Triangle(_) | Shape::Sphere(_) | Shape::Cuboid(_) => true,
+    });
+    cutouts
+}
+
+/// Returns bodies of two kinds in the order of the script.
+fn merged(mut bodies: Vec<bodies::Solid>, cutouts: Vec<bodies::Solid>) -> Vec<bodies::Solid> {
+    if !cutouts.is_empty() {
+        bodies.extend(cutouts);
+        bodies.sort_by_key(bodies::Solid::order);
+    }
+    bodies
+}
+
+/// Returns whether all objects have the same material.
+pub(crate) fn have_one_material(scene: &Scene) -> bool {
+    let first = scene.objects.first().map(Object::material);
+    scene.objects.iter().all(|object| Some(object.material()) == first)
 }
 
 /// Returns whether an object may be a body.

@@ -1,0 +1,63 @@
+//! Pictures of a model: how they lie on its faces.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use crate::picture::Picture;
+
+/// The continuation of a picture beyond its edges, along one of its axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// It repeats.
+    #[default]
+    Repeat,
+    /// It repeats, every other time mirrored.
+    Mirror,
+    /// Its first and last pixels go on.
+    Clamp,
+}
+
+/// The use of a picture by the faces of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    /// A factor of their colour.
+    Color,
+    /// A factor of the light that they give off.
+    Glow,
+}
+
+/// A picture on the faces of a model.
+#[derive(Clone, Debug)]
+pub struct Texture {
+    pub(crate) picture: Arc<Picture>,
+    pub(crate) wraps: [Wrap; 2],
+    /// Whether it lies by texture coordinates of its own, and not by those of an `image` with `uv`.
+    pub(crate) has_own_uvs: bool,
+    /// The rows of an affine map of texture coordinates: the factors of u and v, and what is added.
+    pub(crate) transform: Option<[[f64; 3]; 2]>,
+}
+
+impl Texture {
+    /// Makes a picture that repeats, by the texture coordinates as they stand.
+    pub(crate) fn new(picture: Arc<Picture>) -> Self {
+        Self { picture, wraps: [Wrap::Repeat; 2], has_own_uvs: false, transform: None }
+    }
+
+    /// Returns the picture.
+    pub fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// Returns how the picture goes on across and down.
+    pub fn wraps(&self) -> [Wrap; 2] {
+        self.wraps
+    }
+
+    /// Returns the place of texture coordinates after the transform of the material.
+    pub fn transformed(&self, uv: DVec2) -> DVec2 {
+        let Some([across, down]) = self.transform else { return uv };
+        let row = |[a, b, c]: [f64; 3]| a * uv.x + b * uv.y + c;
+        DVec2::new(row(across), row(down))
+    }
+}
