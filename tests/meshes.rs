@@ -10,7 +10,7 @@ use image::RgbImage;
 use rayfold_scene::assets::{Library, MemoryFiles};
 use rayfold_scene::{Limits, Object, Scene, parse_with_files};
 use rayfold_tracer::probe::nearest_hits;
-use rayfold_tracer::{RenderOptions, reference, render};
+use rayfold_tracer::{Exposure, RenderOptions, first_hits, reference, render, render_picture};
 
 /// The triangles of a ball of radius 1, seen counterclockwise from outside, of about 2n² triangles.
 fn ball(n: usize) -> Vec<[DVec3; 3]> {
@@ -164,7 +164,10 @@ const STAGE: &str = "Screen 80 60\nLook 3 2.5 5 0 .2 0 32\nBackground .9 .95 1 .
                      .01 floor\n";
 
 fn scene(lines: &str) -> Scene {
-    let text = format!("{STAGE}{lines}\nTrace");
+    first_frame(&format!("{STAGE}{lines}\nTrace"))
+}
+
+fn first_frame(text: &str) -> Scene {
     let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library());
     parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap()
 }
@@ -466,4 +469,25 @@ fn pictures_and_holes_are_the_same_bytes_for_all_tiles_and_trees() {
             assert!(render(&scene, &options).unwrap() == usual, "{lines} {tile:?} {tree:?}");
         }
     }
+}
+
+/// A pixel is clear where its ray meets nothing, and where it meets a hole.
+#[test]
+fn first_hits_pass_through_holes() {
+    let text = "Screen 80 60\nLook .4 .3 4 0 0 0 32\nBackground none\nMesh \"leaf.gltf\"\nTrace";
+    let scene = first_frame(text);
+    let hits = first_hits(&scene, &RenderOptions::default()).unwrap();
+    let picture = render_picture(Exposure::still(&scene), &RenderOptions::default()).unwrap().into_rgba8();
+    let (mut seen, mut holes) = (0, 0);
+    for (pixel, hit) in picture.pixels().zip(&hits) {
+        assert_eq!(pixel.0[3] > 0, hit.object == 1, "{pixel:?} {hit:?}");
+        seen += u32::from(hit.object == 1);
+    }
+    // Within the square that the model is.
+    let square = first_frame(&text.replace("Mesh \"leaf.gltf\"", "Mesh \"quads.gltf\""));
+    for (hit, of_square) in hits.iter().zip(first_hits(&square, &RenderOptions::default()).unwrap()) {
+        holes += u32::from(of_square.object == 1 && hit.object == 0);
+        assert!(of_square.object == 1 || hit.object == 0);
+    }
+    assert!(seen > 100 && holes > 100, "{seen} {holes}");
 }

@@ -193,9 +193,7 @@ pub(crate) fn duplicate(lines: &[Line], which: &[usize], aside: f64) -> (Vec<Spl
 /// Moves all positions of a line, or returns `None` if it has none. Numbers that do not change are not rewritten.
 pub(crate) fn moved(line: &Line, by: DVec3, keying: Keying) -> Option<Line> {
     let values = Values::of(line, keying.time)?;
-    if values.positions().next().is_none() {
-        return None;
-    }
+    values.positions().next()?;
     values.positions().try_fold(line.clone(), |line, (first, position)| {
         let to = [0, 1, 2]
             .map(|axis| if by[axis] == 0.0 { position[axis] } else { tidy(position[axis] + by[axis]) });

@@ -90,8 +90,8 @@ impl<'a> Finder<'a> {
     /// Those of [`crate::render`].
     pub(crate) fn new(scene: &'a Scene, options: &RenderOptions<'a>) -> Result<Option<Self>, RenderError> {
         let ranked = Ranked::new(scene);
-        let geometry =
-            if has_kernels(options) { Geometry::new(&ranked.scene, options.tree).ok() } else { None };
+        let geometry = || Geometry::with_faces(&ranked.scene, ranked.faces.as_ref(), options.tree).ok();
+        let geometry = if has_kernels(options) { geometry() } else { None };
         let in_double = RenderOptions { precision: Precision::F64, ..*options };
         let can_hold = |geometry: &Geometry| resolve(&in_double, geometry, &ranked.scene).is_some();
         let Some(geometry) = geometry.filter(can_hold) else { return Ok(None) };
