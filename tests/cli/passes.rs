@@ -47,11 +47,11 @@ fn hits(scene: &Scene) -> Vec<FirstHit> {
     first_hits(scene, &RenderOptions::default()).unwrap()
 }
 
-/// The channels of a file, each with its name.
-type Channels = Vec<(String, Vec<f32>)>;
+/// The numbers of a channel, with its name.
+type Channel = (String, Vec<f32>);
 
-/// Returns the size, the channels by name, and the comment of an `.exr`.
-fn decoded(file: &[u8]) -> ((usize, usize), Channels, String) {
+/// Returns the size, the channels, and the comment of an `.exr`.
+fn decoded(file: &[u8]) -> ((usize, usize), Vec<Channel>, String) {
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
