@@ -31,7 +31,7 @@ const SEED: u64 = 20_261_126;
 const NEARBY: f64 = 1e-6;
 
 /// Rays and objects that the plain tracer may compare for one scene: a few seconds.
-const PAIRS: usize = 40_000_000;
+const PAIRS: usize = 14_000_000;
 
 /// What the plain tracer finds along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
