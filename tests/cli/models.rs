@@ -87,8 +87,13 @@ fn pictures_are_read_copied_and_missed_as_models_are() {
     let map = include_bytes!("../../crates/scene/tests/pixel.png");
     folder.write("film/my map.png", map);
     folder.write("film/unused.exr", "no picture");
+    folder.write("film/unused.otf", "no font");
+    folder.write("film/0001.depth.exr", "a pass");
     let text = said(0);
-    assert!(text.contains("unused.exr: no script names this file"), "{text}");
+    for unused in ["unused.exr", "unused.otf"] {
+        assert!(text.contains(&format!("{unused}: no script names this file")), "{text}");
+    }
+    assert!(!text.contains("depth.exr"), "{text}");
     assert!(!text.contains("sky.hdr") && !text.contains("my map.png"), "{text}");
     folder.rayfold("render film -o film.gif").assert().code(0);
     folder.rayfold("split film/1.txt parts").assert().code(0);

@@ -11,6 +11,7 @@ use crate::input::{Input, stdin_once};
 use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::plan::{Plan, Wishes};
+use crate::render::passes::is_pass;
 use crate::survey::{Conflict, Faults};
 use crate::threads::Threads;
 use crate::values;
@@ -134,7 +135,7 @@ fn unused_files(folder: &Path) -> Vec<PathBuf> {
     let named = named_by_scripts();
     let is_meant = |path: &Path| {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        NAMED.contains(&ending.as_str()) && path.is_file()
+        NAMED.contains(&ending.as_str()) && !is_pass(path) && path.is_file()
     };
     let entries = folder.read_dir().into_iter().flatten();
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));

@@ -29,7 +29,7 @@ use crate::wording::{Size, number};
 
 pub(crate) mod fit;
 pub(crate) mod movie;
-mod passes;
+pub(crate) mod passes;
 pub(crate) mod target;
 mod watch;
 

@@ -129,6 +129,12 @@ impl Pass {
     }
 }
 
+/// Returns whether a file has the name of a pass, such as `frame.depth.exr`.
+pub(crate) fn is_pass(path: &Path) -> bool {
+    let inner = path.file_stem().map(Path::new).and_then(Path::extension);
+    inner.is_some_and(|inner| Pass::value_variants().iter().any(|pass| inner == pass.name()))
+}
+
 impl PassFormat {
     fn ending(self) -> &'static str {
         match self {
