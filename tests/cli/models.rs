@@ -94,7 +94,8 @@ fn pictures_are_read_copied_and_missed_as_models_are() {
         assert!(text.contains(&format!("{unused}: no script names this file")), "{text}");
     }
     assert!(!text.contains("depth.exr"), "{text}");
-    assert!(!text.contains("sky.hdr") && !text.contains("my map.png"), "{text}");
+    assert!(text.contains("`sky.hdr` has 4 x 1 pixels, and is stretched around the scene"), "{text}");
+    assert!(!text.contains("sky.hdr: ") && !text.contains("my map.png"), "{text}");
     folder.rayfold("render film -o film.gif").assert().code(0);
     folder.rayfold("split film/1.txt parts").assert().code(0);
     assert_eq!(folder.list("parts"), ["1-1.txt", "1-2.txt", "my map.png", "sky.hdr"]);

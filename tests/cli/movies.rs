@@ -139,7 +139,7 @@ fn a_webp_is_every_frame_without_loss() {
         assert_eq!(ms, if number == 5 { 1_500 } else { 80 }, "frame {number}");
     }
     // Read back by this program, too.
-    folder.rayfold("render balls -o balls.gif --fps 12.5 --final-delay 1.5").assert().code(0);
+    folder.rayfold("render balls -o balls.gif --fps 12.5 --loop 2 --final-delay 1.5").assert().code(0);
     folder.rayfold("encode balls.webp -o parts.gif").assert().code(0);
     assert!(folder.read("parts.gif") == folder.read("balls.gif"));
     // Above 90 frames a second as an APNG.

@@ -89,6 +89,7 @@ fn a_script_with_curves_is_split_into_its_frames() {
 "#]]);
     let part = |k: usize| String::from_utf8(folder.read(&format!("parts/wave-{k}.txt"))).unwrap();
     assert!(part(1).contains("\nFrames 2 2\n") && part(1).contains("(smooth 1:1 6:2)"), "{}", part(1));
+    assert!(part(6).contains("\nFrames 1\nTrace"), "{}", part(6));
     assert!(part(7).contains("\nFrames 2 2\n") && !part(7).contains("skin"), "{}", part(7));
     folder.rayfold("check parts").assert().code(0).stderr_eq(str![[r#"
 8 files, 8 frames: no errors

@@ -44,6 +44,15 @@ error: nothing was written: 1 error
     let model: String = (0..1_000).map(|i| format!("v {i} 0 0\nf {i} 1 2\n")).collect();
     folder.write("a.obj", model);
     let message = said(&folder, "check a.obj", 1);
+    assert!(
+        message.starts_with(
+            "error: a.obj: this is an OBJ model, not a scene script: `Mesh \"FILE\"` in a script draws it\n"
+        ),
+        "{message}"
+    );
+    let other: String = (0..1_000).map(|i| format!("moveto {i} 0\nlineto {i} 1\n")).collect();
+    folder.write("a.ps", other);
+    let message = said(&folder, "check a.ps", 1);
     assert_eq!(message.matches("error: unknown command").count(), 10, "{message}");
     assert!(message.contains("error: 1,991 more errors from here on"), "{message}");
 }

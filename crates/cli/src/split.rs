@@ -1,5 +1,6 @@
 //! `rayfold split`: a script with many Traces becomes a folder with a script a frame.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -66,7 +67,7 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     for number in 1..=script.frame_count() {
         anyhow::ensure!(!interrupt::stopping(), "interrupted");
         let frame = script.only(number - 1).context("a frame of the script is missing")?;
-        OutputFile::write(folder.join(name(number)), frame.to_string().as_bytes(), false)?;
+        OutputFile::write(folder.join(name(number)), part(&frame.to_string()).as_bytes(), false)?;
     }
     let first = folder.join(name(1));
     console.note(format_args!(
@@ -75,6 +76,15 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
         first.display()
     ));
     Ok(Outcome::Done)
+}
+
+/// Returns the text of a part. One with curves says that it is a single frame, so that nobody takes it for a script whose frames
+/// were forgotten.
+fn part(text: &str) -> Cow<'_, str> {
+    if text.contains('(') && !text.contains("\nFrames ") {
+        return text.replacen("\nTrace", "\nFrames 1\nTrace", 1).into();
+    }
+    text.into()
 }
 
 /// Copies the files that a script names into the folder, as far as they are there.

@@ -13,7 +13,7 @@ use crate::meshes::Expanded;
 use crate::parallel::bands_of;
 use crate::parts;
 use crate::reference::{FirstSurface, FirstSurfaces};
-use crate::{Exposure, RenderError, RenderOptions};
+use crate::{RenderError, RenderOptions};
 
 /// What the ray through the middle of a pixel hits first.
 ///
@@ -63,7 +63,7 @@ impl Default for FirstHit {
 /// # Errors
 /// The errors of [`crate::render`].
 pub fn first_hits(scene: &Scene, options: &RenderOptions) -> Result<Vec<FirstHit>, RenderError> {
-    parts::check(&Exposure::still(scene))?;
+    parts::check(scene)?;
     let dark = Scene { lights: SharedSlice::default(), fog: Fog::default(), ..scene.clone() };
     let finder = Finder::new(&dark, options)?;
     let (ranked, faces) = match &finder {

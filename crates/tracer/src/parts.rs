@@ -6,8 +6,8 @@
 use rayfold_scene::model::Finish;
 use rayfold_scene::{Light, Object, Scene, Tone};
 
+use crate::RenderError;
 use crate::reference::turns_axes_to_axes;
-use crate::{Exposure, RenderError};
 
 /// A part that a build can leave out.
 #[derive(Clone, Copy)]
@@ -71,12 +71,12 @@ parts! {
 ///
 /// # Errors
 /// If the build lacks a part that the scene uses.
-pub(crate) fn check(shot: &Exposure) -> Result<(), RenderError> {
+pub(crate) fn check(scene: &Scene) -> Result<(), RenderError> {
     // A constant, so that a build with all parts compiles no check.
     if const { has_all() } {
         return Ok(());
     }
-    let missing = PARTS.iter().find(|part| !part.is_built && (part.is_used)(shot.scene()));
+    let missing = PARTS.iter().find(|part| !part.is_built && (part.is_used)(scene));
     missing.map_or(Ok(()), |part| Err(RenderError::LeftOut { feature: part.feature }))
 }
 

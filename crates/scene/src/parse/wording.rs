@@ -40,9 +40,9 @@ pub(super) fn not_text(what: &str) -> Fault {
     if what == super::foreign::UTF_16 {
         return utf16();
     }
-    let fault = Fault::new(Code::NotText, format!("this is {what}, not a scene script"))
-        .expected("expected a text file with commands such as `Screen 640 480`");
-    if what.ends_with("model") { fault.help("`Mesh \"FILE\"` in a script draws it") } else { fault }
+    let hint = if what.ends_with("model") { ": `Mesh \"FILE\"` in a script draws it" } else { "" };
+    Fault::new(Code::NotText, format!("this is {what}, not a scene script{hint}"))
+        .expected("expected a text file with commands such as `Screen 640 480`")
 }
 
 pub(super) fn lone_carriage_return() -> Fault {

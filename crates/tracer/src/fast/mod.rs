@@ -86,7 +86,7 @@ impl<'a> Drawing<'a> {
     /// # Errors
     /// If this build leaves out a feature that the scene needs.
     pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
-        parts::check(&exposure)?;
+        parts::check(exposure.scene())?;
         let scene = exposure.scene();
         if parts::BUILT.samples && scene.samples.most() > 1 {
             return Ok(Self(
