@@ -104,3 +104,23 @@ fn pictures_are_read_copied_and_missed_as_models_are() {
     folder.write("film/sky.hdr", &LIGHT[..20]);
     assert!(said(1).contains("`sky.hdr`: its header has no end"), "{}", said(1));
 }
+
+#[test]
+fn no_output_replaces_a_picture_or_a_model_that_is_read() {
+    let folder = Folder::with(
+        "a.txt",
+        "Screen 8 6\nMaterial m ambient 1 1 1 image \"a.albedo.png\" ball\nSphere 1 0 0 -5 m\nMesh \"a.obj\"\nIlight 1 1 1 0 0 -1\nTrace\n",
+    );
+    let map = include_bytes!("../../crates/scene/tests/pixel.png");
+    folder.write("a.albedo.png", map);
+    folder.write("a.obj", CORNER);
+    folder.write("colours.mtl", COLORS);
+    for args in ["-o a.png --pass albedo --pass-format png", "-o a.albedo.png"] {
+        let run = folder.rayfold(&format!("render a.txt {args}")).output().unwrap();
+        let said = String::from_utf8(run.stderr).unwrap();
+        assert_eq!(run.status.code(), Some(2), "{said}");
+        assert!(said.contains("a.albedo.png would replace"), "{said}");
+        assert_eq!(folder.read("a.albedo.png"), map, "{args}");
+    }
+    folder.rayfold("render a.txt -o b.png --pass albedo --pass-format png").assert().code(0);
+}

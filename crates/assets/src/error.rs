@@ -68,7 +68,9 @@ pub enum AssetError {
         name: String,
     },
     /// The model has no triangle that can be seen.
-    #[error("`{name}` has no triangle with an area")]
+    #[error(
+        "`{name}` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff"
+    )]
     NoTriangle {
         /// The name of the file.
         name: String,

@@ -58,7 +58,8 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
 
 /// Returns the text of a line after its first word, without blanks around it.
 fn rest_of(line: &[u8], word: &[u8]) -> String {
-    let at = line.windows(word.len()).position(|w| w == word).unwrap_or_default() + word.len();
+    let is_word = |window: &[u8]| window.eq_ignore_ascii_case(word);
+    let at = line.windows(word.len()).position(is_word).unwrap_or_default() + word.len();
     String::from_utf8_lossy(&line[at..]).trim().to_string()
 }
 
@@ -297,7 +298,7 @@ impl Reader {
                 Some(bytes) => self.read_materials(&name, &bytes, refer)?,
                 None => {
                     self.lacks_library = true;
-                    let warning = format!("there is no file `{name}`: what has its materials is grey");
+                    let warning = refer.absence(&name, "what has its materials is grey");
                     self.parts.warnings.push(warning);
                 }
             }
@@ -313,6 +314,12 @@ impl Reader {
             let Some(Map { library, line, path }) = self.pictures.get(&number) else {
                 let is_named = number > 0 && !self.defined.contains(&number);
                 self.parts.looks[number as usize].is_missing = self.lacks_library && is_named;
+                if is_named && !self.lacks_library && !self.defined.is_empty() {
+                    let name = self.names.iter().find(|(_, of)| **of == number).map(|(name, _)| name);
+                    let name = String::from_utf8_lossy(name.map_or(b"", Vec::as_slice));
+                    let warning = format!("no library has the material `{name}`: what has it is grey");
+                    self.parts.warnings.push(warning);
+                }
                 continue;
             };
             let look = &mut self.parts.looks[number as usize];
@@ -323,7 +330,7 @@ impl Reader {
                 Some(picture) => look.texture = Some(Texture::new(picture)),
                 None => {
                     look.is_missing = true;
-                    let warning = format!("there is no file `{path}`: what has this picture is grey");
+                    let warning = refer.absence(path, "what has this picture is grey");
                     if !self.parts.warnings.contains(&warning) {
                         self.parts.warnings.push(warning);
                     }
@@ -362,8 +369,15 @@ impl Reader {
                         self.parts.looks[look as usize].factor = Some(color);
                     }
                 }
-                Some(b"map_Kd") => {
+                // Some programs write it in small letters.
+                Some(word) if word.eq_ignore_ascii_case(b"map_Kd") => {
                     let path = rest_of(&text, b"map_Kd");
+                    if path.is_empty() {
+                        self.parts
+                            .warnings
+                            .push(format!("line {line} of `{file}`: `map_Kd` names no picture"));
+                        continue;
+                    }
                     let begins = words.clone().next().is_some_and(|word| word.len() > 1 && word[0] == b'-');
                     let has_option = words.any(|word| OPTIONS.contains(&word));
                     if begins || has_option && !refer.exists(&path).map_err(within)? {

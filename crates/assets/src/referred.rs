@@ -133,6 +133,14 @@ impl<'a> Referred<'a> {
         Ok(info.map(|_| name.into()))
     }
 
+    /// Returns the warning of a model that does without a file, and the effect of that.
+    pub(crate) fn absence(&self, path: &str, effect: &str) -> String {
+        let name = last_part(path);
+        let similar = self.files.names().into_iter().find(|other| same_but_for_case(other, name));
+        let similar = similar.map(|other| format!(" (there is `{other}`: names are compared byte for byte)"));
+        format!("there is no file `{path}`{}: {effect}", similar.unwrap_or_default())
+    }
+
     /// Returns the error for a file that a model cannot do without.
     pub(crate) fn absent(&mut self, path: &str) -> Fault {
         let error = absent(self.files, last_part(path));

@@ -229,8 +229,14 @@ fn what_is_wrong_is_said() {
         (b"v 0 0 nan\n", "`x`, line 1: `nan` is not a finite number"),
         (b"v 0 0\n", "`x`, line 1: 2 of 3 numbers"),
         (b"v 0 0 0\nv 1 0 0\nf 1 2\n", "`x`, line 3: a face of 2 corners"),
-        (b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "`x` has no triangle with an area"),
-        (b"hello\n", "`x` has no triangle with an area"),
+        (
+            b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
+            "`x` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff",
+        ),
+        (
+            b"hello\n",
+            "`x` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff",
+        ),
         (b"\x7fELF\0\0", "`x`: it is no model"),
         (b"ply\nformat ascii 2.0\n", "`x`, line 2: `format ascii 2.0` is no line of a header"),
         (b"{}", "`x`: it is not glTF of version 2"),

@@ -51,6 +51,23 @@ fn a_picture_of_an_obj_is_that_of_its_material() {
 }
 
 #[test]
+fn what_other_programs_write_is_read_or_said() {
+    let warnings = |obj: &str, mtl: &str, name: &str| {
+        let model = read_obj(obj, mtl, name, png()).unwrap();
+        let has_picture = model.looks()[model.look(0)].texture(Slot::Color).is_some();
+        (has_picture, model.warnings().to_vec())
+    };
+    assert_eq!(warnings(OBJ, "newmtl m\nmap_kd r.png\n", "r.png"), (true, vec![]), "in small letters");
+    let other_case = "there is no file `R.PNG` (there is `r.png`: names are compared byte for byte): what has this picture is grey";
+    assert_eq!(warnings(OBJ, "newmtl m\nmap_Kd R.PNG\n", "r.png"), (false, vec![other_case.into()]));
+    let empty = "line 2 of `a.mtl`: `map_Kd` names no picture";
+    assert_eq!(warnings(OBJ, "newmtl m\nmap_Kd\n", "r.png"), (false, vec![empty.into()]));
+    let unknown = "no library has the material `m`: what has it is grey";
+    let (_, said) = warnings(OBJ, "newmtl other\nKd 1 0 0\n", "r.png");
+    assert!(said.contains(&unknown.into()), "{said:?}");
+}
+
+#[test]
 fn factors_multiply_before_they_are_clamped() {
     let model = read_obj(OBJ, "newmtl m\nKd 2 2 2\nmap_Kd a.png", "a.png", png()).unwrap();
     assert_eq!(color(&model, DVec3::splat(0.25)), DVec3::splat(0.5));

@@ -79,7 +79,8 @@ impl<'a, 'b> Pictures<'a, 'b> {
                 let path = decoded_path(uri)?;
                 let picture = self.referred.picture(&path)?;
                 if picture.is_none() {
-                    self.warn(format!("there is no file `{path}`: {effect}"));
+                    let warning = self.referred.absence(&path, effect);
+                    self.warn(warning);
                 }
                 picture
             }

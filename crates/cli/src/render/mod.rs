@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::Context;
 use clap::ValueEnum;
 use image::DynamicImage;
-use rayfold_files::{OutputFile, probe};
+use rayfold_files::{OutputFile, named_by_scripts, probe};
 use rayfold_movie::{Container, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Limits, Samples, Screen};
 use rayfold_tracer::{Precision, Progress as Work, RenderOptions};
@@ -239,6 +239,13 @@ fn draw_all(args: &Args, target: &Target, passes: &Passes, console: &Console) ->
         Ok(plan) => plan,
         Err(faults) => anyhow::bail!("nothing was written: {}", faults.count()),
     };
+    // Pictures and models are known once the scripts are read.
+    let named = named_by_scripts();
+    let named = || named.iter().map(PathBuf::as_path);
+    files.iter().try_for_each(|path| must_not_replace(path, named()))?;
+    if let Some(taken) = named().find(|file| patterns.iter().any(|pattern| pattern.names(file))) {
+        must_not_replace(taken, std::iter::once(taken))?;
+    }
     if let Some(size) = args.size {
         warn_if_squashed(&plan, size, console)?;
     }
