@@ -26,7 +26,7 @@ fn the_image_at_fault_is_named_and_nothing_is_written() {
     folder.rayfold("render ball.txt -o b.png --size 30x20").assert().code(0);
     folder.write("text.png", "this is no image");
     for (frames, fault) in [
-        ("a.png b.png", "b.png: the frame is 30 x 20 pixels, the frames before it are 24 x 16"),
+        ("a.png b.png", "b.png: frame 2 is 30 x 20 pixels, the frames before it are 24 x 16"),
         ("a.png text.png", "text.png"),
         ("none.png", "none.png"),
     ] {

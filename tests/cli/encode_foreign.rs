@@ -187,13 +187,14 @@ fn pictures_of_unlike_sizes_are_an_error_in_every_output() {
     RgbaImage::from_pixel(3, 2, BLUE).save(folder.join("small.png")).unwrap();
     for output in ["o.gif", "o.apng", "o.webp", "o.y4m"] {
         for (files, said) in [
-            ("land.png port.png", "port.png: the frame is 6 x 9 pixels, the frames before it are 9 x 6"),
-            ("land.png small.png", "small.png: the frame is 3 x 2 pixels, the frames before it are 9 x 6"),
-            ("small.png land.png", "land.png: the frame is 9 x 6 pixels, the frames before it are 3 x 2"),
+            ("land.png port.png", "6 x 9 pixels, the frames before it are 9 x 6"),
+            ("land.png small.png", "3 x 2 pixels, the frames before it are 9 x 6"),
+            ("small.png land.png", "9 x 6 pixels, the frames before it are 3 x 2"),
         ] {
             let run = folder.rayfold(&format!("encode --no-sort {files} -o {output}")).assert().code(1);
             let text = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
-            assert!(text.contains(said), "{output}: {text}");
+            let second = files.split(' ').nth(1).unwrap();
+            assert!(text.contains(said) && text.contains(&format!("{second}: ")), "{output}: {text}");
             assert!(!folder.join(output).exists(), "{output}");
         }
     }

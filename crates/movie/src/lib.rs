@@ -167,7 +167,8 @@ impl<W: Write> Encoding<W> {
     pub fn push(&mut self, frame: impl Into<DynamicImage>, seconds: Option<f64>) -> Result<(), Error> {
         let frame: DynamicImage = frame.into();
         let found = (frame.width(), frame.height());
-        if found != self.size {
+        // The encoder of GIFs says which frame it is.
+        if found != self.size && !matches!(self.kind, Kind::Gif(_)) {
             return Err(Error::Size { found, expected: self.size });
         }
         let frame = match (frame.color().has_alpha(), &self.kind) {
