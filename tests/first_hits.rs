@@ -1,4 +1,4 @@
-//! What is behind the middle of each pixel, against single rays of the plain tracer, which share no code with the kernels
+//! First hits behind the middle of each pixel, against single rays of the plain tracer, which share no code with the kernels
 //! that find the objects. Colours are judged by a picture of the same scene whose surfaces give off the light that they
 //! would send back.
 //!
@@ -33,7 +33,7 @@ const NEARBY: f64 = 1e-6;
 /// Rays and objects that the plain tracer may compare for one scene: a few seconds.
 const PAIRS: usize = 14_000_000;
 
-/// What the plain tracer finds along a ray.
+/// The first hit that the plain tracer finds along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Judged {
     object: u32,

@@ -135,8 +135,7 @@ impl<'a> Referred<'a> {
 
     /// Returns the warning of a model that does without a file, and the effect of that.
     pub(crate) fn absence(&self, path: &str, effect: &str) -> String {
-        let name = last_part(path);
-        let similar = self.files.names().into_iter().find(|other| same_but_for_case(other, name));
+        let similar = similar(self.files, last_part(path));
         let similar = similar.map(|other| format!(" (there is `{other}`: names are compared byte for byte)"));
         format!("there is no file `{path}`{}: {effect}", similar.unwrap_or_default())
     }
@@ -173,8 +172,12 @@ pub(crate) fn absent(files: &dyn Files, name: &str) -> AssetError {
     if !files.are_readable() {
         return AssetError::NotHere { name: name.into() };
     }
-    let similar = files.names().into_iter().find(|other| same_but_for_case(other, name));
-    AssetError::Absent { name: name.into(), similar }
+    AssetError::Absent { name: name.into(), similar: similar(files, name) }
+}
+
+/// Returns the file whose name differs in letter case alone.
+fn similar(files: &dyn Files, name: &str) -> Option<String> {
+    files.names().into_iter().find(|other| same_but_for_case(other, name))
 }
 
 /// Returns the content of a file within the limit on its size.

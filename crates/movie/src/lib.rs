@@ -58,7 +58,7 @@ pub enum Error {
     Size {
         /// The columns and rows of the frame.
         found: (u32, u32),
-        /// Those of the animation.
+        /// The columns and rows of the animation.
         expected: (u32, u32),
     },
     /// The state of an unfinished file cannot be read.

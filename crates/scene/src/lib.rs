@@ -55,7 +55,7 @@ pub use natural::natural_cmp;
 pub use parse::{Parsed, is_name, parse, parse_curve, parse_with_files, unquoted_word};
 pub use rayfold_assets as assets;
 pub use script::{Origin, Script, ShotSummary};
-pub use settings::{AnimationSettings, ParsedSettings, fraction, parse_settings};
+pub use settings::{AnimationSettings, ParsedSettings, SETTINGS_FIELDS, fraction, parse_settings};
 pub use shared_slice::SharedSlice;
 
 /// The example of the README is compiled and run with the tests.

@@ -23,7 +23,8 @@ use crate::model::{InvalidValue, Parameter};
 use crate::report::{BYTE_ORDER_MARK, Fault, Line, Report};
 use crate::shown::quoted;
 
-const FIELDS: [&str; 6] = ["frames", "fps", "loop", "bounce", "durations", "outputs"];
+/// The fields of an `animation.json`.
+pub const SETTINGS_FIELDS: [&str; 6] = ["frames", "fps", "loop", "bounce", "durations", "outputs"];
 
 /// The settings of an animation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -422,9 +423,9 @@ fn outputs(text: &str, value: &RawValue, report: &mut Report<'_>) -> Result<Vec<
 
 fn unknown(name: &str) -> Fault {
     let near = |field: &&&str| name.len() < 40 && strsim::osa_distance(&name.to_lowercase(), field) <= 2;
-    let help = match FIELDS.iter().find(near) {
+    let help = match SETTINGS_FIELDS.iter().find(near) {
         Some(field) => format!("did you mean `{field}`?"),
-        None => format!("the fields are `{}`", FIELDS.join("`, `")),
+        None => format!("the fields are `{}`", SETTINGS_FIELDS.join("`, `")),
     };
     Fault::new(Code::UnknownField, format!("unknown field {}", quoted(name)))
         .expected("expected a field's name")

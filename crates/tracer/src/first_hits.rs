@@ -1,4 +1,4 @@
-//! What a picture shows beside light: how far its surfaces are, how they stand, what they are and their colours.
+//! The surfaces that a picture shows, without their light: distance, normal, object and colour.
 //!
 //! The kernels in double precision find the objects. What is returned of a hit is computed as the reference tracer does.
 
@@ -15,7 +15,7 @@ use crate::parts;
 use crate::reference::{FirstSurface, FirstSurfaces};
 use crate::{RenderError, RenderOptions};
 
-/// What the ray through the middle of a pixel hits first.
+/// The first hit of the ray through the middle of a pixel.
 ///
 /// ```
 /// use glam::DVec3;

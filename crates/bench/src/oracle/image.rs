@@ -44,7 +44,7 @@ pub(super) fn factor(object: &Object, place: &DVec3, line: &Line, hit: &Hit, lin
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use rayfold_scene::assets::{Library, MemoryFiles};
     use rayfold_scene::{Limits, parse_with_files};
     use rayfold_tracer::reference;
@@ -60,7 +60,7 @@ mod tests {
         -1 0 1 0\n0 1 0 .5 1\n3 0 1 2\n";
 
     /// A PNG with alpha, 5 x 3 pixels.
-    fn png() -> Vec<u8> {
+    pub(in crate::oracle) fn png() -> Vec<u8> {
         let level = |k: u32| (k * 97 % 256) as u8;
         let picture = ::image::RgbaImage::from_fn(5, 3, |x, y| {
             let k = x + 5 * y;

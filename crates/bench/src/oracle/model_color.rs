@@ -117,6 +117,7 @@ mod tests {
     use rayfold_tracer::reference;
 
     use crate::oracle;
+    use crate::oracle::image::tests::png;
 
     /// Three faces, of which two have pictures; the third has a picture that is missing.
     const OBJ: &[u8] = b"mtllib a.mtl\nv -1.2 -1 0 1 .4 .5\nv 0 -1 .2 .6 1 1\nv 0 1 0\nv -1 1 0\nv 1.2 -1 0\nv 1.1 1 .3\nv 0 1.6 .2\n\
@@ -124,18 +125,6 @@ mod tests {
         3/3\nusemtl lost\nf 4 3 7\n";
     const MTL: &[u8] =
         b"newmtl dim\nKd .5 .6 1.4\nmap_Kd a.png\nnewmtl bare\nmap_Kd ./a.png\nnewmtl lost\nKd 1 0 0\nmap_Kd lost.png\n";
-
-    /// A PNG with alpha, 5 x 3 pixels.
-    fn png() -> Vec<u8> {
-        let level = |k: u32| (k * 97 % 256) as u8;
-        let picture = ::image::RgbaImage::from_fn(5, 3, |x, y| {
-            let k = x + 5 * y;
-            ::image::Rgba([level(k), level(k + 3), level(2 * k), 255 - level(3 * k) / 2])
-        });
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        picture.write_to(&mut bytes, ::image::ImageFormat::Png).unwrap();
-        bytes.into_inner()
-    }
 
     fn data(bytes: &[u8]) -> String {
         bytes.iter().fold("data:,".to_string(), |text, byte| text + &format!("%{byte:02x}"))

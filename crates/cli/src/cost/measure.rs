@@ -31,7 +31,7 @@ pub(super) struct Measured {
     pub(super) ms: f64,
     /// A frame's PNG, in the mean.
     pub(super) frame_kb: f64,
-    /// What the settings ask for.
+    /// The outputs that the settings ask for.
     pub(super) outputs: Vec<Container>,
     /// The number of the files that the scripts name, and of those that they refer to.
     pub(super) files: u64,

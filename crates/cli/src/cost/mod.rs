@@ -203,7 +203,8 @@ fn table(work: &Workload, prices: &Prices, sections: &[Section]) -> String {
         prices.currency,
     );
     if let Some(places) = work.places {
-        let (rendering, assembling) = (amount(work.rendering_s()), amount(work.assembling_s()));
+        let (rendering, assembling) =
+            (amount(work.rendering_s()), amount(work.outputs.len() as f64 * work.assembling_s()));
         let at_once =
             if places == 1 { "1 place".to_owned() } else { format!("{} places", amount(places as f64)) };
         // Writing to a String cannot fail.

@@ -5,14 +5,13 @@ use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use rayfold_scene::parse_settings;
+use rayfold_scene::{SETTINGS_FIELDS, parse_settings};
 use serde_json::{Map, Value};
 
 use crate::console::Console;
 
-/// The field of an animation.json that is read here, and those that are not.
+/// The field of an animation.json that is read here.
 const DURATIONS: &str = "durations";
-const FIELDS: [&str; 5] = ["frames", "fps", "loop", "bounce", "outputs"];
 
 /// Reads the times of frames in seconds, by frame from 1: a JSON object of them, or the `durations` of an animation.json, whose
 /// other fields are reported as not read.
@@ -29,9 +28,13 @@ pub(super) fn read(path: &Path, console: &Console) -> anyhow::Result<BTreeMap<u6
         Ok(Value::Object(fields)) => fields,
         _ => Map::new(),
     };
-    let others: Vec<&str> = fields.keys().map(String::as_str).filter(|key| FIELDS.contains(key)).collect();
-    let is_settings = fields.contains_key(DURATIONS) || !others.is_empty();
-    if !fields.contains_key(DURATIONS) && is_settings {
+    let (own, others): (Vec<&str>, Vec<&str>) = fields
+        .keys()
+        .map(String::as_str)
+        .filter(|key| SETTINGS_FIELDS.contains(key))
+        .partition(|key| *key == DURATIONS);
+    let is_settings = !own.is_empty();
+    if !is_settings && !others.is_empty() {
         bail!("{name} has no \"{DURATIONS}\": expected seconds by frame, such as {{\"5\": 0.5}}");
     }
     if !others.is_empty() {

@@ -34,7 +34,7 @@ pub(super) struct Frames {
     disposed: Option<Place>,
 }
 
-/// Where a frame stands on the canvas: left, top, width and height.
+/// The place of a frame on the canvas: left, top, width and height.
 #[derive(Clone, Copy)]
 struct Place([u32; 4]);
 

@@ -33,7 +33,7 @@ const SHOWN: usize = 200;
 /// The largest number up to which `f32` has every whole one.
 const WHOLE: usize = 1 << f32::MANTISSA_DIGITS;
 
-/// What a pixel says.
+/// A kind of pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub(crate) enum Pass {
     /// Distance along the view axis
@@ -87,7 +87,7 @@ pub(crate) struct Passes {
     depth_range: Option<(f64, f64)>,
 }
 
-/// What a pass says of each pixel.
+/// The numbers of all pixels of a pass.
 #[derive(Clone, Debug, PartialEq)]
 enum Values {
     /// One number, in the channel `Y`, the only one that every program reads by itself.

@@ -107,7 +107,7 @@ pub struct Workload {
     pub frame_kb: f64,
     /// The size of the GIF.
     pub gif_mb: f64,
-    /// What is assembled.
+    /// The files that are assembled.
     pub outputs: Vec<Container>,
     /// The number of the files that the scripts name, and of those that they refer to.
     pub files: u64,

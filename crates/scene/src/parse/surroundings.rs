@@ -10,6 +10,9 @@ use crate::form::Scripted;
 use crate::model::{Background, Fog, PictureFile, SkyColors, SkyTurn};
 use crate::script::{SkyLine, Value};
 
+/// The share by which a panorama may be stretched without a warning.
+const STRETCH: f64 = 0.05;
+
 impl<'a> Parser<'a> {
     pub(super) fn background(&mut self, s: &Statement<'a, '_>) {
         self.unseen.removable.get_or_insert_with(|| s.place());
@@ -40,9 +43,7 @@ impl<'a> Parser<'a> {
         let Some(name) = self.file(s, subject.clone()) else { return };
         let Some(picture) = self.picture_of(s, &subject, &name, Purpose::Sky) else { return };
         let size @ [width, height] = [picture.width(), picture.height()];
-        if f64::from(width)
-            != (2.0 * f64::from(height)).clamp(0.95 * f64::from(width), 1.05 * f64::from(width))
-        {
+        if (2.0 * f64::from(height) / f64::from(width) - 1.0).abs() > STRETCH {
             self.report.warning(s.line, subject, || wording::no_panorama(&name, size));
         }
         let Some((turn, moving)) = turn else { return };

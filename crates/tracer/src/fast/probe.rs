@@ -45,7 +45,7 @@ pub struct Found {
 /// there.
 ///
 /// # Errors
-/// Those of [`crate::render`].
+/// The errors of [`crate::render`].
 pub fn nearest_hits(
     scene: &Scene,
     rays: &[(DVec3, DVec3)],
@@ -87,7 +87,7 @@ impl<'a> Finder<'a> {
     /// Prepares a scene. Returns `None` if no kernel can hold its numbers.
     ///
     /// # Errors
-    /// Those of [`crate::render`].
+    /// The errors of [`crate::render`].
     pub(crate) fn new(scene: &'a Scene, options: &RenderOptions<'a>) -> Result<Option<Self>, RenderError> {
         let ranked = Ranked::new(scene);
         let geometry = || Geometry::with_faces(&ranked.scene, ranked.faces.as_ref(), options.tree).ok();

@@ -9,7 +9,7 @@ use super::{Hit, shapes};
 use crate::camera::Ray;
 use crate::meshes::Expanded;
 
-/// What is behind the pixels of a scene.
+/// The surfaces behind the pixels of a scene.
 pub(crate) struct FirstSurfaces<'a>(World<'a>);
 
 /// The first surface along a ray.

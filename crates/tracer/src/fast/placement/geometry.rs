@@ -74,7 +74,7 @@ impl Geometry {
     /// Converts a scene, of which some triangles may be faces of meshes.
     ///
     /// # Errors
-    /// Those of [`Self::new`].
+    /// The errors of [`Self::new`].
     pub(crate) fn with_faces(
         scene: &Scene,
         faces: Option<&Arc<Faces>>,
