@@ -143,3 +143,23 @@ fn a_scene_with_a_hidden_sky_is_clear() {
     assert_eq!(hidden.frame(0).unwrap().background, Background::NONE);
     assert_eq!(hidden.frame(0).unwrap().surroundings().color(), Some(DVec3::new(1.0, 2.0, 3.0)));
 }
+
+#[test]
+fn a_sky_that_is_no_panorama_is_stretched_with_a_warning() {
+    let warnings = |width: usize, height: usize| {
+        let header = format!("#?RGBE\n\n-Y {height} +X {width}\n").into_bytes();
+        let picture = [header, [1, 3, 5, 128].repeat(width * height)].concat();
+        let library = Library::new(MemoryFiles::from([("a.hdr", picture)]));
+        let text = b"Screen 4 3\nSky \"a.hdr\"\nTrace\n";
+        let parsed = parse_with_files("a.txt", text, &Limits::default(), &library);
+        assert!(parsed.script.is_some(), "{:?}", parsed.diagnostics);
+        parsed.diagnostics.into_iter().map(|diagnostic| diagnostic.message).collect::<Vec<_>>()
+    };
+    for (width, height) in [(40, 20), (41, 20), (39, 20)] {
+        assert!(warnings(width, height).is_empty(), "{width} x {height}");
+    }
+    for (width, height) in [(30, 20), (20, 20), (60, 20), (5, 1)] {
+        let message = format!("`a.hdr` has {width} x {height} pixels, and is stretched around the scene");
+        assert_eq!(warnings(width, height), [message]);
+    }
+}
