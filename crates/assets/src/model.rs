@@ -1,6 +1,8 @@
 //! A model: triangles with normals and colours, whatever the format of its file.
 
-use std::sync::OnceLock;
+use std::any::Any;
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -10,6 +12,9 @@ use crate::limits;
 use crate::normals::smoothed;
 use crate::srgb::{decoded, encoded};
 use crate::texture::{Slot, Texture};
+
+/// An estimate of the bytes for each triangle of what a renderer makes of a model.
+const DERIVED_BYTES: usize = 512;
 
 /// The index of a normal or of texture coordinates that a corner does not have.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -109,6 +114,17 @@ pub struct Model {
     look_of: Vec<u32>,
     warnings: Vec<String>,
     closure: OnceLock<Closure>,
+    derived: Derived,
+}
+
+/// Data that a renderer has made of a model.
+#[derive(Default)]
+struct Derived(OnceLock<Arc<dyn Any + Send + Sync>>);
+
+impl fmt::Debug for Derived {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.get().is_some() { "Derived" } else { "None" })
+    }
 }
 
 /// A model as a decoder gives it, not checked yet.
@@ -201,7 +217,7 @@ impl Model {
             look.cutoff = look.cutoff.filter(|_| !look.has_one_alpha(&parts.alphas));
         }
         let normals = normals.into_iter().map(unit).collect();
-        let closure = OnceLock::new();
+        let (closure, derived) = (OnceLock::new(), Derived::default());
         Ok(Some(Self {
             positions,
             triangles,
@@ -217,6 +233,7 @@ impl Model {
             look_of,
             warnings,
             closure,
+            derived,
         }))
     }
 
@@ -242,7 +259,15 @@ impl Model {
             look_of: self.look_of.clone(),
             warnings: self.warnings.clone(),
             closure: self.closure.clone(),
+            derived: Derived::default(),
         }
+    }
+
+    /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is made at the first call,
+    /// and dropped with the model. If the model holds data of another type, it is made anew and not kept.
+    pub fn derived<T: Any + Send + Sync>(&self, make: impl Fn() -> T) -> Arc<T> {
+        let kept = self.derived.0.get_or_init(|| Arc::new(make())).clone();
+        kept.downcast().unwrap_or_else(|_| Arc::new(make()))
     }
 
     /// Returns the model with every position moved by `point` and every normal turned by `direction`, or `None` if a number
@@ -452,6 +477,7 @@ impl Model {
             + 12 * self.colors.len()
             + 4 * self.alphas.len()
             + 4 * self.look_of.len()
+            + self.derived.0.get().map_or(0, |_| DERIVED_BYTES * self.triangles.len())
     }
 }
 

@@ -4,9 +4,13 @@
 //! the pixels of its triangles, bit for bit. A mesh in a group is expanded once, however often the group is drawn.
 //! Normals, colours at vertices, pictures and the inside of closed glass are looked up by the position of a triangle among all
 //! objects ([`Faces`]), when a ray has hit it.
+//!
+//! The kernels draw meshes of many triangles from one tree in the coordinates of their model, which stays with the model
+//! ([`Models::Shared`]). Then each look of the mesh is one object, in place of its triangles. The order of a hit is that of
+//! the object, and its fraction is the number of the triangle ([`hit_face`]).
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -34,12 +38,30 @@ pub(crate) struct Faces {
     runs: Vec<Run>,
 }
 
+/// The treatment of meshes of many triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Models {
+    /// The tree of a model is made once, however often it is drawn.
+    Shared,
+    /// All triangles are written out.
+    WrittenOut,
+}
+
+/// The least number of triangles, of all meshes of a model, with which its tree is shared.
+const MANY_TRIANGLES: usize = 100_000;
+
+/// The part of an order that counts the triangles of a model. There are fewer triangles than its inverse, and fewer objects
+/// than 2²⁸, so that an order is exact in `f64`.
+pub(crate) const ONE_FACE: f64 = 1.0 / (1 << 24) as f64;
+
 /// The faces of one mesh, as it is drawn once.
 #[derive(Debug)]
 struct Run {
-    /// The position of the first face, and the number of faces.
+    /// The position of the first face, and the number of faces; of a mesh whose tree is shared, those of its looks.
     first: usize,
     count: usize,
+    /// Whether the tree of the model is shared.
+    is_shared: bool,
     /// The position of the mesh before it was expanded.
     object: usize,
     model: Arc<Model>,
@@ -89,11 +111,11 @@ pub(crate) struct FaceHit {
 }
 
 impl<'a> Expanded<'a> {
-    pub(crate) fn new(scene: Cow<'a, Scene>) -> Self {
+    pub(crate) fn new(scene: Cow<'a, Scene>, models: Models) -> Self {
         if !scene.objects.iter().any(|object| mesh(object).is_some()) {
             return Self { scene, faces: None };
         }
-        let (objects, faces) = expanded(&scene.objects, Colors::of(&scene));
+        let (objects, faces) = expanded(&scene.objects, Colors::of(&scene), models);
         Self {
             scene: Cow::Owned(Scene { objects: objects.into(), ..scene.into_owned() }),
             faces: Some(Arc::new(faces)),
@@ -134,11 +156,11 @@ impl Colors {
 }
 
 /// Expands the meshes among objects.
-pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Faces) {
-    let is_linear = colors.is_linear;
-    let mut all = Vec::with_capacity(expanded_count(objects));
+pub(crate) fn expanded(objects: &[Object], colors: Colors, models: Models) -> (Vec<Object>, Faces) {
+    let shared = Shared::among(objects, models);
+    let mut all = Vec::with_capacity(objects.len());
     let mut faces = Faces::default();
-    // The triangles of a group's mesh, by its place in memory.
+    // The objects that the mesh of a group becomes, by its place in memory.
     let mut of_groups: HashMap<*const Mesh, SharedSlice<Object>> = HashMap::new();
     for (place, object) in objects.iter().enumerate() {
         let Some(mesh) = mesh(object) else {
@@ -146,19 +168,18 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
             continue;
         };
         let first = all.len();
+        let is_shared = shared.has(mesh);
         let placement = match object {
             Object::Instance(instance) => {
-                let triangles = of_groups
+                let parts = of_groups
                     .entry(std::ptr::from_ref(mesh))
-                    .or_insert_with(|| triangles(mesh, colors).collect());
+                    .or_insert_with(|| parts(mesh, colors, is_shared).into());
                 let placement = instance.shared_placement();
-                all.extend(
-                    (0..triangles.len()).map(|k| Object::from(Instance::new(triangles, k, placement))),
-                );
+                all.extend((0..parts.len()).map(|k| Object::from(Instance::new(parts, k, placement))));
                 Some(placement.clone())
             }
             _ => {
-                all.extend(triangles(mesh, colors));
+                all.append(&mut parts(mesh, colors, is_shared));
                 None
             }
         };
@@ -169,10 +190,11 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
         faces.runs.push(Run {
             first,
             count: all.len() - first,
+            is_shared,
             object: place,
             model: model.clone(),
             placement,
-            is_linear,
+            is_linear: colors.is_linear,
             has_colors: is_own && looks().any(|look| model.is_varied(look)),
             glows: is_own && !mesh.has_material() && looks().any(|look| glows_apart(model, look)),
             has_image: finish
@@ -183,6 +205,51 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
         });
     }
     (all, faces)
+}
+
+/// The models whose trees are shared, by their places in memory.
+struct Shared(HashSet<*const Model>);
+
+impl Shared {
+    fn among(objects: &[Object], models: Models) -> Self {
+        let mut counts: HashMap<*const Model, usize> = HashMap::new();
+        if models == Models::Shared {
+            for mesh in objects.iter().filter_map(mesh).filter(|mesh| can_be_shared(mesh)) {
+                *counts.entry(Arc::as_ptr(mesh.model())).or_default() += mesh.model().triangle_count();
+            }
+        }
+        Self(
+            counts
+                .into_iter()
+                .filter(|(_, count)| *count >= MANY_TRIANGLES)
+                .map(|(model, _)| model)
+                .collect(),
+        )
+    }
+
+    fn has(&self, mesh: &Mesh) -> bool {
+        can_be_shared(mesh) && self.0.contains(&Arc::as_ptr(mesh.model()))
+    }
+}
+
+/// Returns whether a mesh can be drawn from the tree of its model: it has no holes, is not of glass, and its coefficients do
+/// not depend on the place.
+fn can_be_shared(mesh: &Mesh) -> bool {
+    let is_simple = |finish: &Finish| {
+        finish.glass.is_none()
+            && finish.pattern.is_none()
+            && finish.image.as_ref().is_none_or(|image| image.map() == ImageMap::Uv)
+    };
+    !mesh.model().has_holes() && mesh.material().finish().is_none_or(is_simple)
+}
+
+/// Returns the objects that a mesh becomes: its triangles, or one object for each look.
+fn parts(mesh: &Mesh, colors: Colors, is_shared: bool) -> Vec<Object> {
+    if !is_shared {
+        return triangles(mesh, colors).collect();
+    }
+    let looks = 0..mesh.model().looks().len();
+    looks.map(|look| mesh.with_material(material(mesh, look, colors)).into()).collect()
 }
 
 /// Returns whether the light that faces of a look give off is looked up where they are hit: because it varies, or because
@@ -295,11 +362,17 @@ impl Faces {
         (order < run.first + run.count).then_some(run)
     }
 
-    /// Returns what the face at `order` adds to the surface of a hit, or `None` for what is no more than a triangle.
-    /// `material` is that of the object at `order`.
-    pub(crate) fn shading(&self, order: usize, material: &Material, hit: FaceHit) -> Option<Shading> {
-        let run = self.run_of(order).filter(|run| run.is_shaded())?;
-        let k = order - run.first;
+    /// Returns whether the object at `order` is a further look of a mesh whose tree is shared: it is drawn with the first.
+    pub(crate) fn is_further_look(&self, order: usize) -> bool {
+        self.run_of(order).is_some_and(|run| run.is_shared && order > run.first)
+    }
+
+    /// Returns what the face with the `order` of a hit adds to the surface there, or `None` for what is no more than a
+    /// triangle. `material` is that of the object.
+    pub(crate) fn shading(&self, order: f64, material: &Material, hit: FaceHit) -> Option<Shading> {
+        let object = order as usize;
+        let run = self.run_of(object).filter(|run| run.is_shaded())?;
+        let k = if run.is_shared { hit_face(order) } else { object - run.first };
         let FaceHit { point, center, scale, direction, face } = hit;
         let corners = run.corners(k, center, scale);
         let weights = weights(corners, point);
@@ -377,6 +450,11 @@ impl Run {
         let DVec2 { x, y } = texture.transformed(mixed);
         DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
+}
+
+/// Returns the number of the triangle that the order of a hit on a shared model has.
+pub(crate) fn hit_face(order: f64) -> usize {
+    (order.fract() / ONE_FACE) as usize
 }
 
 /// Returns the barycentric weights of a point of a triangle, none below 0.

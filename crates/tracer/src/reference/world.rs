@@ -106,7 +106,7 @@ impl<'a> World<'a> {
         let Surface { point, normal: face, .. } = hit.surface;
         let material = self.scene.objects[hit.object].material();
         let at = FaceHit { point, center: self.center, scale: 1.0, direction, face };
-        self.faces?.shading(hit.object, material, at)
+        self.faces?.shading(hit.object as f64, material, at)
     }
 
     /// Returns whether an object, which is no instance, is a body that glass fills.

@@ -1,5 +1,5 @@
 //! Shapes that have their own coordinate axes: planes, discs, cylinders, cones, tori, capsules, boxes with
-//! round edges, and rotated boxes; and triangles with holes.
+//! round edges, and rotated boxes; triangles with holes; and models of many triangles.
 //!
 //! Each shape has its own file, with its intersection and its surface in the shape's coordinates. The common parts are
 //! here: the transformation into these coordinates and back, the offset of new rays, and the search. None of it is part
@@ -17,6 +17,7 @@ mod cone;
 mod cuboid;
 mod cutout;
 mod disc;
+mod model;
 mod plane;
 mod roundbox;
 mod solid;
@@ -36,6 +37,7 @@ use self::cuboid::{Cuboid, CuboidForm};
 use self::cutout::{Cutout, CutoutForm};
 pub(super) use self::cutout::{Holes, cutout};
 use self::disc::{Disc, DiscForm};
+use self::model::{ModelForm, SharedModel};
 use self::plane::PlaneForm;
 use self::roundbox::{Roundbox, RoundboxForm};
 use self::solid::{Form, Frame, Place};
@@ -48,6 +50,7 @@ use crate::fast::acceleration::tree::{Copies, Tree, group};
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Crossing;
 use crate::fast::rays::packet::{Nearest, Ray, Surface};
+use crate::meshes::mesh;
 use crate::parts::BUILT;
 
 /// A packet of rays in the coordinates of a body.
@@ -76,6 +79,7 @@ enum AnyForm {
     Roundbox(RoundboxForm),
     Cuboid(CuboidForm),
     Cutout(CutoutForm),
+    Model(ModelForm),
 }
 
 impl AnyForm {
@@ -95,16 +99,22 @@ impl AnyForm {
                 let center = o.min() + 0.5 * (o.max() - o.min());
                 of(Self::Roundbox)(RoundboxForm::new(o, (DMat3::IDENTITY, 1.0), center, place))
             }
-            Object::Instance(o) => match turned(o)? {
-                Turned::Cuboid(cuboid) => of(Self::Cuboid)(CuboidForm::new(cuboid, o.placement(), place)),
-                Turned::Roundbox(roundbox) => {
-                    let placement = o.placement();
-                    let (min, max) = (roundbox.min(), roundbox.max());
-                    let center = placement.point(min + 0.5 * (max - min));
-                    let turn = (placement.rotation(), placement.scale());
-                    of(Self::Roundbox)(RoundboxForm::new(roundbox, turn, center, place))
+            Object::Mesh(o) => of(Self::Model)(ModelForm::new(o.model(), None, place)),
+            Object::Instance(o) => {
+                if let Object::Mesh(mesh) = o.object() {
+                    return Some(of(Self::Model)(ModelForm::new(mesh.model(), Some(o.placement()), place)));
                 }
-            },
+                match turned(o)? {
+                    Turned::Cuboid(cuboid) => of(Self::Cuboid)(CuboidForm::new(cuboid, o.placement(), place)),
+                    Turned::Roundbox(roundbox) => {
+                        let placement = o.placement();
+                        let (min, max) = (roundbox.min(), roundbox.max());
+                        let center = placement.point(min + 0.5 * (max - min));
+                        let turn = (placement.rotation(), placement.scale());
+                        of(Self::Roundbox)(RoundboxForm::new(roundbox, turn, center, place))
+                    }
+                }
+            }
             _ => return None,
         })
     }
@@ -119,6 +129,7 @@ impl AnyForm {
             Self::Roundbox(form) => form,
             Self::Cuboid(form) => form,
             Self::Cutout(form) => form,
+            Self::Model(form) => form,
         }
     }
 }
@@ -136,6 +147,7 @@ enum Shape<E> {
     Cuboid(Cuboid<E>),
     /// In the coordinates of the scene.
     Cutout(Box<Cutout<E>>),
+    Model(Box<SharedModel<E>>),
 }
 
 impl<E> Shape<E> {
@@ -151,6 +163,7 @@ impl<E> Shape<E> {
             Self::Roundbox(_) => BUILT.roundboxes,
             Self::Cuboid(_) => BUILT.turned_boxes,
             Self::Cutout(_) => BUILT.pictures && BUILT.meshes,
+            Self::Model(_) => BUILT.meshes,
         }
     }
 }
@@ -165,12 +178,15 @@ pub(super) struct Body<E> {
     /// The offset of a new ray from the surface, without the part that depends on the hit point.
     offset: E,
     order: E,
+    /// The number of objects that it is: looks of a model, whose orders follow each other.
+    looks: usize,
     shape: Shape<E>,
 }
 
 impl<E: Real> Body<E> {
-    /// Makes a body. `holes` are those of the triangles that have some.
-    fn new(solid: &Solid, holes: Option<&Arc<Holes>>) -> Self {
+    /// Makes a body of one of the `objects`. `holes` are those of the triangles that have some.
+    fn new(solid: &Solid, objects: &[Object], holes: Option<&Arc<Holes>>) -> Self {
+        let mut looks = 1;
         let shape = match solid.form {
             AnyForm::Plane(_) => Shape::Plane,
             AnyForm::Disc(DiscForm { radius }) => Shape::Disc(Disc::new(radius)),
@@ -187,12 +203,20 @@ impl<E: Real> Body<E> {
                 Some(holes) => Shape::Cutout(Box::new(Cutout::new(form, solid.order, holes.clone()))),
                 None => unreachable!("triangles are bodies for their holes alone"),
             },
+            AnyForm::Model(form) => match mesh(&objects[solid.order as usize]) {
+                Some(mesh) => {
+                    looks = mesh.model().looks().len();
+                    Shape::Model(Box::new(SharedModel::new(form, mesh.model())))
+                }
+                None => unreachable!("models are those of meshes"),
+            },
         };
         Self {
             axes: solid.frame.axes.map(|axis| axis.to_array().map(E::narrow)),
             center: solid.frame.center.to_array().map(E::narrow),
             offset: E::narrow(OFFSET * E::ROUNDOFF * solid.extent()),
             order: E::narrow(f64::from(solid.order)),
+            looks,
             shape,
         }
     }
@@ -264,6 +288,7 @@ impl<E: Real> Body<E> {
                         Shape::Roundbox(roundbox) => roundbox.intersect(simd, local),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
                         Shape::Cutout(cutout) => return cutout.intersect(simd, ray, nearest),
+                        Shape::Model(model) => return model.intersect(simd, local, self.order, nearest),
                         Shape::Plane | Shape::Disc(_) => return,
                     };
                     nearest.offer(simd, hit, distance, self.order);
@@ -286,9 +311,15 @@ impl<E: Real> Body<E> {
         }
     }
 
-    /// Returns the surface at the hits of the rays with the body.
+    /// Returns the surface at the hits of the rays with the body that have this order.
     #[inline(never)]
-    pub(super) fn surface<S: Simd>(&self, simd: S, ray: Ray<S, E>, distance: Lanes<S, E>) -> Surface<S, E> {
+    pub(super) fn surface<S: Simd>(
+        &self,
+        simd: S,
+        order: E,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -316,6 +347,10 @@ impl<E: Real> Body<E> {
                         self.in_scene(simd, cuboid.surface(simd, self.local(simd, ray), distance))
                     }
                     Shape::Cutout(cutout) => return cutout.surface(simd, ray, distance),
+                    Shape::Model(model) => {
+                        let at = model.surface(simd, order, self.local(simd, ray), distance);
+                        self.in_scene(simd, at)
+                    }
                 };
                 let BodyHit { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
@@ -354,8 +389,8 @@ enum Way<E> {
 }
 
 impl<E: Real> Bodies<E> {
-    /// `holes` are those of the triangles that have some.
-    pub(super) fn new(solids: &[Solid], holes: Option<&Arc<Holes>>) -> Self {
+    /// Makes the bodies of some `objects`. `holes` are those of the triangles that have some.
+    pub(super) fn new(solids: &[Solid], objects: &[Object], holes: Option<&Arc<Holes>>) -> Self {
         let (mut planes, mut bounded): (Vec<Solid>, Vec<Solid>) =
             solids.iter().copied().partition(|solid| solid.bounds().is_none());
         let branches = group(&mut bounded, Some(true), Copies::Kept);
@@ -368,12 +403,16 @@ impl<E: Real> Bodies<E> {
             Some(tree) => Way::Both(tree),
             None => Way::Planes,
         };
-        Self { bodies: planes.iter().map(|solid| Body::new(solid, holes)).collect(), planes: count, way, few }
+        let bodies = planes.iter().map(|solid| Body::new(solid, objects, holes)).collect();
+        Self { bodies, planes: count, way, few }
     }
 
-    /// Returns, for each body, its order in the script and its index here.
+    /// Returns, for each object that is a body, its order in the script and the body's index here.
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.bodies.iter().enumerate().map(|(at, body)| (body.order.to_index(), at))
+        self.bodies.iter().enumerate().flat_map(|(at, body)| {
+            let first = body.order.to_index();
+            (first..first + body.looks).map(move |order| (order, at))
+        })
     }
 
     /// Returns the bounding boxes of the bodies that have one, in the order of their bits in a mask, or `None` if there
@@ -533,15 +572,15 @@ impl<E: Real> Bodies<E> {
         lit & !nearest.distance.simd_lt(limit)
     }
 
-    /// Returns the surface of one of the bodies.
+    /// Returns the surface of one of the bodies at the hits that have this order.
     #[inline(always)]
     pub(super) fn surface<S: Simd>(
         &self,
         simd: S,
-        at: usize,
+        (at, order): (usize, E),
         ray: Ray<S, E>,
         distance: Lanes<S, E>,
     ) -> Surface<S, E> {
-        self.bodies[at].surface(simd, ray, distance)
+        self.bodies[at].surface(simd, order, ray, distance)
     }
 }

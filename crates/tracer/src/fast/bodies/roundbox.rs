@@ -2,12 +2,18 @@
 //!
 //! Along a ray the square of the distance from the core is a convex function of the ray's parameter. It consists of at
 //! most seven parabolas, which meet, with equal slopes, where the ray enters and leaves the three slabs of the core. The
-//! ray enters the body in the last parabola whose beginning is outside and goes down, and leaves it in the first whose
-//! end is outside and goes up. So there are two square roots, no tests of faces, edges and corners, and no seam between
-//! them: if rounding chooses the parabola beside the right one, both have the same value and slope there.
+//! ray enters the body in the last parabola whose beginning is outside and goes down. So there is one square root, there
+//! are no tests of faces, edges and corners, and no seam between them: if rounding chooses the parabola beside the right
+//! one, both have the same value and slope there. A ray leaves the body where the reversed ray enters it.
+//!
+//! Most rays leave no slab before they enter the body. So the beginnings where a slab is entered are looked at first. The
+//! parabola found so is no higher than the function behind it as long as no other slab is entered, so a ray that misses
+//! it misses the body. The beginnings where a slab is left are looked at for rays that leave one before they enter the
+//! body. A ray that starts outside the bounding box needs no place where it leaves.
 //!
 //! A ray is beside the core along an axis by comparisons of its parameter with those of the slabs alone. So a place that
-//! is outside has an axis along which it is, and the parabola's square coefficient is not 0.
+//! is outside has an axis along which it is. A ray along a slab gets a small step across it: then its parameters there
+//! are large numbers of the right signs.
 //!
 //! As for cones, the ray's parameter is counted from its point nearest to the body's centre, so that the numbers are no
 //! larger than the body. The places beside the core have errors of two roundoffs of that, the discriminant is one of a
@@ -28,139 +34,237 @@ use crate::fast::shared::{Plain, Side, Surface};
 pub(super) struct Roundbox<E> {
     core: [E; 3],
     radius: E,
+    /// The distance of the bounding box from the core, with the rounding errors of tests against the box.
+    reach: E,
 }
+
+/// The least step of a ray along an axis, for a direction of length 1.
+const LEAST_STEP: f64 = 1e-30;
+
+/// The widening of the bounding box, in roundoffs of the body's size.
+const WIDER: f64 = 64.0;
 
 /// A slab of the core, along one axis.
 #[derive(Clone, Copy)]
 struct Slab<S: Simd, E: Real> {
-    /// The parameters at which rays enter and leave it; those of no numbers for rays along it.
+    half: Lanes<S, E>,
+    place: Lanes<S, E>,
+    direction: Lanes<S, E>,
+    /// The parameters at which rays enter and leave it.
     near: Lanes<S, E>,
     far: Lanes<S, E>,
     /// The places of the rays, at the parameter 0, beyond the face by which they enter, and that by which they leave.
     before: Lanes<S, E>,
     behind: Lanes<S, E>,
-    /// The places of rays along it, beyond the nearer face; 0 within it, and for all other rays.
-    aside: Lanes<S, E>,
-    direction: Lanes<S, E>,
+    /// The parameters at which rays enter and leave that of the bounding box.
+    outer: [Lanes<S, E>; 2],
 }
 
 /// The place of rays beyond the core along an axis, at the parameter 0, and how it grows.
 type Beside<S, E> = (Lanes<S, E>, Lanes<S, E>);
 
-/// A place where rays cross the surface: the parameter, and the vector there from the core.
-struct Crossing<S: Simd, E: Real> {
+/// The places where rays enter the body: the parameter, and the vector there from the core.
+struct Entry<S: Simd, E: Real> {
     at: Lanes<S, E>,
     from_core: Vec3<S, E>,
-    crosses: Mask<S, E>,
+    enters: Mask<S, E>,
 }
 
-/// The interval of each ray in the body, and what its parameters are counted from.
-struct Stretch<S: Simd, E: Real> {
-    enter: Crossing<S, E>,
-    leave: Crossing<S, E>,
-    nearest: Lanes<S, E>,
-}
+/// The slabs of the core, along the three axes.
+struct Slabs<S: Simd, E: Real>([Slab<S, E>; 3]);
 
 impl<S: Simd, E: Real> Slab<S, E> {
     #[inline(always)]
-    fn new(simd: S, half: E, place: Lanes<S, E>, direction: Lanes<S, E>) -> Self {
+    fn new(simd: S, (half, reach): (E, E), place: Lanes<S, E>, direction: Lanes<S, E>) -> Self {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
-        let (far, back) = (constant::<S, E>(simd, E::FAR), constant::<S, E>(simd, -E::FAR));
+        let least = constant::<S, E>(simd, LEAST_STEP);
         let half = splat::<S, E>(simd, half);
-        let (over, under) = (place + half, place - half);
         let forwards = direction.simd_gt(zero);
-        let (before, behind) = (forwards.select(over, under), forwards.select(under, over));
+        let direction = forwards.select(direction.max(least), direction.min(zero - least));
         let inverse = one / direction;
-        let is_along = direction.simd_eq(zero);
-        let aside = place - place.max(zero - half).min(half);
-        Self {
-            near: is_along.select(back, (zero - before) * inverse),
-            far: is_along.select(far, (zero - behind) * inverse),
-            before,
-            behind,
-            aside: is_along.select(aside, zero),
-            direction,
+        let face = forwards.select(half, zero - half);
+        let (before, behind) = (place + face, place - face);
+        let (near, far) = (zero - before * inverse, zero - behind * inverse);
+        let grown = splat::<S, E>(simd, reach) * inverse.abs();
+        Self { half, place, direction, near, far, before, behind, outer: [near - grown, far + grown] }
+    }
+
+    /// Returns the place of rays beyond it at a parameter.
+    #[inline(always)]
+    fn beyond(&self, simd: S, at: Lanes<S, E>) -> Lanes<S, E> {
+        let place = at.mul_add(self.direction, self.place);
+        place - place.max(constant::<S, E>(simd, 0.0) - self.half).min(self.half)
+    }
+
+    /// Returns the rays that leave it between two parameters.
+    #[inline(always)]
+    fn is_left(&self, begin: Lanes<S, E>, end: Lanes<S, E>) -> Mask<S, E> {
+        begin.simd_lt(self.far) & self.far.simd_lt(end)
+    }
+
+    /// Returns the place of rays beyond it from a parameter on.
+    #[inline(always)]
+    fn from(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
+        let zero = constant::<S, E>(simd, 0.0);
+        let (is_before, is_behind) = (at.simd_lt(self.near), at.simd_ge(self.far));
+        let place = is_before.select(self.before, is_behind.select(self.behind, zero));
+        (place, (is_before | is_behind).select(self.direction, zero))
+    }
+}
+
+impl<S: Simd, E: Real> Slabs<S, E> {
+    /// Returns the slabs as seen by rays, from their points nearest to the body's centre.
+    #[inline(always)]
+    fn new(simd: S, roundbox: &Roundbox<E>, place: Vec3<S, E>, direction: Vec3<S, E>) -> Self {
+        let Roundbox { core: [x, y, z], reach, .. } = *roundbox;
+        Self([
+            Slab::new(simd, (x, reach), place.x, direction.x),
+            Slab::new(simd, (y, reach), place.y, direction.y),
+            Slab::new(simd, (z, reach), place.z, direction.z),
+        ])
+    }
+
+    /// Returns the parameters at which rays enter and leave the bounding box: the first is greater for those that miss.
+    #[inline(always)]
+    fn outer(&self) -> [Lanes<S, E>; 2] {
+        let Self([x, y, z]) = self;
+        [x.outer[0].max(y.outer[0]).max(z.outer[0]), x.outer[1].min(y.outer[1]).min(z.outer[1])]
+    }
+
+    /// Returns where rays enter the body whose core has a distance of the root of `square`.
+    #[inline(always)]
+    fn entry(&self, simd: S, square: Lanes<S, E>) -> Entry<S, E> {
+        let Self([x, y, z]) = self;
+        let mut begin = constant::<S, E>(simd, -E::FAR);
+        begin = later(simd, begin, x.near, (y, z), square);
+        begin = later(simd, begin, y.near, (z, x), square);
+        begin = later(simd, begin, z.near, (x, y), square);
+        let first = self.crossing(simd, begin, square);
+        let left = x.is_left(begin, first.at) | y.is_left(begin, first.at) | z.is_left(begin, first.at);
+        let leaves = first.enters & left;
+        if !leaves.any_true() {
+            return first;
+        }
+        begin = later(simd, begin, x.far, (y, z), square);
+        begin = later(simd, begin, y.far, (z, x), square);
+        begin = later(simd, begin, z.far, (x, y), square);
+        let second = self.crossing(simd, begin, square);
+        Entry {
+            at: leaves.select(second.at, first.at),
+            from_core: Vec3::<S, E>::new(
+                leaves.select(second.from_core.x, first.from_core.x),
+                leaves.select(second.from_core.y, first.from_core.y),
+                leaves.select(second.from_core.z, first.from_core.z),
+            ),
+            enters: first.enters & (second.enters | !leaves),
         }
     }
 
-    /// Returns the place of rays beyond it from the parameter `at` on.
+    /// Returns where the parabola that begins at a parameter goes down through the value `square`.
     #[inline(always)]
-    fn from(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
-        let (is_before, is_behind) = (at.simd_lt(self.near), at.simd_ge(self.far));
-        self.beside(simd, is_before, is_behind)
-    }
-
-    /// Returns the place of rays beyond it up to the parameter `at`.
-    #[inline(always)]
-    fn up_to(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
-        let (is_before, is_behind) = (at.simd_le(self.near), at.simd_gt(self.far));
-        self.beside(simd, is_before, is_behind)
-    }
-
-    #[inline(always)]
-    fn beside(&self, simd: S, is_before: Mask<S, E>, is_behind: Mask<S, E>) -> Beside<S, E> {
+    fn crossing(&self, simd: S, begin: Lanes<S, E>, square: Lanes<S, E>) -> Entry<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
-        let place = is_before.select(self.before, is_behind.select(self.behind, self.aside));
-        (place, (is_before | is_behind).select(self.direction, zero))
+        let Self([x, y, z]) = self;
+        let (x, y, z) = (x.from(simd, begin), y.from(simd, begin), z.from(simd, begin));
+        let from = Vec3::<S, E>::new(x.0, y.0, z.0);
+        let along = Vec3::<S, E>::new(x.1, y.1, z.1);
+        let a = along.dot(along);
+        // As a cross product, because the squares of the vectors cancel.
+        let across = from.cross(along);
+        let discriminant = square.mul_sub(a, across.dot(across));
+        let at = (zero - from.dot(along) - discriminant.max(zero).sqrt()) / a;
+        let enters = discriminant.simd_ge(zero) & a.simd_gt(zero);
+        Entry { at, from_core: along.scale_add(at, from), enters }
     }
+}
+
+/// Returns the later beginning of the parabola in which rays enter the body, given a parameter at which they are at a
+/// face of one slab, and the other two slabs.
+#[inline(always)]
+fn later<S: Simd, E: Real>(
+    simd: S,
+    begin: Lanes<S, E>,
+    at: Lanes<S, E>,
+    (one, other): (&Slab<S, E>, &Slab<S, E>),
+    square: Lanes<S, E>,
+) -> Lanes<S, E> {
+    let (u, v) = (one.beyond(simd, at), other.beyond(simd, at));
+    let is_outside = u.mul_add(u, v * v).simd_gt(square);
+    let slope = u.mul_add(one.direction, v * other.direction);
+    let goes_down = slope.simd_lt(constant::<S, E>(simd, 0.0));
+    (is_outside & goes_down).select(begin.max(at), begin)
 }
 
 impl<E: Real> Roundbox<E> {
     pub(super) fn new(half: DVec3, radius: f64) -> Self {
         let core = (half - radius).max(DVec3::ZERO);
-        Self { core: core.to_array().map(E::narrow), radius: E::narrow(radius) }
+        let reach = radius + WIDER * E::ROUNDOFF * half.element_sum();
+        Self { core: core.to_array().map(E::narrow), radius: E::narrow(radius), reach: E::narrow(reach) }
     }
 
-    /// Returns the interval of each ray in the body.
     #[inline(always)]
-    fn stretch<S: Simd>(&self, simd: S, ray: Local<S, E>) -> Stretch<S, E> {
-        let Local { origin, direction } = ray;
-        let (mut begin, mut end) = (constant::<S, E>(simd, -E::FAR), constant::<S, E>(simd, E::FAR));
+    fn square<S: Simd>(&self, simd: S) -> Lanes<S, E> {
         let radius = splat::<S, E>(simd, self.radius);
-        let square = radius * radius;
+        radius * radius
+    }
+
+    /// Returns the parameter of each ray's point nearest to the centre, and that point.
+    #[inline(always)]
+    fn nearest<S: Simd>(simd: S, Local { origin, direction }: Local<S, E>) -> (Lanes<S, E>, Vec3<S, E>) {
         let nearest = constant::<S, E>(simd, 0.0) - origin.dot(direction);
-        let place = direction.scale_add(nearest, origin);
-        let [x, y, z] = self.core;
-        let x = Slab::new(simd, x, place.x, direction.x);
-        let y = Slab::new(simd, y, place.y, direction.y);
-        let z = Slab::new(simd, z, place.z, direction.z);
-        (begin, end) = narrower(simd, (begin, end), x.near, (&y, &z), square);
-        (begin, end) = narrower(simd, (begin, end), x.far, (&y, &z), square);
-        (begin, end) = narrower(simd, (begin, end), y.near, (&z, &x), square);
-        (begin, end) = narrower(simd, (begin, end), y.far, (&z, &x), square);
-        (begin, end) = narrower(simd, (begin, end), z.near, (&x, &y), square);
-        (begin, end) = narrower(simd, (begin, end), z.far, (&x, &y), square);
-        let minus = constant::<S, E>(simd, -1.0);
-        let enter = (x.from(simd, begin), y.from(simd, begin), z.from(simd, begin));
-        let leave = (x.up_to(simd, end), y.up_to(simd, end), z.up_to(simd, end));
-        Stretch {
-            enter: crossing(simd, enter, square, minus),
-            leave: crossing(simd, leave, square, constant::<S, E>(simd, 1.0)),
-            nearest,
-        }
+        (nearest, direction.scale_add(nearest, origin))
+    }
+
+    /// Returns where rays leave the body.
+    #[inline(always)]
+    fn exit<S: Simd>(&self, simd: S, place: Vec3<S, E>, direction: Vec3<S, E>) -> Entry<S, E> {
+        let zero = constant::<S, E>(simd, 0.0);
+        let back = Vec3::<S, E>::new(zero - direction.x, zero - direction.y, zero - direction.z);
+        let mut exit = Slabs::new(simd, self, place, back).entry(simd, self.square(simd));
+        exit.at = zero - exit.at;
+        exit
     }
 
     #[inline(always)]
     pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
-        let Stretch { enter, leave, nearest } = self.stretch(simd, ray);
-        let (first, last) = (enter.at + nearest, leave.at + nearest);
-        let distance = first.simd_gt(zero).select(first, last);
-        (enter.crosses & distance.simd_gt(zero), distance)
+        let (nearest, place) = Self::nearest(simd, ray);
+        let slabs = Slabs::new(simd, self, place, ray.direction);
+        let [enter, leave] = slabs.outer();
+        let hits = enter.simd_le(leave) & (leave + nearest).simd_gt(zero);
+        if !hits.any_true() {
+            return (hits, zero);
+        }
+        let entry = slabs.entry(simd, self.square(simd));
+        let first = entry.at + nearest;
+        let hits = hits & entry.enters;
+        let starts_within = (enter + nearest).simd_le(zero) & first.simd_le(zero);
+        let mut distance = first;
+        if (hits & starts_within).any_true() {
+            let last = self.exit(simd, place, ray.direction).at + nearest;
+            distance = starts_within.select(last, first);
+        }
+        (hits & distance.simd_gt(zero), distance)
     }
 
     /// Returns the hit of each ray.
     #[inline(always)]
     pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> BodyHit<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
-        let Stretch { enter, leave, nearest } = self.stretch(simd, ray);
-        let within = (enter.at + nearest).simd_le(zero);
-        let (first, last) = (enter.from_core, leave.from_core);
-        let from_core = Vec3::<S, E>::new(
-            within.select(last.x, first.x),
-            within.select(last.y, first.y),
-            within.select(last.z, first.z),
-        );
+        let (nearest, place) = Self::nearest(simd, ray);
+        let slabs = Slabs::new(simd, self, place, ray.direction);
+        let entry = slabs.entry(simd, self.square(simd));
+        let [enter, _] = slabs.outer();
+        let within = (enter + nearest).simd_le(zero) & (entry.at + nearest).simd_le(zero);
+        let mut from_core = entry.from_core;
+        if within.any_true() {
+            let last = self.exit(simd, place, ray.direction).from_core;
+            from_core = Vec3::<S, E>::new(
+                within.select(last.x, from_core.x),
+                within.select(last.y, from_core.y),
+                within.select(last.z, from_core.z),
+            );
+        }
         let normal = from_core.normalize(simd);
         let place = ray.direction.scale_add(distance, ray.origin);
         let radius = splat::<S, E>(simd, self.radius);
@@ -179,46 +283,6 @@ impl<E: Real> Roundbox<E> {
 fn clamped<S: Simd, E: Real>(simd: S, place: Lanes<S, E>, half: E) -> Lanes<S, E> {
     let half = splat::<S, E>(simd, half);
     place.max(constant::<S, E>(simd, 0.0) - half).min(half)
-}
-
-/// Returns the later beginning and the earlier end of the parabolas in which rays cross the surface, given a parameter
-/// at which they are in or at the faces of one slab, and the other two slabs.
-#[inline(always)]
-fn narrower<S: Simd, E: Real>(
-    simd: S,
-    (begin, end): (Lanes<S, E>, Lanes<S, E>),
-    at: Lanes<S, E>,
-    (one, other): (&Slab<S, E>, &Slab<S, E>),
-    square: Lanes<S, E>,
-) -> (Lanes<S, E>, Lanes<S, E>) {
-    let zero = constant::<S, E>(simd, 0.0);
-    let ((u, du), (v, dv)) = (one.from(simd, at), other.from(simd, at));
-    let (u, v) = (at.mul_add(du, u), at.mul_add(dv, v));
-    let is_outside = u.mul_add(u, v * v).simd_gt(square);
-    let slope = u.mul_add(du, v * dv);
-    let begin = (is_outside & slope.simd_lt(zero)).select(begin.max(at), begin);
-    let end = (is_outside & slope.simd_gt(zero)).select(end.min(at), end);
-    (begin, end)
-}
-
-/// Returns where a parabola has the value `square`: the smaller root for a `side` of -1, the larger for 1.
-#[inline(always)]
-fn crossing<S: Simd, E: Real>(
-    simd: S,
-    (x, y, z): (Beside<S, E>, Beside<S, E>, Beside<S, E>),
-    square: Lanes<S, E>,
-    side: Lanes<S, E>,
-) -> Crossing<S, E> {
-    let zero = constant::<S, E>(simd, 0.0);
-    let from = Vec3::<S, E>::new(x.0, y.0, z.0);
-    let along = Vec3::<S, E>::new(x.1, y.1, z.1);
-    let a = along.dot(along);
-    // As a cross product, because the squares of the vectors cancel.
-    let across = from.cross(along);
-    let discriminant = square.mul_sub(a, across.dot(across));
-    let at = side.mul_sub(discriminant.max(zero).sqrt(), from.dot(along)) / a;
-    let crosses = discriminant.simd_ge(zero) & a.simd_gt(zero);
-    Crossing { at, from_core: along.scale_add(at, from), crosses }
 }
 
 /// A box with round edges in its frame, by half of its lengths.

@@ -10,6 +10,7 @@ use crate::fast::acceleration::tree::Grouped;
 use crate::fast::rays::bounds::{Bounds, NOTHING};
 use crate::fast::shapes::instance::{in_world, turned};
 use crate::fast::shared::{Flat, Plain, Surface};
+use crate::meshes::mesh;
 
 /// A body and its position in the script.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +68,7 @@ const AT_ORIGIN: f64 = 64.0 * f64::EPSILON;
 pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f64) -> Option<Solid> {
     if let Object::Instance(instance) = object
         && turned(instance).is_none()
+        && mesh(object).is_none()
     {
         return body(&in_world(instance)?, order, center, scale);
     }

@@ -32,7 +32,7 @@ impl<E: Real> Extensions<E> {
     pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         is_needed(geometry).then(|| Self {
             bodies: (!geometry.bodies.is_empty())
-                .then(|| Bodies::new(&geometry.bodies, geometry.holes.as_ref())),
+                .then(|| Bodies::new(&geometry.bodies, &scene.objects, geometry.holes.as_ref())),
             lamps: geometry.lamps.iter().map(Lamp::new).collect(),
             finishes: Finishes::new(scene, geometry),
             glass: Glass::new(scene, geometry.faces.as_deref()),

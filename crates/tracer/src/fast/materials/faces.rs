@@ -52,12 +52,12 @@ impl ShadedFaces {
                 if !hits.is_hit(lane) {
                     continue;
                 }
-                let order = hits.order.0[lane].to_index();
+                let order = hits.order.0[lane].widen();
                 let offset = hits.sides[0].0[lane].widen();
                 let point = start - offset * face;
                 let direction = read(&queue.direction, lane);
                 let hit = FaceHit { point, center: self.center, scale: self.scale, direction, face };
-                let material = self.scene.objects[order].material();
+                let material = self.scene.objects[order as usize].material();
                 let Some(shading) = self.faces.shading(order, material, hit) else { continue };
                 write(&mut hits.normal, lane, shading.normal);
                 write(&mut hits.onward, lane, shading.onward);

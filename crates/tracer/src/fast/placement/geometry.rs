@@ -115,7 +115,9 @@ impl Geometry {
         // If objects are at the same distance, one that is not glass is visible.
         let copies = if is_finished { Copies::Kept } else { Copies::Dropped };
         let branches = group(&mut solids, tree, copies);
+        let is_drawn = |order| !faces.is_some_and(|faces| faces.is_further_look(order));
         let orders = scene.objects.iter().filter(|_| has_bodies).zip(0..);
+        let orders = orders.filter(|(_, order)| is_drawn(*order as usize));
         let bodies = orders.filter_map(|(object, order)| bodies::body(object, order, center, scale));
         let bodies = merged(bodies.collect(), cutouts);
         let lamps = lamps(scene).map(|lamp| Place::new(lamp, center, scale)).collect();

@@ -124,7 +124,7 @@ mod tests {
 
     fn placed(vertices: [[f64; 3]; 3], center: DVec3) -> Solid {
         let triangle = Triangle::new(vertices.map(DVec3::from), Material::default()).unwrap();
-        let placed = triangle::RenderSpaceTriangle::new(&triangle, center, 1.0 / 16.0).unwrap();
+        let placed = triangle::RenderSpaceTriangle::new(triangle.vertices(), center, 1.0 / 16.0).unwrap();
         Solid { shape: Shape::Triangle(placed), order: 0 }
     }
 

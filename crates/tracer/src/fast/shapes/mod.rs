@@ -108,7 +108,7 @@ impl Shape {
                 Some(Self::Cuboid(cuboid::RenderSpaceCuboid::new(cuboid, center, scale)))
             }
             Object::Triangle(triangle) => {
-                triangle::RenderSpaceTriangle::new(triangle, center, scale).map(Self::Triangle)
+                triangle::RenderSpaceTriangle::new(triangle.vertices(), center, scale).map(Self::Triangle)
             }
             Object::Instance(instance) => {
                 let placed = Self::new(&instance::in_world(instance)?, center, scale)?;

@@ -34,14 +34,10 @@ const NEEDLE: f64 = 0.1;
 impl RenderSpaceTriangle {
     /// Makes a triangle, moved so that `center` is the origin, and then scaled. Returns `None` if it has no area, or if
     /// rounding leaves it none: then it is too thin to be visible.
-    pub(in crate::fast) fn new(
-        triangle: &rayfold_scene::Triangle,
-        center: DVec3,
-        scale: f64,
-    ) -> Option<Self> {
-        let vertices = triangle.vertices().map(|vertex| (vertex - center) * scale);
+    pub(in crate::fast) fn new(corners: &[DVec3; 3], center: DVec3, scale: f64) -> Option<Self> {
+        let vertices = corners.map(|vertex| (vertex - center) * scale);
         // Its own size decides whether it has an area, independent of its position.
-        let (own, width) = normal_and_width(triangle.vertices());
+        let (own, width) = normal_and_width(corners);
         if own == DVec3::ZERO {
             return None;
         }

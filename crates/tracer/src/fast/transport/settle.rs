@@ -39,8 +39,8 @@ impl SharedSurfaces {
                     if earlier.is_empty() {
                         continue;
                     }
-                    let entry = &scene.entries[order.to_index()];
-                    let normal = surface::<S, E, F, EYE>(simd, scene, entry, ray, found.distance).normal;
+                    let object = (&scene.entries[order.to_index()], order);
+                    let normal = surface::<S, E, F, EYE>(simd, scene, object, ray, found.distance).normal;
                     let climb = normal.dot(ray.direction).abs();
                     let along = found.distance * constant::<S, E>(simd, EQUAL * E::ROUNDOFF);
                     for Earlier { order, size } in earlier {

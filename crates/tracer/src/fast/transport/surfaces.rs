@@ -30,7 +30,7 @@ pub(crate) fn ambient<S: Simd, E: Real, const EYE: bool>(
                     simd,
                     scene,
                     #[inline(always)]
-                    |entry, same, _| {
+                    |(entry, _), same, _| {
                         sum = Vec3::select(same, weigh::<S, E, EYE>(simd, entry.ambient, queue, at), sum);
                     },
                 );
@@ -72,14 +72,21 @@ impl<'a, S: Simd, E: Real> HitPacket<'a, S, E> {
         (&scene.entries[order.to_index()], same)
     }
 
-    /// Calls `each` with each object of the packet, the lanes that hit it, and whether it is the first.
+    /// Calls `each` with each object of the packet and the order of its hits, the lanes that hit it, and whether it is the
+    /// first.
     #[inline(always)]
-    fn each_object(&self, simd: S, scene: &Prepared<E>, mut each: impl FnMut(&Entry<E>, Mask<S, E>, bool)) {
+    fn each_object(
+        &self,
+        simd: S,
+        scene: &Prepared<E>,
+        mut each: impl FnMut((&Entry<E>, E), Mask<S, E>, bool),
+    ) {
         let hit = self.hit.to_bitmask();
         let mut remaining = hit;
         while remaining != 0 {
-            let (entry, same) = self.object(simd, scene, remaining.trailing_zeros());
-            each(entry, same, remaining == hit);
+            let lane = remaining.trailing_zeros();
+            let (entry, same) = self.object(simd, scene, lane);
+            each((entry, self.orders[lane as usize]), same, remaining == hit);
             remaining &= !same.to_bitmask();
         }
     }
@@ -143,7 +150,7 @@ pub(crate) fn surfaces<
                     simd,
                     scene,
                     #[inline(always)]
-                    |entry, same, is_first| {
+                    |(entry, order), same, is_first| {
                         let share = Share { at, lanes: same, is_first };
                         let bits = same.to_bitmask();
                         let behind = weigh::<S, E, EYE>(simd, background, queue, at);
@@ -155,7 +162,8 @@ pub(crate) fn surfaces<
                         }
                         let origin = if EYE { zero } else { Vec3::load(simd, &queue.origin, at) };
                         let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
-                        let surface = surface::<S, E, F, EYE>(simd, scene, entry, ray, met.found.distance);
+                        let object = (entry, order);
+                        let surface = surface::<S, E, F, EYE>(simd, scene, object, ray, met.found.distance);
                         share.put(simd, surface.normal, zero, normal);
                         if GLASS {
                             let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
@@ -262,12 +270,12 @@ fn own_shadow<E: Real, F: Features<E>, const EYE: bool>(scene: &Prepared<E>, ent
     if outside && scene.tree.is_none() { !(1 << entry.index) } else { u64::MAX }
 }
 
-/// Returns an object's surface at the hits of the rays.
+/// Returns an object's surface at the hits of the rays that have this order.
 #[inline(always)]
 pub(crate) fn surface<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd: S,
     scene: &Prepared<E>,
-    entry: &Entry<E>,
+    (entry, order): (&Entry<E>, E),
     ray: Ray<S, E>,
     distance: Lanes<S, E>,
 ) -> Surface<S, E> {
@@ -275,7 +283,7 @@ pub(crate) fn surface<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
         && entry.is_body
         && let Some(bodies) = scene.beyond.as_ref().and_then(Extensions::bodies)
     {
-        return bodies.surface(simd, entry.index as usize, ray, distance);
+        return bodies.surface(simd, (entry.index as usize, order), ray, distance);
     }
     let object = (F::one_of_these(entry.kind), entry.index as usize);
     scene.shapes.surface::<S, F::By, EYE>(simd, object, ray, distance)

@@ -78,7 +78,8 @@ impl<S: Simd, E: Real> IncidentLight<S, E> {
                         };
                         let dimmed = color.mul(Vec3::splat(simd, pane.color));
                         color = Vec3::select(same, dimmed, color);
-                        let mut surface = surface::<S, E, F, false>(simd, scene, entry, ray, found.distance);
+                        let object = (entry, orders[lane as usize]);
+                        let mut surface = surface::<S, E, F, false>(simd, scene, object, ray, found.distance);
                         if let Some(shared) = &scene.shared {
                             surface = shared.lifted(simd, surface, orders[lane as usize]);
                         }
