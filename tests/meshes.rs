@@ -219,14 +219,18 @@ fn without_a_material_a_mesh_has_the_colours_of_its_file() {
     }
 }
 
-/// Compares the packets with the reference tracer: at most one level, but for some pixels at outlines.
+/// Compares the packets with the reference tracer: at most one level, but for some pixels at outlines. Models are written
+/// out, and drawn from trees of their own.
 fn compare(lines: &str) {
     let scene = scene(lines);
-    let (fast, plain) = (drawn(&scene), reference::render(&scene, &RenderOptions::default()).unwrap());
-    let is_off =
-        |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1);
-    let off = fast.pixels().zip(plain.pixels()).filter(|pair| is_off(*pair)).count();
-    assert!(off <= 2, "{off} pixels of {lines}");
+    let plain = reference::render(&scene, &RenderOptions::default()).unwrap();
+    for models in [None, Some(true)] {
+        let fast = render(&scene, &RenderOptions { models, ..RenderOptions::default() }).unwrap();
+        let is_off =
+            |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1);
+        let off = fast.pixels().zip(plain.pixels()).filter(|pair| is_off(*pair)).count();
+        assert!(off <= 2, "{off} pixels of {lines} with {models:?}");
+    }
 }
 
 #[test]
@@ -463,10 +467,13 @@ fn pictures_and_holes_are_the_same_bytes_for_all_tiles_and_trees() {
         "Mesh \"quads.obj\"",
     ] {
         let scene = scene(&format!("Tone srgb\n{lines}\nSphere .4 .9 -.6 .8 chrome"));
-        let usual = drawn(&scene);
-        for (tile, tree) in [(Some((4, 4)), None), (Some((64, 4)), Some(true)), (None, Some(false))] {
-            let options = RenderOptions { tile, tree, ..RenderOptions::default() };
-            assert!(render(&scene, &options).unwrap() == usual, "{lines} {tile:?} {tree:?}");
+        for models in [Some(false), Some(true)] {
+            let usual = RenderOptions { models, ..RenderOptions::default() };
+            let picture = render(&scene, &usual).unwrap();
+            for (tile, tree) in [(Some((4, 4)), None), (Some((64, 4)), Some(true)), (None, Some(false))] {
+                let options = RenderOptions { tile, tree, ..usual };
+                assert!(render(&scene, &options).unwrap() == picture, "{lines} {tile:?} {tree:?} {models:?}");
+            }
         }
     }
 }
@@ -490,4 +497,50 @@ fn first_hits_pass_through_holes() {
         assert!(of_square.object == 1 || hit.object == 0);
     }
     assert!(seen > 100 && holes > 100, "{seen} {holes}");
+}
+
+/// 64 balls of 5,280 triangles each: as their model's tree draws them, and written out, which is what balls of other
+/// colours in a pattern of one colour are.
+#[test]
+fn a_model_that_is_used_often_is_drawn_as_written_out() {
+    let uses: String = (0..64)
+        .map(|k| {
+            let (x, z) = (f64::from(k % 8) - 3.5, f64::from(k / 8) - 4.0);
+            format!(
+                "Use g {} {} {} {} {} 5 .{}\n",
+                0.5 * x,
+                0.2 * x * z,
+                0.6 * z,
+                7 * k,
+                11 * k,
+                15 + k % 4 * 5
+            )
+        })
+        .collect();
+    let library = Library::new(MemoryFiles::from([("fine.obj", obj(&ball(52), true, true))]));
+    let drawn = |material: &str, smooth: &str, options: &RenderOptions| {
+        let text = format!(
+            "{STAGE}{material}\nGroup g\nMesh \"fine.obj\" fine {smooth}\nEnd\n{uses}Sphere .6 0 1 1 chrome\nTrace"
+        );
+        let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library);
+        let scene = parsed.script.unwrap_or_else(|| panic!("{:?}", parsed.diagnostics)).frame(0).unwrap();
+        render(&scene, options).unwrap()
+    };
+    let fine = "Material fine ambient .1 .1 .2 diffuse .7 .6 .8 mirror .1 .1 .1 own shine .2 .2 .2 9";
+    let (usual, by_tree) =
+        (RenderOptions::default(), RenderOptions { models: Some(true), ..Default::default() });
+    let written = RenderOptions { models: Some(false), ..Default::default() };
+    for smooth in ["", "flat"] {
+        let picture = drawn(fine, smooth, &usual);
+        assert!(picture == drawn(fine, smooth, &by_tree), "there are many triangles");
+        let off = difference(&picture, &drawn(fine, smooth, &written));
+        assert!(off < 0.01, "{off} levels {smooth}");
+        let painted =
+            format!("Material two ambient .1 .1 .2 diffuse .7 .6 .8 mirror .1 .1 .1\n{fine} checker .3 two");
+        let painted = drawn(&painted, smooth, &by_tree);
+        assert!(
+            painted == drawn(fine, smooth, &written),
+            "patterns are drawn on triangles that are written out"
+        );
+    }
 }

@@ -61,19 +61,23 @@ impl Files for NoFiles {
 /// Files in memory, for tests and generated models.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryFiles {
-    files: BTreeMap<String, Vec<u8>>,
+    /// The content of each file, and its hash.
+    files: BTreeMap<String, (Vec<u8>, u64)>,
 }
 
 impl<const N: usize> From<[(&str, Vec<u8>); N]> for MemoryFiles {
     fn from(files: [(&str, Vec<u8>); N]) -> Self {
-        Self { files: files.into_iter().map(|(name, bytes)| (name.to_string(), bytes)).collect() }
+        let mut all = Self::default();
+        files.into_iter().for_each(|(name, bytes)| all.insert(name, bytes));
+        all
     }
 }
 
 impl MemoryFiles {
     /// Adds or replaces a file.
     pub fn insert(&mut self, name: &str, bytes: Vec<u8>) {
-        self.files.insert(name.into(), bytes);
+        let tag = fnv(&bytes);
+        self.files.insert(name.into(), (bytes, tag));
     }
 }
 
@@ -83,11 +87,11 @@ impl Files for MemoryFiles {
     }
 
     fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
-        Ok(self.files.get(name).map(|bytes| FileInfo { bytes: bytes.len() as u64, tag: fnv(bytes) }))
+        Ok(self.files.get(name).map(|(bytes, tag)| FileInfo { bytes: bytes.len() as u64, tag: *tag }))
     }
 
     fn read(&self, name: &str) -> Result<Vec<u8>, String> {
-        self.files.get(name).cloned().ok_or_else(|| "it is gone".into())
+        self.files.get(name).map(|(bytes, _)| bytes.clone()).ok_or_else(|| "it is gone".into())
     }
 }
 

@@ -114,6 +114,7 @@ pub struct Model {
     look_of: Vec<u32>,
     warnings: Vec<String>,
     closure: OnceLock<Closure>,
+    bounds: OnceLock<[DVec3; 2]>,
     derived: Derived,
 }
 
@@ -217,7 +218,7 @@ impl Model {
             look.cutoff = look.cutoff.filter(|_| !look.has_one_alpha(&parts.alphas));
         }
         let normals = normals.into_iter().map(unit).collect();
-        let (closure, derived) = (OnceLock::new(), Derived::default());
+        let (closure, bounds, derived) = (OnceLock::new(), OnceLock::new(), Derived::default());
         Ok(Some(Self {
             positions,
             triangles,
@@ -233,6 +234,7 @@ impl Model {
             look_of,
             warnings,
             closure,
+            bounds,
             derived,
         }))
     }
@@ -259,8 +261,17 @@ impl Model {
             look_of: self.look_of.clone(),
             warnings: self.warnings.clone(),
             closure: self.closure.clone(),
+            bounds: self.bounds.clone(),
             derived: Derived::default(),
         }
+    }
+
+    /// Returns the lowest and the highest corner of the box around the triangles.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        *self.bounds.get_or_init(|| {
+            let corners = self.triangles.iter().flatten().map(|i| self.positions[*i as usize]);
+            corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+        })
     }
 
     /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is made at the first call,
@@ -276,7 +287,7 @@ impl Model {
         let mut moved = self.with(Smoothing::OfFile);
         moved.positions.iter_mut().for_each(|p| *p = point(*p));
         moved.normals.iter_mut().for_each(|n| *n = direction(n.as_dvec3()).as_vec3());
-        moved.closure = OnceLock::new();
+        (moved.closure, moved.bounds) = (OnceLock::new(), OnceLock::new());
         moved.positions.iter().all(|p| p.is_finite()).then_some(moved)
     }
 

@@ -9,7 +9,7 @@ use rayfold_scene::{Fog, Scene, SharedSlice};
 
 use crate::camera::{Rays, Single};
 use crate::fast::Finder;
-use crate::meshes::{Expanded, Models};
+use crate::meshes::{Expanded, Shared};
 use crate::parallel::bands_of;
 use crate::parts;
 use crate::reference::{FirstSurface, FirstSurfaces};
@@ -72,7 +72,7 @@ pub fn first_hits(scene: &Scene, options: &RenderOptions) -> Result<Vec<FirstHit
     };
     let expanded = match &finder {
         Some(_) => Expanded { scene: Cow::Borrowed(ranked), faces },
-        None => Expanded::new(Cow::Borrowed(ranked), Models::WrittenOut),
+        None => Expanded::new(Cow::Borrowed(ranked), Shared::NONE),
     };
     let surfaces = FirstSurfaces::new(&expanded);
     let in_script = |object: usize| match &finder {

@@ -92,6 +92,10 @@ pub struct RenderOptions<'a> {
     pub tile: Option<(u32, u32)>,
     /// Whether objects are found by a tree. It is always used for more than 64 objects.
     pub tree: Option<bool>,
+    /// Whether the tree of a model is made once for all its meshes, and kept with it for further pictures. By default it is
+    /// for models of at least 100,000 triangles, all meshes counted. It never is for models of glass, with patterns or with
+    /// holes.
+    pub models: Option<bool>,
     /// The largest number of reflections and refractions that a ray follows. Default: the scene's own depth.
     pub bounces: Option<u32>,
     /// The arrangement of samples.

@@ -6,7 +6,7 @@
 //! objects ([`Faces`]), when a ray has hit it.
 //!
 //! The kernels draw meshes of many triangles from one tree in the coordinates of their model, which stays with the model
-//! ([`Models::Shared`]). Then each look of the mesh is one object, in place of its triangles. The order of a hit is that of
+//! ([`can_be_shared`]). Then each look of the mesh is one object, in place of its triangles. The order of a hit is that of
 //! the object, and its fraction is the number of the triangle ([`hit_face`]).
 
 use std::borrow::Cow;
@@ -20,6 +20,7 @@ use rayfold_scene::{
     Triangle,
 };
 
+use crate::RenderOptions;
 use crate::parts;
 use crate::pictures::{alpha_at, factor_at, level_at};
 use crate::reference::onward_normal;
@@ -38,17 +39,32 @@ pub(crate) struct Faces {
     runs: Vec<Run>,
 }
 
-/// The treatment of meshes of many triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Models {
-    /// The tree of a model is made once, however often it is drawn.
-    Shared,
-    /// All triangles are written out.
-    WrittenOut,
-}
-
 /// The least number of triangles, of all meshes of a model, with which its tree is shared.
-const MANY_TRIANGLES: usize = 100_000;
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shared(usize);
+
+impl Shared {
+    /// All triangles are written out.
+    pub(crate) const NONE: Self = Self(usize::MAX);
+
+    /// Returns what the options ask for.
+    pub(crate) fn by(options: &RenderOptions) -> Self {
+        match options.models {
+            None => Self(100_000),
+            Some(true) => Self(0),
+            Some(false) => Self::NONE,
+        }
+    }
+
+    /// Returns the models among objects whose trees are shared, by their places in memory.
+    fn among(self, objects: &[Object]) -> HashSet<*const Model> {
+        let mut counts: HashMap<*const Model, usize> = HashMap::new();
+        for mesh in objects.iter().filter_map(mesh).filter(|mesh| can_be_shared(mesh)) {
+            *counts.entry(Arc::as_ptr(mesh.model())).or_default() += mesh.model().triangle_count();
+        }
+        counts.into_iter().filter(|(_, count)| *count >= self.0).map(|(model, _)| model).collect()
+    }
+}
 
 /// The part of an order that counts the triangles of a model. There are fewer triangles than its inverse, and fewer objects
 /// than 2²⁸, so that an order is exact in `f64`.
@@ -111,11 +127,11 @@ pub(crate) struct FaceHit {
 }
 
 impl<'a> Expanded<'a> {
-    pub(crate) fn new(scene: Cow<'a, Scene>, models: Models) -> Self {
+    pub(crate) fn new(scene: Cow<'a, Scene>, shared: Shared) -> Self {
         if !scene.objects.iter().any(|object| mesh(object).is_some()) {
             return Self { scene, faces: None };
         }
-        let (objects, faces) = expanded(&scene.objects, Colors::of(&scene), models);
+        let (objects, faces) = expanded(&scene.objects, Colors::of(&scene), shared);
         Self {
             scene: Cow::Owned(Scene { objects: objects.into(), ..scene.into_owned() }),
             faces: Some(Arc::new(faces)),
@@ -156,8 +172,8 @@ impl Colors {
 }
 
 /// Expands the meshes among objects.
-pub(crate) fn expanded(objects: &[Object], colors: Colors, models: Models) -> (Vec<Object>, Faces) {
-    let shared = Shared::among(objects, models);
+pub(crate) fn expanded(objects: &[Object], colors: Colors, shared: Shared) -> (Vec<Object>, Faces) {
+    let shared = shared.among(objects);
     let mut all = Vec::with_capacity(objects.len());
     let mut faces = Faces::default();
     // The objects that the mesh of a group becomes, by its place in memory.
@@ -168,7 +184,7 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors, models: Models) -> (V
             continue;
         };
         let first = all.len();
-        let is_shared = shared.has(mesh);
+        let is_shared = can_be_shared(mesh) && shared.contains(&Arc::as_ptr(mesh.model()));
         let placement = match object {
             Object::Instance(instance) => {
                 let parts = of_groups
@@ -205,31 +221,6 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors, models: Models) -> (V
         });
     }
     (all, faces)
-}
-
-/// The models whose trees are shared, by their places in memory.
-struct Shared(HashSet<*const Model>);
-
-impl Shared {
-    fn among(objects: &[Object], models: Models) -> Self {
-        let mut counts: HashMap<*const Model, usize> = HashMap::new();
-        if models == Models::Shared {
-            for mesh in objects.iter().filter_map(mesh).filter(|mesh| can_be_shared(mesh)) {
-                *counts.entry(Arc::as_ptr(mesh.model())).or_default() += mesh.model().triangle_count();
-            }
-        }
-        Self(
-            counts
-                .into_iter()
-                .filter(|(_, count)| *count >= MANY_TRIANGLES)
-                .map(|(model, _)| model)
-                .collect(),
-        )
-    }
-
-    fn has(&self, mesh: &Mesh) -> bool {
-        can_be_shared(mesh) && self.0.contains(&Arc::as_ptr(mesh.model()))
-    }
 }
 
 /// Returns whether a mesh can be drawn from the tree of its model: it has no holes, is not of glass, and its coefficients do

@@ -43,7 +43,7 @@ use crate::fast::placement::window::{Grid, Window};
 #[cfg(feature = "accuracy")]
 use crate::fast::shapes::naive;
 use crate::fast::shapes::shape::Robust;
-use crate::meshes::Models;
+use crate::meshes::Shared;
 use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::parts;
 use crate::sampling::rough::Energies;
@@ -94,7 +94,7 @@ impl<'a> Drawing<'a> {
                 sampled_backend(exposure, options)?.unwrap_or(Backend::Reference(exposure, options)),
             ));
         }
-        let Ranked { scene: ranked, faces, .. } = &Ranked::new(scene, Models::Shared);
+        let Ranked { scene: ranked, faces, .. } = &Ranked::new(scene, Shared::by(options));
         let geometry = || Geometry::with_faces(ranked, faces.as_ref(), options.tree).ok();
         let geometry = if has_kernels(options) { geometry() } else { None };
         let precision = |geometry| Some((precision::resolve(options, &geometry, ranked)?, geometry));
@@ -330,7 +330,7 @@ fn sampled_backend<'a>(
     let (moments, faces): (Vec<Scene>, Vec<_>) = moments
         .iter()
         .map(|moment| {
-            let Ranked { scene, faces, .. } = Ranked::new(moment, Models::Shared);
+            let Ranked { scene, faces, .. } = Ranked::new(moment, Shared::by(options));
             (scene.into_owned(), faces)
         })
         .unzip();
@@ -374,7 +374,7 @@ fn has_kernels(_: &RenderOptions) -> bool {
 
 /// Returns the precision that [`Precision::Auto`] selects for a scene.
 pub(crate) fn precision(scene: &Scene) -> Precision {
-    let Ranked { scene, faces, .. } = &Ranked::new(scene, Models::Shared);
+    let Ranked { scene, faces, .. } = &Ranked::new(scene, Shared::by(&RenderOptions::default()));
     let geometry = Geometry::with_faces(scene, faces.as_ref(), None).ok();
     let resolved =
         geometry.and_then(|geometry| precision::resolve(&RenderOptions::default(), &geometry, scene));
@@ -387,7 +387,7 @@ pub(crate) fn precision(scene: &Scene) -> Precision {
 /// The errors of [`crate::render`].
 #[cfg(feature = "accuracy")]
 pub(crate) fn render_naive(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let Ranked { scene: ranked, .. } = &Ranked::new(scene, Models::WrittenOut);
+    let Ranked { scene: ranked, .. } = &Ranked::new(scene, Shared::NONE);
     let setup = Setup::<f32>::new(scene, ranked, &Geometry::new(ranked, options.tree)?, options)?;
     setup.draw::<naive::Naive>(0..scene.screen.height())
 }

@@ -25,7 +25,7 @@ use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::search::nearest;
 use crate::fast::transport::surfaces::surface;
-use crate::meshes::{Faces, Models};
+use crate::meshes::{Faces, Shared};
 use crate::{Precision, RenderError, RenderOptions};
 
 /// What a ray meets first.
@@ -53,7 +53,7 @@ pub fn nearest_hits(
 ) -> Result<Vec<Option<Found>>, RenderError> {
     let one_by_one =
         || rays.iter().map(|&(origin, direction)| one_by_one(scene, origin, direction)).collect();
-    let ranked = &Ranked::new(scene, Models::Shared);
+    let ranked = &Ranked::new(scene, Shared::by(options));
     let geometry = Geometry::with_faces(&ranked.scene, ranked.faces.as_ref(), options.tree)?;
     match resolve(options, &geometry, &ranked.scene) {
         Some(Precision::F64) => {
@@ -89,7 +89,7 @@ impl<'a> Finder<'a> {
     /// # Errors
     /// The errors of [`crate::render`].
     pub(crate) fn new(scene: &'a Scene, options: &RenderOptions<'a>) -> Result<Option<Self>, RenderError> {
-        let ranked = Ranked::new(scene, Models::WrittenOut);
+        let ranked = Ranked::new(scene, Shared::NONE);
         let geometry = || Geometry::with_faces(&ranked.scene, ranked.faces.as_ref(), options.tree).ok();
         let geometry = if has_kernels(options) { geometry() } else { None };
         let in_double = RenderOptions { precision: Precision::F64, ..*options };

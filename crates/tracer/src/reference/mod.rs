@@ -49,7 +49,7 @@ pub(crate) use shapes::{
 pub(crate) use tone::{encoded, levels};
 
 use crate::camera::Ray;
-use crate::meshes::{Colors, Expanded, Faces, Models, expanded, mesh};
+use crate::meshes::{Colors, Expanded, Faces, Shared, expanded, mesh};
 use crate::parallel::{CHANNELS, bands};
 use crate::{RenderError, RenderOptions};
 use shading::Shader;
@@ -76,7 +76,7 @@ pub fn render(scene: &Scene, options: &RenderOptions) -> Result<RgbImage, Render
 
 /// Draws some rows of a scene with the reference tracer.
 fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Result<RgbImage, RenderError> {
-    let expanded = Expanded::new(Cow::Borrowed(scene), Models::WrittenOut);
+    let expanded = Expanded::new(Cow::Borrowed(scene), Shared::NONE);
     let world = World::of(&expanded);
     let lights = world.middles();
     let image = bands(
@@ -102,7 +102,7 @@ fn render_rows(scene: &Scene, rows: Range<u32>, options: &RenderOptions) -> Resu
 
 /// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
-    let expanded = Expanded::new(Cow::Borrowed(scene), Models::WrittenOut);
+    let expanded = Expanded::new(Cow::Borrowed(scene), Shared::NONE);
     let world = World::of(&expanded);
     let ray = world.rays.ray(f64::from(i), f64::from(j));
     Shader { world: &world, lights: &world.middles(), cancel: None, paths: None }
@@ -115,7 +115,7 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
     if objects.iter().any(|object| mesh(object).is_some()) {
-        let (objects, faces) = expanded(objects, Colors::default(), Models::WrittenOut);
+        let (objects, faces) = expanded(objects, Colors::default(), Shared::NONE);
         let hit = nearest_of(&objects, Ray { origin, direction }, Some(&faces))?;
         return Some(Hit { object: faces.origin(hit.object), ..hit });
     }

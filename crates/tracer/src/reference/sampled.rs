@@ -14,7 +14,7 @@ use super::tone;
 use super::world::World;
 use crate::camera::Ray;
 use crate::cover::Lit;
-use crate::meshes::{Expanded, Models};
+use crate::meshes::{Expanded, Shared};
 use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::sampling::paths::{Way, choice, choice_dimension, direction_dimension};
 use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
@@ -124,7 +124,7 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
     let energies = Energies::of(&scenes);
     let bounces = options.bounces(scene);
     let scenes: Vec<Expanded> =
-        scenes.iter().map(|scene| Expanded::new(Cow::Borrowed(scene), Models::WrittenOut)).collect();
+        scenes.iter().map(|scene| Expanded::new(Cow::Borrowed(scene), Shared::NONE)).collect();
     let moments = scenes.iter().map(|scene| {
         let energies = energies.clone();
         Moment { world: World::of(scene), energies, dimensions: &dimensions, bounces }
@@ -257,7 +257,7 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
         let time = independent(seed, u64::MAX, first.into(), 0);
         let at = exposure.at(time);
         let energies = Energies::of(core::slice::from_ref(&at));
-        let of_moment = Expanded::new(Cow::Owned(at), Models::WrittenOut);
+        let of_moment = Expanded::new(Cow::Owned(at), Shared::NONE);
         let moment = Moment { world: World::of(&of_moment), energies, dimensions: &dimensions, bounces };
         sums.par_iter_mut().enumerate().for_each(|(place, sum)| {
             let place = place as u64;

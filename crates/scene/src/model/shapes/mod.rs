@@ -181,6 +181,9 @@ impl Object {
 
     /// Returns the lowest and the highest corner of the box around the object, or `None` if it is unbounded.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        if let Self::Mesh(mesh) = self {
+            return Some(mesh.model().bounds());
+        }
         let corner = |sign: f64| {
             let [x, y, z] = DVec3::AXES.map(|axis| self.support(sign * axis));
             Some(sign * DVec3::new(x?, y?, z?))

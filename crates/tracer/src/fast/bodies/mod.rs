@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use rayfold_scene::Object;
 
 use self::body_culler::BodyCuller;
@@ -173,6 +173,8 @@ impl<E> Shape<E> {
 pub(super) struct Body<E> {
     /// Orthonormal axes. The last is the axis of symmetry of round shapes.
     axes: [[E; 3]; 3],
+    /// Whether the axes are those of the scene.
+    is_straight: bool,
     /// The origin of the axes.
     center: [E; 3],
     /// The offset of a new ray from the surface, without the part that depends on the hit point.
@@ -197,7 +199,9 @@ impl<E: Real> Body<E> {
             AnyForm::Capsule(CapsuleForm { radius, height, .. }) => {
                 Shape::Capsule(Capsule::new(radius, height))
             }
-            AnyForm::Roundbox(RoundboxForm { half, radius }) => Shape::Roundbox(Roundbox::new(half, radius)),
+            AnyForm::Roundbox(RoundboxForm { half, radius }) => {
+                Shape::Roundbox(Roundbox::new(half, radius, solid.frame.center.abs().max_element()))
+            }
             AnyForm::Cuboid(CuboidForm { half }) => Shape::Cuboid(Cuboid::new(half)),
             AnyForm::Cutout(form) => match holes {
                 Some(holes) => Shape::Cutout(Box::new(Cutout::new(form, solid.order, holes.clone()))),
@@ -213,6 +217,7 @@ impl<E: Real> Body<E> {
         };
         Self {
             axes: solid.frame.axes.map(|axis| axis.to_array().map(E::narrow)),
+            is_straight: solid.frame.axes == DVec3::AXES,
             center: solid.frame.center.to_array().map(E::narrow),
             offset: E::narrow(OFFSET * E::ROUNDOFF * solid.extent()),
             order: E::narrow(f64::from(solid.order)),
@@ -224,6 +229,9 @@ impl<E: Real> Body<E> {
     #[inline(always)]
     fn local<S: Simd>(&self, simd: S, ray: Ray<S, E>) -> Local<S, E> {
         let origin = ray.origin.sub(Vec3::splat(simd, self.center));
+        if self.is_straight {
+            return Local { origin, direction: ray.direction };
+        }
         Local { origin: self.turned(simd, origin), direction: self.turned(simd, ray.direction) }
     }
 

@@ -57,8 +57,7 @@ impl<E: Real> ModelTree<E> {
     fn new(model: &Model) -> Self {
         let count = model.triangle_count();
         let corners = || (0..count).flat_map(|k| model.corners(k));
-        let (low, high) =
-            corners().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(p), high.max(p)));
+        let [low, high] = model.bounds();
         let center = low + 0.5 * (high - low);
         let scale = below_inverse((high - center).max(center - low).max_element());
         let place = |p: DVec3| (p - center) * scale;

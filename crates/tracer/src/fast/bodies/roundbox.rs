@@ -36,6 +36,9 @@ pub(super) struct Roundbox<E> {
     radius: E,
     /// The distance of the bounding box from the core, with the rounding errors of tests against the box.
     reach: E,
+    /// Half of the lengths of that box, and the rounding error of the moment of a ray.
+    outer: [E; 3],
+    slack: E,
 }
 
 /// The least step of a ray along an axis, for a direction of length 1.
@@ -196,10 +199,17 @@ fn later<S: Simd, E: Real>(
 }
 
 impl<E: Real> Roundbox<E> {
-    pub(super) fn new(half: DVec3, radius: f64) -> Self {
+    /// `far` is at least the largest coordinate of its centre.
+    pub(super) fn new(half: DVec3, radius: f64, far: f64) -> Self {
         let core = (half - radius).max(DVec3::ZERO);
         let reach = radius + WIDER * E::ROUNDOFF * half.element_sum();
-        Self { core: core.to_array().map(E::narrow), radius: E::narrow(radius), reach: E::narrow(reach) }
+        Self {
+            core: core.to_array().map(E::narrow),
+            radius: E::narrow(radius),
+            reach: E::narrow(reach),
+            outer: (core + reach).to_array().map(E::narrow),
+            slack: E::narrow(WIDER * E::ROUNDOFF * (1.0 + far + half.element_sum())),
+        }
     }
 
     #[inline(always)]
@@ -225,9 +235,27 @@ impl<E: Real> Roundbox<E> {
         exit
     }
 
+    /// Returns the rays whose lines meet the bounding box, by the three planes through a line and along an axis. It is the
+    /// test that misses soonest, because it has no division.
+    #[inline(always)]
+    fn passes<S: Simd>(&self, simd: S, Local { origin, direction }: Local<S, E>) -> Mask<S, E> {
+        let [x, y, z] = self.outer.map(|half| splat::<S, E>(simd, half));
+        let slack = splat::<S, E>(simd, self.slack);
+        let moment = origin.cross(direction);
+        let Vec3 { x: dx, y: dy, z: dz } = direction;
+        let (dx, dy, dz) = (dx.abs(), dy.abs(), dz.abs());
+        moment.x.abs().simd_le(y.mul_add(dz, z.mul_add(dy, slack)))
+            & moment.y.abs().simd_le(z.mul_add(dx, x.mul_add(dz, slack)))
+            & moment.z.abs().simd_le(x.mul_add(dy, y.mul_add(dx, slack)))
+    }
+
     #[inline(always)]
     pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
+        let passes = self.passes(simd, ray);
+        if !passes.any_true() {
+            return (passes, zero);
+        }
         let (nearest, place) = Self::nearest(simd, ray);
         let slabs = Slabs::new(simd, self, place, ray.direction);
         let [enter, leave] = slabs.outer();

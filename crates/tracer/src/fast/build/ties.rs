@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rayfold_scene::{Object, Scene};
 
-use crate::meshes::{Expanded, Faces, Models};
+use crate::meshes::{Expanded, Faces, Shared};
 use crate::parts::BUILT;
 
 /// A scene whose objects stand in the order in which equal hits count.
@@ -21,16 +21,16 @@ pub(crate) struct Ranked<'a> {
 }
 
 impl<'a> Ranked<'a> {
-    pub(crate) fn new(scene: &'a Scene, models: Models) -> Self {
+    pub(crate) fn new(scene: &'a Scene, shared: Shared) -> Self {
         if scene.objects.is_sorted_by_key(is_glass) {
-            let Expanded { scene, faces } = expanded(Cow::Borrowed(scene), models);
+            let Expanded { scene, faces } = expanded(Cow::Borrowed(scene), shared);
             return Self { scene, faces, places: None };
         }
         let mut places: Vec<usize> = (0..scene.objects.len()).collect();
         places.sort_by_key(|&place| is_glass(&scene.objects[place]));
         let objects = places.iter().map(|&place| scene.objects[place].clone()).collect();
         let scene = Cow::Owned(Scene { objects, ..scene.clone() });
-        let Expanded { scene, faces } = expanded(scene, models);
+        let Expanded { scene, faces } = expanded(scene, shared);
         Self { scene, faces, places: Some(places) }
     }
 
@@ -42,8 +42,8 @@ impl<'a> Ranked<'a> {
 }
 
 /// Expands meshes, in builds that have them.
-fn expanded(scene: Cow<'_, Scene>, models: Models) -> Expanded<'_> {
-    if BUILT.meshes { Expanded::new(scene, models) } else { Expanded { scene, faces: None } }
+fn expanded(scene: Cow<'_, Scene>, shared: Shared) -> Expanded<'_> {
+    if BUILT.meshes { Expanded::new(scene, shared) } else { Expanded { scene, faces: None } }
 }
 
 fn is_glass(object: &Object) -> bool {
@@ -68,10 +68,10 @@ mod tests {
         let opaque = Material::default();
         let mut scene = Scene::new(Screen::new(1, 1).unwrap(), Camera::Orthographic);
         scene.objects = vec![ball(1.0, &opaque), ball(2.0, &glass)].into();
-        assert!(matches!(Ranked::new(&scene, Models::Shared).scene, Cow::Borrowed(_)));
+        assert!(matches!(Ranked::new(&scene, Shared::NONE).scene, Cow::Borrowed(_)));
         scene.objects =
             vec![ball(1.0, &glass), ball(2.0, &opaque), ball(3.0, &glass), ball(4.0, &opaque)].into();
-        let ranked = Ranked::new(&scene, Models::Shared);
+        let ranked = Ranked::new(&scene, Shared::NONE);
         assert_eq!([0, 1, 2, 3].map(|order| ranked.in_script(order)), [1, 3, 0, 2]);
         assert_eq!(ranked.scene.objects[2], scene.objects[0]);
     }
