@@ -39,6 +39,9 @@ pub(super) struct Roundbox<E> {
     /// Half of the lengths of that box, and the rounding error of the moment of a ray.
     outer: [E; 3],
     slack: E,
+    /// The inverse of the radius, and whether rounding errors are more than a small part of the radius.
+    inverse: E,
+    is_sharp: bool,
 }
 
 /// The least step of a ray along an axis, for a direction of length 1.
@@ -78,14 +81,15 @@ struct Slabs<S: Simd, E: Real>([Slab<S, E>; 3]);
 
 impl<S: Simd, E: Real> Slab<S, E> {
     #[inline(always)]
-    fn new(simd: S, (half, reach): (E, E), place: Lanes<S, E>, direction: Lanes<S, E>) -> Self {
-        let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
-        let least = constant::<S, E>(simd, LEAST_STEP);
+    fn new(
+        simd: S,
+        (half, reach): (E, E),
+        place: Lanes<S, E>,
+        (direction, inverse): (Lanes<S, E>, Lanes<S, E>),
+    ) -> Self {
+        let zero = constant::<S, E>(simd, 0.0);
         let half = splat::<S, E>(simd, half);
-        let forwards = direction.simd_gt(zero);
-        let direction = forwards.select(direction.max(least), direction.min(zero - least));
-        let inverse = one / direction;
-        let face = forwards.select(half, zero - half);
+        let face = direction.simd_gt(zero).select(half, zero - half);
         let (before, behind) = (place + face, place - face);
         let (near, far) = (zero - before * inverse, zero - behind * inverse);
         let grown = splat::<S, E>(simd, reach) * inverse.abs();
@@ -120,10 +124,17 @@ impl<S: Simd, E: Real> Slabs<S, E> {
     #[inline(always)]
     fn new(simd: S, roundbox: &Roundbox<E>, place: Vec3<S, E>, direction: Vec3<S, E>) -> Self {
         let Roundbox { core: [x, y, z], reach, .. } = *roundbox;
+        let dx = not_along::<S, E>(simd, direction.x);
+        let dy = not_along::<S, E>(simd, direction.y);
+        let dz = not_along::<S, E>(simd, direction.z);
+        // One division for three. The parameters may err, because neighbouring parabolas are alike where they meet.
+        let yz = dy * dz;
+        let all = constant::<S, E>(simd, 1.0) / (dx * yz);
+        let x_all = dx * all;
         Self([
-            Slab::new(simd, (x, reach), place.x, direction.x),
-            Slab::new(simd, (y, reach), place.y, direction.y),
-            Slab::new(simd, (z, reach), place.z, direction.z),
+            Slab::new(simd, (x, reach), place.x, (dx, yz * all)),
+            Slab::new(simd, (y, reach), place.y, (dy, dz * x_all)),
+            Slab::new(simd, (z, reach), place.z, (dz, dy * x_all)),
         ])
     }
 
@@ -172,13 +183,21 @@ impl<S: Simd, E: Real> Slabs<S, E> {
         let from = Vec3::<S, E>::new(x.0, y.0, z.0);
         let along = Vec3::<S, E>::new(x.1, y.1, z.1);
         let a = along.dot(along);
+        let inverse = constant::<S, E>(simd, 1.0) / a;
         // As a cross product, because the squares of the vectors cancel.
         let across = from.cross(along);
         let discriminant = square.mul_sub(a, across.dot(across));
-        let at = (zero - from.dot(along) - discriminant.max(zero).sqrt()) / a;
+        let at = (zero - from.dot(along) - discriminant.max(zero).sqrt()) * inverse;
         let enters = discriminant.simd_ge(zero) & a.simd_gt(zero);
         Entry { at, from_core: along.scale_add(at, from), enters }
     }
+}
+
+/// Returns the step of rays along an axis, not 0.
+#[inline(always)]
+fn not_along<S: Simd, E: Real>(simd: S, step: Lanes<S, E>) -> Lanes<S, E> {
+    let (zero, least) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, LEAST_STEP));
+    step.simd_gt(zero).select(step.max(least), step.min(zero - least))
 }
 
 /// Returns the later beginning of the parabola in which rays enter the body, given a parameter at which they are at a
@@ -208,6 +227,8 @@ impl<E: Real> Roundbox<E> {
             radius: E::narrow(radius),
             reach: E::narrow(reach),
             outer: (core + reach).to_array().map(E::narrow),
+            inverse: E::narrow(1.0 / radius),
+            is_sharp: radius < 1e-5 * half.max_element(),
             slack: E::narrow(WIDER * E::ROUNDOFF * (1.0 + far + half.element_sum())),
         }
     }
@@ -293,7 +314,14 @@ impl<E: Real> Roundbox<E> {
                 within.select(last.z, from_core.z),
             );
         }
-        let normal = from_core.normalize(simd);
+        let normal = if self.is_sharp {
+            from_core.normalize(simd)
+        } else {
+            // Its length is the radius, but for rounding errors. A step of Newton's method makes it 1.
+            let normal = from_core.scale(splat::<S, E>(simd, self.inverse));
+            let half = constant::<S, E>(simd, -0.5);
+            normal.scale(normal.dot(normal).mul_add(half, constant::<S, E>(simd, 1.5)))
+        };
         let place = ray.direction.scale_add(distance, ray.origin);
         let radius = splat::<S, E>(simd, self.radius);
         let [x, y, z] = self.core;
