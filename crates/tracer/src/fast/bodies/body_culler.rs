@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::Solid;
 use crate::fast::acceleration::candidates::MASKED;
-use crate::fast::arithmetic::real::{Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::Shape;
 
@@ -27,6 +27,8 @@ pub(super) struct BodyCuller<E> {
 struct Ball<E> {
     center: [E; 3],
     square: E,
+    /// The radius, with the errors of distances along a ray.
+    radius: E,
 }
 
 impl<E: Real> BodyCuller<E> {
@@ -41,14 +43,22 @@ impl<E: Real> BodyCuller<E> {
         Some(Self { boxes: boxes?, balls })
     }
 
-    /// Returns the rays that come near the body of this bit.
+    /// Returns the rays that come near the body of this bit before a distance.
     #[inline(always)]
-    pub(super) fn are_near<S: Simd>(&self, simd: S, bit: usize, ray: Ray<S, E>) -> Mask<S, E> {
-        let Ball { center, square } = self.balls[bit];
+    pub(super) fn are_near<S: Simd>(
+        &self,
+        simd: S,
+        bit: usize,
+        ray: Ray<S, E>,
+        before: Lanes<S, E>,
+    ) -> Mask<S, E> {
+        let Ball { center, square, radius } = self.balls[bit];
         let to = Vec3::splat(simd, center).sub(ray.origin);
         let along = to.dot(ray.direction);
         let apart = to.dot(to) - along * along;
-        apart.simd_le(splat::<S, E>(simd, square) + to.dot(to) * constant::<S, E>(simd, WIDER * E::ROUNDOFF))
+        let slack = to.dot(to) * constant::<S, E>(simd, WIDER * E::ROUNDOFF);
+        apart.simd_le(splat::<S, E>(simd, square) + slack)
+            & (along - splat::<S, E>(simd, radius)).simd_le(before)
     }
 }
 
@@ -57,6 +67,11 @@ impl<E: Real> Ball<E> {
         let square = radius * radius * (1.0 + WIDER * E::ROUNDOFF);
         // The effect of the centre's rounding error.
         let shift = WIDER * E::ROUNDOFF * (center.length() * (radius + center.length()));
-        Self { center: center.to_array().map(E::narrow), square: E::narrow(square + shift) }
+        let along = WIDER * E::ROUNDOFF * (1.0 + radius + center.length());
+        Self {
+            center: center.to_array().map(E::narrow),
+            square: E::narrow(square + shift),
+            radius: E::narrow(radius + along),
+        }
     }
 }

@@ -293,7 +293,7 @@ impl<E: Real> Body<E> {
                         Shape::Cone(cone, end) => cone.intersect(simd, local, self.over(simd, *end, ray)),
                         Shape::Torus(torus) => torus.intersect(simd, local, nearest.distance),
                         Shape::Capsule(capsule) => capsule.intersect(simd, local),
-                        Shape::Roundbox(roundbox) => roundbox.intersect(simd, local),
+                        Shape::Roundbox(roundbox) => roundbox.intersect(simd, local, nearest.distance),
                         Shape::Cuboid(cuboid) => cuboid.intersect(simd, local),
                         Shape::Cutout(cutout) => return cutout.intersect(simd, ray, nearest),
                         Shape::Model(model) => return model.intersect(simd, local, self.order, nearest),
@@ -488,7 +488,7 @@ impl<E: Real> Bodies<E> {
             let bit = bits.trailing_zeros() as usize;
             bits &= bits - 1;
             let open = with.distance.simd_gt(zero);
-            if (open & few.are_near(simd, bit, ray)).any_true() {
+            if (open & few.are_near(simd, bit, ray, with.distance)).any_true() {
                 self.bodies[self.planes + bit].intersect(simd, ray, &mut with);
             }
         }

@@ -36,7 +36,7 @@ pub(super) struct Roundbox<E> {
     radius: E,
     /// The distance of the bounding box from the core, with the rounding errors of tests against the box.
     reach: E,
-    /// Half of the lengths of that box, and the rounding error of the moment of a ray.
+    /// Half of the lengths of that box, and a bound on the rounding errors of the moment of a ray and of distances.
     outer: [E; 3],
     slack: E,
     /// The inverse of the radius, and whether rounding errors are more than a small part of the radius.
@@ -270,8 +270,14 @@ impl<E: Real> Roundbox<E> {
             & moment.z.abs().simd_le(x.mul_add(dy, y.mul_add(dx, slack)))
     }
 
+    /// Returns the hits of the rays and their distances, at least all that are no farther than `before`.
     #[inline(always)]
-    pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Mask<S, E>, Lanes<S, E>) {
+    pub(super) fn intersect<S: Simd>(
+        &self,
+        simd: S,
+        ray: Local<S, E>,
+        before: Lanes<S, E>,
+    ) -> (Mask<S, E>, Lanes<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
         let passes = self.passes(simd, ray);
         if !passes.any_true() {
@@ -280,7 +286,9 @@ impl<E: Real> Roundbox<E> {
         let (nearest, place) = Self::nearest(simd, ray);
         let slabs = Slabs::new(simd, self, place, ray.direction);
         let [enter, leave] = slabs.outer();
-        let hits = enter.simd_le(leave) & (leave + nearest).simd_gt(zero);
+        let before = before + splat::<S, E>(simd, self.slack);
+        let is_before = (leave + nearest).simd_gt(zero) & (enter + nearest).simd_le(before);
+        let hits = enter.simd_le(leave) & is_before;
         if !hits.any_true() {
             return (hits, zero);
         }
