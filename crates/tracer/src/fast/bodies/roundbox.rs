@@ -47,6 +47,9 @@ pub(super) struct Roundbox<E> {
 /// The least step of a ray along an axis, for a direction of length 1.
 const LEAST_STEP: f64 = 1e-30;
 
+/// The radius, in units of half of the greatest length, below which normals are computed as exactly as the ends of intervals.
+const SHARP_TO_SEE: f64 = 1e-5;
+
 /// The widening of the bounding box, in roundoffs of the body's size.
 const WIDER: f64 = 64.0;
 
@@ -228,7 +231,7 @@ impl<E: Real> Roundbox<E> {
             reach: E::narrow(reach),
             outer: (core + reach).to_array().map(E::narrow),
             inverse: E::narrow(1.0 / radius),
-            is_sharp: radius < 1e-5 * half.max_element(),
+            is_sharp: radius < SHARP_TO_SEE * half.max_element().max(0.1),
             slack: E::narrow(WIDER * E::ROUNDOFF * (1.0 + far + half.element_sum())),
         }
     }
@@ -308,37 +311,51 @@ impl<E: Real> Roundbox<E> {
     #[inline(always)]
     pub(super) fn surface<S: Simd>(&self, simd: S, ray: Local<S, E>, distance: Lanes<S, E>) -> BodyHit<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
+        let place = ray.direction.scale_add(distance, ray.origin);
+        let in_core = self.in_core(simd, place);
+        let (normal, within) = if self.is_sharp {
+            self.sharp(simd, ray)
+        } else {
+            let start = ray.origin.sub(self.in_core(simd, ray.origin));
+            // The length of the normal is 1 but for rounding errors, of which a step of Newton's method leaves none.
+            let normal = place.sub(in_core).scale(splat::<S, E>(simd, self.inverse));
+            let half = constant::<S, E>(simd, -0.5);
+            let normal = normal.scale(normal.dot(normal).mul_add(half, constant::<S, E>(simd, 1.5)));
+            (normal, start.dot(start).simd_lt(self.square(simd)))
+        };
+        let point = normal.scale_add(splat::<S, E>(simd, self.radius), in_core);
+        BodyHit { point, normal: normal.scale(within.select(zero - one, one)), within }
+    }
+
+    /// Returns the outer normal at the hit of each ray, where the radius is not much more than rounding errors, and whether the ray
+    /// starts within.
+    #[inline(always)]
+    fn sharp<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Vec3<S, E>, Mask<S, E>) {
+        let zero = constant::<S, E>(simd, 0.0);
         let (nearest, place) = Self::nearest(simd, ray);
         let slabs = Slabs::new(simd, self, place, ray.direction);
         let entry = slabs.entry(simd, self.square(simd));
         let [enter, _] = slabs.outer();
         let within = (enter + nearest).simd_le(zero) & (entry.at + nearest).simd_le(zero);
-        let mut from_core = entry.from_core;
-        if within.any_true() {
-            let last = self.exit(simd, place, ray.direction).from_core;
-            from_core = Vec3::<S, E>::new(
-                within.select(last.x, from_core.x),
-                within.select(last.y, from_core.y),
-                within.select(last.z, from_core.z),
-            );
-        }
-        let normal = if self.is_sharp {
-            from_core.normalize(simd)
-        } else {
-            // Its length is the radius, but for rounding errors. A step of Newton's method makes it 1.
-            let normal = from_core.scale(splat::<S, E>(simd, self.inverse));
-            let half = constant::<S, E>(simd, -0.5);
-            normal.scale(normal.dot(normal).mul_add(half, constant::<S, E>(simd, 1.5)))
-        };
-        let place = ray.direction.scale_add(distance, ray.origin);
-        let radius = splat::<S, E>(simd, self.radius);
-        let [x, y, z] = self.core;
-        let point = Vec3::<S, E>::new(
-            normal.x.mul_add(radius, clamped::<S, E>(simd, place.x, x)),
-            normal.y.mul_add(radius, clamped::<S, E>(simd, place.y, y)),
-            normal.z.mul_add(radius, clamped::<S, E>(simd, place.z, z)),
+        let first = entry.from_core;
+        let last = self.exit(simd, place, ray.direction).from_core;
+        let from_core = Vec3::<S, E>::new(
+            within.select(last.x, first.x),
+            within.select(last.y, first.y),
+            within.select(last.z, first.z),
         );
-        BodyHit { point, normal: normal.scale(within.select(zero - one, one)), within }
+        (from_core.normalize(simd), within)
+    }
+
+    /// Returns the points of the core that are nearest to some points.
+    #[inline(always)]
+    fn in_core<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Vec3<S, E> {
+        let [x, y, z] = self.core;
+        Vec3::<S, E>::new(
+            clamped::<S, E>(simd, point.x, x),
+            clamped::<S, E>(simd, point.y, y),
+            clamped::<S, E>(simd, point.z, z),
+        )
     }
 }
 
