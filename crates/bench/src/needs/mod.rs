@@ -31,9 +31,12 @@ pub struct Args {
     /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
-    /// Use the build without all parts of version 2, and a third of those without some of them; write nothing
+    /// Use the build without all parts of version 2, and every fifth of those without some of them; write nothing
     #[arg(long)]
     slice: bool,
+    /// Begin with this of those; without it, with one of the first five
+    #[arg(long, requires = "slice")]
+    first: Option<usize>,
 }
 
 impl Args {
@@ -44,8 +47,13 @@ impl Args {
             // The last one is without all of version 2.
             builds = builds.pop().into_iter().collect();
         }
-        let step = if self.slice { 3 } else { 1 };
-        builds.extend(of_version_2.into_iter().step_by(step));
+        if self.slice {
+            let first = self.first.unwrap_or_else(|| fastrand::usize(..SLICES));
+            eprintln!("a slice: --first {first} repeats it");
+            builds.extend(of_version_2.into_iter().skip(first).step_by(SLICES));
+        } else {
+            builds.extend(of_version_2);
+        }
         builds.retain(|build| build.name.contains(&self.only));
         builds
     }
@@ -56,6 +64,9 @@ const MOST: f64 = 0.5;
 
 /// The driver's exit code for a scene that needs a part that its build lacks.
 const LEFT_OUT: i32 = 3;
+
+/// The number of slices that have all builds.
+const SLICES: usize = 5;
 
 /// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;
@@ -132,8 +143,16 @@ pub fn run(args: &Args) -> Result<()> {
 /// Builds the driver whole and without parts.
 fn build(builds: &[Build], folder: &Path) -> Result<Vec<PathBuf>> {
     let next = AtomicUsize::new(0);
+    let target =
+        |place: usize| Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../target/needs-{place}"));
+    // The tracer's dependencies are built once, on all cores.
+    cargo_build(&["--package", "rayfold-scene"], &target(0)).context("the tracer's dependencies")?;
+    for other in (1..AT_ONCE).map(target).filter(|target| !target.exists()) {
+        let status = Command::new("cp").arg("-a").args([target(0), other]).status().context("cp")?;
+        ensure!(status.success(), "cp: {status}");
+    }
     let builder = |place: usize| -> Result<Vec<(usize, PathBuf)>> {
-        let target = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../target/needs-{place}"));
+        let target = target(place);
         let mut built = Vec::new();
         loop {
             let k = next.fetch_add(1, Ordering::Relaxed);
@@ -164,10 +183,19 @@ fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<Path
     let name = if without.is_empty() { "whole".into() } else { format!("without {}", without.join(", ")) };
     eprintln!("building the tracer, {name}");
     let with: Vec<_> = parts().map(|(part, _)| part).filter(|part| !without.contains(part)).collect();
+    let with = with.join(",");
+    let example =
+        ["--package", "rayfold-tracer", "--example", "frames", "--no-default-features", "--features", &with];
+    cargo_build(&example, target).context(name)?;
+    std::fs::copy(target.join("release/examples/frames"), program)?;
+    Ok(program.to_owned())
+}
+
+fn cargo_build(what: &[&str], target: &Path) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let status = Command::new(cargo)
-        .args(["build", "--quiet", "--locked", "--release", "--package", "rayfold-tracer"])
-        .args(["--example", "frames", "--no-default-features", "--features", &with.join(",")])
+        .args(["build", "--quiet", "--locked", "--release"])
+        .args(what)
         // One codegen unit, because the division into several depends on the code, and changes counts by up to 10 %.
         .args(["--config", "profile.release.package.rayfold-tracer.codegen-units=1"])
         .arg("--target-dir")
@@ -175,9 +203,8 @@ fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<Path
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
         .status()
         .context("cargo")?;
-    ensure!(status.success(), "cargo build, {name}: {status}");
-    std::fs::copy(target.join("release/examples/frames"), program)?;
-    Ok(program.to_owned())
+    ensure!(status.success(), "cargo build: {status}");
+    Ok(())
 }
 
 /// Returns a row for each build that lacks only parts that the scene does not use. Checks that the other builds refuse
