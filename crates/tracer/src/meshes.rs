@@ -7,6 +7,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -15,6 +16,7 @@ use rayfold_scene::{
     Coefficients, Finish, ImageMap, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone,
     Triangle,
 };
+use rayon::prelude::*;
 
 use crate::parts;
 use crate::pictures::{alpha_at, factor_at, level_at};
@@ -36,7 +38,7 @@ pub(crate) struct Faces {
 
 /// The faces of one mesh, as it is drawn once.
 #[derive(Debug)]
-struct Run {
+pub(crate) struct Run {
     /// The position of the first face, and the number of faces.
     first: usize,
     count: usize,
@@ -290,6 +292,32 @@ impl Faces {
         self.run_of(order).is_some_and(|run| run.is_filled)
     }
 
+    /// Returns how much normals can turn, as a sine, where a hit is beside its place by a roundoff of its distance: in
+    /// roundoffs. A point p of the world is at `(p - center) * scale`, and no hit is nearer to the eye than `nearest`.
+    pub(crate) fn steepest(&self, (center, scale): (DVec3, f64), nearest: f64) -> f64 {
+        let of_run = |run: &Run| {
+            let of_face = |k: usize| {
+                let Some(normals) = run.normals(k) else { return 0.0 };
+                let corners = run.corners(k, center, scale);
+                let farthest = corners.into_iter().map(DVec3::length).fold(nearest, f64::max);
+                farthest * bend(corners, normals)
+            };
+            let faces = (0..run.count).into_par_iter().with_min_len(1024).map(of_face);
+            faces.reduce(|| 0.0, f64::max)
+        };
+        self.runs.iter().filter(|run| run.has_normals()).map(of_run).fold(0.0, f64::max)
+    }
+
+    /// Returns the runs of faces, in the order of the objects.
+    pub(crate) fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// Returns whether what is seen of the object at `order` varies with the place of a hit on it.
+    pub(crate) fn is_varied(&self, order: usize) -> bool {
+        self.run_of(order).is_some_and(|run| run.has_normals() || run.is_colored())
+    }
+
     fn run_of(&self, order: usize) -> Option<&Run> {
         let run = self.runs[..self.runs.partition_point(|run| run.first <= order)].last()?;
         (order < run.first + run.count).then_some(run)
@@ -306,12 +334,7 @@ impl Faces {
         let outwards = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let within = run.is_filled && outwards.dot(direction) > 0.0;
         let (mut normal, mut lift) = (face, DVec3::ZERO);
-        if let Some(normals) = run.model.normals(k) {
-            let turned = |n: DVec3| match &run.placement {
-                Some(placement) => placement.rotation() * n,
-                None => n,
-            };
-            let normals = normals.map(turned);
+        if let Some(normals) = run.normals(k) {
             let mixed: DVec3 = normals.iter().zip(weights).map(|(n, b)| *n * b).sum();
             let mixed = if mixed.dot(face) < 0.0 { -mixed } else { mixed }.normalize_or_zero();
             if mixed.dot(direction) < 0.0 {
@@ -322,26 +345,8 @@ impl Faces {
                 lift += b * n.dot(corner - point).max(0.0) * n;
             }
         }
-        let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
-        let look = || run.model.look(k);
-        if run.has_colors && run.model.is_varied(look()) {
-            let level = run.level(k, weights, Slot::Color);
-            color = run.model.color(k, weights, level, run.is_linear);
-        }
-        let finish = material.finish();
-        if run.has_image
-            && let (Some(image), Some(uvs)) = (finish.and_then(|f| f.image.as_ref()), run.model.uvs(k))
-        {
-            let [u, v] = [0, 1].map(|axis: usize| {
-                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
-            });
-            let v = if run.model.has_uvs_from_top() { v } else { 1.0 - v };
-            color *= factor_at(image.file().picture(), [u, v], true, run.is_linear);
-        }
-        if run.glows && glows_apart(&run.model, look()) {
-            glow = run.model.glow(look(), run.level(k, weights, Slot::Glow), run.is_linear);
-        }
-        let glass = finish.and_then(|finish| finish.glass);
+        let [color, glow] = run.colors(k, weights, material);
+        let glass = material.finish().and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));
         let onward = onward_normal(direction, normal, face, glass);
         Some(Shading { normal, onward, lift, color, glow, within })
@@ -349,8 +354,62 @@ impl Faces {
 }
 
 impl Run {
-    fn is_shaded(&self) -> bool {
-        self.model.has_normals() || self.has_colors || self.glows || self.has_image || self.is_filled
+    pub(crate) fn is_shaded(&self) -> bool {
+        self.model.has_normals() || self.is_colored() || self.is_filled
+    }
+
+    /// Returns whether colours vary within its faces.
+    pub(crate) fn is_colored(&self) -> bool {
+        self.has_colors || self.glows || self.has_image
+    }
+
+    /// Returns whether its faces can have normals of their own.
+    pub(crate) fn has_normals(&self) -> bool {
+        self.model.has_normals()
+    }
+
+    /// Returns whether it is a closed body of glass.
+    pub(crate) fn is_filled(&self) -> bool {
+        self.is_filled
+    }
+
+    /// Returns the positions of its faces among all objects.
+    pub(crate) fn orders(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    /// Returns the normals at the corners of a face, or `None` if it is flat.
+    pub(crate) fn normals(&self, k: usize) -> Option<[DVec3; 3]> {
+        let normals = self.model.normals(k)?;
+        Some(match &self.placement {
+            Some(placement) => normals.map(|n| placement.rotation() * n),
+            None => normals,
+        })
+    }
+
+    /// Returns the factor of the ambient and diffuse coefficients of a face at a place, given by its barycentric weights, and
+    /// the colour that is added.
+    pub(crate) fn colors(&self, k: usize, weights: [f64; 3], material: &Material) -> [DVec3; 2] {
+        let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
+        let look = || self.model.look(k);
+        if self.has_colors && self.model.is_varied(look()) {
+            let level = self.level(k, weights, Slot::Color);
+            color = self.model.color(k, weights, level, self.is_linear);
+        }
+        if self.has_image
+            && let Some(image) = material.finish().and_then(|finish| finish.image.as_ref())
+            && let Some(uvs) = self.model.uvs(k)
+        {
+            let [u, v] = [0, 1].map(|axis: usize| {
+                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
+            });
+            let v = if self.model.has_uvs_from_top() { v } else { 1.0 - v };
+            color *= factor_at(image.file().picture(), [u, v], true, self.is_linear);
+        }
+        if self.glows && glows_apart(&self.model, look()) {
+            glow = self.model.glow(look(), self.level(k, weights, Slot::Glow), self.is_linear);
+        }
+        [color, glow]
     }
 
     /// Returns the corners of a face in coordinates in which a point p of the world is at `(p - center) * scale`.
@@ -377,6 +436,18 @@ impl Run {
         let DVec2 { x, y } = texture.transformed(mixed);
         DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
+}
+
+/// Returns how fast the normal changes across a face: the most that it turns over a length, divided by that length.
+fn bend([a, b, c]: [DVec3; 3], normals: [DVec3; 3]) -> f64 {
+    let (p, q) = (b - a, c - a);
+    let length = p.length();
+    let along = p / length;
+    let beside = q - q.dot(along) * along;
+    let of_p = (normals[1] - normals[0]) / length;
+    let of_q = (normals[2] - normals[0] - q.dot(along) * of_p) / beside.length();
+    let bend = of_p.length() + of_q.length();
+    if bend.is_nan() { f64::INFINITY } else { bend }
 }
 
 /// Returns the barycentric weights of a point of a triangle, none below 0.

@@ -10,13 +10,13 @@
 //! The choice does not depend on the order of the objects.
 
 use glam::DVec3;
-use rayfold_scene::Scene;
+use rayfold_scene::{Object, Scene};
 
 use crate::camera::Axis;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::arithmetic::rounding::OFFSET;
 use crate::fast::bodies;
-use crate::fast::build::extensions::is_needed;
+use crate::fast::build::extensions::needs_double;
 use crate::fast::materials::glass::SURFACES_OF_ONE;
 use crate::fast::placement::coincidence::surfaces_z_fight;
 use crate::fast::placement::geometry::Geometry;
@@ -46,6 +46,10 @@ const START: f64 = OFFSET + POINT;
 ///
 /// [`LATE`]: crate::fast::arithmetic::rounding::LATE
 const SHADOW: f64 = 16.0;
+
+/// The accumulated rounding error of the place in a face for which its normals are mixed, in roundoffs of its distance: 6 of
+/// the ray's direction and of the distance along it, and 8 of the sides of the edges.
+const MIXED: f64 = 16.0;
 
 /// The number of pairs of an occluder and a possible receiver that are compared before the search is given up.
 const PAIRS: usize = 1 << 22;
@@ -86,8 +90,9 @@ pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
     if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) || is_too_deep(&geometry.view) {
         return None;
     }
-    // The errors of the extensions have bounds for `f64` alone, and pictures may have many pixels.
-    let single = !is_needed(geometry)
+    // The errors of most extensions have bounds for `f64` alone, and pictures may have many pixels.
+    let single = !needs_double(geometry)
+        && !bends_rays(geometry, scene)
         && scene.sky_picture().is_none()
         && match options.precision {
             Precision::F64 => false,
@@ -95,6 +100,20 @@ pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
             Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
         };
     Some(if single { Precision::F32 } else { Precision::F64 })
+}
+
+/// Returns whether rays go on from faces with normals of their own, or pixels have several rays from such faces. For these the
+/// errors of normals have bounds for `f64` alone.
+fn bends_rays(geometry: &Geometry, scene: &Scene) -> bool {
+    let is_mirror = |object: &Object| object.material().mirror() != DVec3::ZERO;
+    geometry.faces.is_some() && (scene.samples.most() > 1 || scene.objects.iter().any(is_mirror))
+}
+
+/// Returns whether the errors of the normals of faces are invisible.
+fn are_normals_fine(geometry: &Geometry, sight: &Sight) -> bool {
+    let Some(faces) = &geometry.faces else { return true };
+    let nearest = if sight.parallel { 1.0 } else { 0.0 };
+    MIXED * sight.roundoff * faces.steepest((geometry.center, geometry.scale), nearest) <= sight.normal
 }
 
 /// Returns whether parallel rays go so far that the errors of `f64` there are visible in a pixel.
@@ -235,6 +254,7 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         start: START,
     };
     geometry.solids.iter().all(|solid| solid.shape.is_fine(&sight))
+        && are_normals_fine(geometry, &sight)
         && are_shadows_fine(geometry, &sight)
         && !surfaces_z_fight(geometry, scene, pixel)
 }

@@ -22,6 +22,7 @@ use crate::fast::rays::bounds::{Bounds, join};
 use crate::fast::rays::placed::{Face, RenderSpaceShape};
 use crate::fast::rays::view::View;
 use crate::fast::shapes::{Shape, Solid};
+use crate::meshes::Faces;
 
 /// The distance below which two surfaces may be hit at the same distance, in roundoffs of their coordinates.
 const ONE_SURFACE: f64 = 6.0;
@@ -44,7 +45,9 @@ pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -
     let first = scene.objects.first().map(Object::material);
     let has = |kind: fn(&Solid) -> bool| geometry.solids.iter().any(kind);
     let touching = has(is_ball) && has(|solid| !is_ball(solid));
-    if !touching && scene.objects.iter().all(|object| Some(object.material()) == first) {
+    let faces = geometry.faces.as_deref();
+    let are_alike = || scene.objects.iter().all(|object| Some(object.material()) == first);
+    if !touching && faces.is_none() && are_alike() {
         return false;
     }
     let is_mirror = |solid: &&Solid| scene.objects[solid.order as usize].material().mirror() != DVec3::ZERO;
@@ -52,6 +55,7 @@ pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -
     let search = Search {
         solids: &geometry.solids,
         objects: &scene.objects,
+        faces,
         pixel,
         parallel: matches!(geometry.view, View::Parallel { .. }),
         mirrors: geometry.solids.iter().filter(is_mirror).map(|solid| solid.shape.bounds()).reduce(join),
@@ -66,6 +70,8 @@ pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -
 struct Search<'a> {
     solids: &'a [Solid],
     objects: &'a [Object],
+    /// The faces whose normals or colours vary, if there are any.
+    faces: Option<&'a Faces>,
     pixel: f64,
     parallel: bool,
     /// The bounding box of all mirrors, if there are any.
@@ -160,7 +166,8 @@ impl Search<'_> {
                     let solids = &self.solids[of];
                     let first = self.material(&solids[0]);
                     let balls = is_ball(&solids[0]);
-                    let is_one = solids.iter().all(|solid| self.material(solid) == first);
+                    let is_one =
+                        solids.iter().all(|solid| self.material(solid) == first && !self.is_varied(solid));
                     Content { material: is_one.then_some(first), balls, faces: !balls }
                 }
                 Part::Children(first, second) => {
@@ -240,7 +247,12 @@ impl Search<'_> {
     }
 
     fn differ(&self, one: &Solid, other: &Solid) -> bool {
-        self.material(one) != self.material(other)
+        self.material(one) != self.material(other) || self.is_varied(one) || self.is_varied(other)
+    }
+
+    /// Returns whether the normal or the colour of a solid varies. Then no other looks as it does.
+    fn is_varied(&self, solid: &Solid) -> bool {
+        self.faces.is_some_and(|faces| faces.is_varied(solid.order as usize))
     }
 
     /// Returns whether two spheres z-fight: they are within the slack of each other on a strip as wide as a pixel.
