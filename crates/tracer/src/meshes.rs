@@ -90,6 +90,9 @@ pub(crate) struct FaceHit {
     pub(crate) face: DVec3,
 }
 
+/// The number of triangles that one thread makes at a time.
+const ALONE: usize = 4096;
+
 impl<'a> Expanded<'a> {
     pub(crate) fn new(scene: Cow<'a, Scene>) -> Self {
         if !scene.objects.iter().any(|object| mesh(object).is_some()) {
@@ -138,7 +141,11 @@ impl Colors {
 /// Expands the meshes among objects.
 pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Faces) {
     let is_linear = colors.is_linear;
-    let mut all = Vec::with_capacity(expanded_count(objects));
+    // A mesh alone is not copied.
+    let mut all = match objects {
+        [_] => Vec::new(),
+        _ => Vec::with_capacity(expanded_count(objects)),
+    };
     let mut faces = Faces::default();
     // The triangles of a group's mesh, by its place in memory.
     let mut of_groups: HashMap<*const Mesh, SharedSlice<Object>> = HashMap::new();
@@ -152,7 +159,7 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
             Object::Instance(instance) => {
                 let triangles = of_groups
                     .entry(std::ptr::from_ref(mesh))
-                    .or_insert_with(|| triangles(mesh, colors).collect());
+                    .or_insert_with(|| triangles(mesh, colors).into());
                 let placement = instance.shared_placement();
                 all.extend(
                     (0..triangles.len()).map(|k| Object::from(Instance::new(triangles, k, placement))),
@@ -160,7 +167,11 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors) -> (Vec<Object>, Face
                 Some(placement.clone())
             }
             _ => {
-                all.extend(triangles(mesh, colors));
+                let triangles = triangles(mesh, colors);
+                match all.is_empty() {
+                    true if objects.len() == 1 => all = triangles,
+                    _ => all.extend(triangles),
+                }
                 None
             }
         };
@@ -195,14 +206,15 @@ fn glows_apart(model: &Model, look: usize) -> bool {
 }
 
 /// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
-fn triangles(mesh: &Mesh, colors: Colors) -> impl Iterator<Item = Object> {
+fn triangles(mesh: &Mesh, colors: Colors) -> Vec<Object> {
     let model = mesh.model();
     let materials: Vec<Material> =
         (0..model.looks().len()).map(|look| material(mesh, look, colors)).collect();
-    (0..model.triangle_count()).map(move |k| {
+    let triangle = |k: usize| {
         let triangle = Triangle::new(model.corners(k), materials[model.look(k)].clone());
         triangle.unwrap_or_else(|_| unreachable!("positions of a model are finite")).into()
-    })
+    };
+    (0..model.triangle_count()).into_par_iter().with_min_len(ALONE).map(triangle).collect()
 }
 
 /// Returns the material of the faces of a look.
@@ -249,6 +261,22 @@ impl Faces {
     /// Returns whether the colour of any face varies, so that equal materials are not equal colours.
     pub(crate) fn have_colors(&self) -> bool {
         self.runs.iter().any(|run| run.has_colors || run.glows || run.has_image)
+    }
+
+    /// Returns the positions of objects, among so many, that have all materials and all kinds of shapes: of the faces of a mesh
+    /// that look alike only one.
+    pub(crate) fn examples(&self, count: usize) -> Vec<u32> {
+        let (mut examples, mut next) = (Vec::new(), 0);
+        for run in &self.runs {
+            examples.extend((next..run.first).map(|order| order as u32));
+            let mut is_known = vec![false; run.model.looks().len()];
+            let mut is_new = |k: &usize| !core::mem::replace(&mut is_known[run.model.look(*k)], true);
+            let faces = if run.model.looks().len() == 1 { 0..1 } else { 0..run.count };
+            examples.extend(faces.filter(|k| is_new(k)).map(|k| (run.first + k) as u32));
+            next = run.first + run.count;
+        }
+        examples.extend((next..count).map(|order| order as u32));
+        examples
     }
 
     /// Returns the position before meshes were expanded of the object at `order`.

@@ -411,7 +411,13 @@ impl<'a, E: Real> Setup<'a, E> {
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
-        let many = geometry.solids.len() > MANY;
+        // Rays of glass are many, and go apart soon: the more of them wait together, the fuller are packets.
+        let has_glass = || {
+            geometry
+                .examples(ranked)
+                .any(|object| object.material().finish().is_some_and(|f| f.glass.is_some()))
+        };
+        let many = geometry.solids.len() > MANY && !has_glass();
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
         let grid = Grid { size, side, margin: MARGIN, lens: None };
         let prepared = Prepared::<E>::new(ranked, geometry, options.tree, &grid)?;

@@ -8,12 +8,13 @@ use glam::{Vec3A, Vec4, Vec4Swizzles};
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
-/// The numbers of slices along an axis: of many boxes, and of few.
+/// The number of slices along an axis.
 const SLICES: usize = 16;
-const FEW_SLICES: usize = 8;
 
-/// The number of boxes below which they count as few.
-const FEW: usize = 64;
+/// The number of boxes below which they count as few, and the number of their slices. They are parted across the axis along
+/// which their middles are farthest apart.
+const FEW: usize = 32;
+const FEW_SLICES: usize = 8;
 
 /// The number of boxes up to which one thread makes a subtree.
 const ALONE: usize = 8192;
@@ -94,60 +95,99 @@ struct Slice {
 impl Slice {
     const EMPTY: Self = Self { span: Span::EMPTY, count: 0 };
 
+    fn add(&mut self, item: &Item) {
+        self.join(&Self { span: Span { low: item.low, high: item.high }, count: 1 });
+    }
+
+    /// Returns its area times the number of its boxes.
+    fn cost(&self) -> f32 {
+        self.span.half_area() * self.count as f32
+    }
+
     fn join(&mut self, other: &Self) {
         self.span.join(other.span);
         self.count += other.count;
     }
 }
 
-type Slices = [[Slice; SLICES]; 3];
+type Slices<const N: usize> = [[Slice; N]; 3];
 
-/// The slices of the boxes between some middles.
+/// Numbers the slices of the boxes between some middles.
 #[derive(Clone, Copy)]
-struct Ruler {
+struct Ruler<const N: usize> {
     from: Vec4,
     scale: Vec4,
-    slices: usize,
 }
 
-impl Ruler {
-    fn new(middles: Span, count: usize) -> Self {
-        let slices = if count < FEW { FEW_SLICES } else { SLICES };
+impl<const N: usize> Ruler<N> {
+    fn new(middles: Span) -> Self {
         let size = middles.high - middles.low;
         // Along an axis without an extent all are in the first slice.
         let scale = |size: f32| {
-            let scale = slices as f32 * 0.999_99 / size;
+            let scale = N as f32 * 0.999_99 / size;
             if size > 0.0 && scale.is_finite() { scale } else { 0.0 }
         };
-        Self { from: middles.low, scale: size.map(scale), slices }
+        Self { from: middles.low, scale: size.map(scale) }
     }
 
     /// Returns the numbers of the slices of a middle, along each axis.
     fn of(&self, middle: Vec4) -> [usize; 3] {
         let place = (middle - self.from) * self.scale;
-        [place.x, place.y, place.z].map(|x| (x as i32 as usize).min(SLICES - 1))
+        [place.x, place.y, place.z].map(|x| (x as i32 as usize).min(N - 1))
     }
 
-    fn count(&self, items: &[Item]) -> Slices {
-        let mut all = [[Slice::EMPTY; SLICES]; 3];
+    /// Returns the number of the slice of a middle along one axis.
+    fn along(&self, axis: usize, middle: Vec4) -> usize {
+        let place = (middle[axis] - self.from[axis]) * self.scale[axis];
+        (place as i32 as usize).min(N - 1)
+    }
+
+    fn count(&self, items: &[Item]) -> Slices<N> {
+        let mut all = [[Slice::EMPTY; N]; 3];
         for item in items {
             let places = self.of(item.middle());
             for (slices, place) in all.iter_mut().zip(places) {
-                slices[place].join(&Slice { span: Span { low: item.low, high: item.high }, count: 1 });
+                slices[place].add(item);
             }
         }
         all
     }
 
-    fn count_together(&self, items: &[Item]) -> Slices {
-        let join = |mut one: Slices, other: Slices| {
+    fn count_along(&self, axis: usize, items: &[Item]) -> [Slice; N] {
+        let mut slices = [Slice::EMPTY; N];
+        for item in items {
+            slices[self.along(axis, item.middle())].add(item);
+        }
+        slices
+    }
+
+    fn count_together(&self, items: &[Item]) -> Slices<N> {
+        let join = |mut one: Slices<N>, other: Slices<N>| {
             for (slice, other) in one.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
                 slice.join(other);
             }
             one
         };
         let counts = items.par_chunks(CHUNK).map(|items| self.count(items));
-        counts.reduce(|| [[Slice::EMPTY; SLICES]; 3], join)
+        counts.reduce(|| [[Slice::EMPTY; N]; 3], join)
+    }
+
+    /// Moves the items before a slice to the front. Returns their number, and the middles of both sides.
+    fn part(&self, items: &mut [Item], (axis, slice): (usize, usize)) -> (usize, [Span; 2]) {
+        let mut sides = [Span::EMPTY; 2];
+        let (mut first, mut end) = (0, items.len());
+        while first < end {
+            let middle = items[first].middle();
+            if self.along(axis, middle) < slice {
+                sides[0].add(middle);
+                first += 1;
+            } else {
+                end -= 1;
+                sides[1].add(middle);
+                items.swap(first, end);
+            }
+        }
+        (first, sides)
     }
 }
 
@@ -243,57 +283,51 @@ fn grow_alone(
 }
 
 /// Parts items in two. Returns the number of the first ones, and the middles of both.
-// Out of line, so that the slices are not on the stack of each level.
-#[inline(never)]
 fn part(items: &mut [Item], middles: Span) -> (usize, [Span; 2]) {
-    let ruler = Ruler::new(middles, items.len());
-    let slices =
-        if items.len() > COUNTED_TOGETHER { ruler.count_together(items) } else { ruler.count(items) };
-    let Some((axis, slice)) = best(&slices, ruler.slices) else {
-        // All are in one place.
-        return (items.len() / 2, [middles; 2]);
-    };
-    let mut sides = [Span::EMPTY; 2];
-    let (mut first, mut end) = (0, items.len());
-    while first < end {
-        let middle = items[first].middle();
-        if ruler.of(middle)[axis] < slice {
-            sides[0].add(middle);
-            first += 1;
-        } else {
-            end -= 1;
-            sides[1].add(middle);
-            items.swap(first, end);
-        }
-    }
-    (first, sides)
+    let parted = if items.len() < FEW { part_few(items, middles) } else { part_many(items, middles) };
+    // All are in one place.
+    parted.unwrap_or((items.len() / 2, [middles; 2]))
 }
 
-/// Returns the axis and the first slice of the second side where the sum of both sides' areas, each times the number of its
-/// boxes, is least; `None` if all boxes are in one slice of each axis.
-fn best(slices: &Slices, count: usize) -> Option<(usize, usize)> {
-    let mut best: Option<(f32, (usize, usize))> = None;
-    for (axis, slices) in slices.iter().enumerate() {
-        let mut behind = [0.0; SLICES];
-        let mut side = Slice::EMPTY;
-        for at in (1..count).rev() {
-            side.join(&slices[at]);
-            behind[at] = if side.count == 0 { f32::NAN } else { side.span.half_area() * side.count as f32 };
-        }
-        let mut side = Slice::EMPTY;
-        for at in 1..count {
-            side.join(&slices[at - 1]);
-            if side.count == 0 {
-                continue;
-            }
-            // NaN where there is nothing behind.
-            let cost = side.span.half_area() * side.count as f32 + behind[at];
-            if best.is_none_or(|(least, _)| cost < least) && !cost.is_nan() {
-                best = Some((cost, (axis, at)));
-            }
+// Out of line, so that the slices are not on the stack of each level.
+#[inline(never)]
+fn part_few(items: &mut [Item], middles: Span) -> Option<(usize, [Span; 2])> {
+    let ruler = Ruler::<FEW_SLICES>::new(middles);
+    let axis = (middles.high - middles.low).xyz().max_position();
+    let (_, slice) = best(&ruler.count_along(axis, items))?;
+    Some(ruler.part(items, (axis, slice)))
+}
+
+#[inline(never)]
+fn part_many(items: &mut [Item], middles: Span) -> Option<(usize, [Span; 2])> {
+    let ruler = Ruler::<SLICES>::new(middles);
+    let slices =
+        if items.len() > COUNTED_TOGETHER { ruler.count_together(items) } else { ruler.count(items) };
+    let bests = (0..3).filter_map(|axis| best(&slices[axis]).map(|(cost, slice)| (cost, (axis, slice))));
+    let (_, place) = bests.reduce(|one, other| if other.0 < one.0 { other } else { one })?;
+    Some(ruler.part(items, place))
+}
+
+/// Returns the first slice of the second side where the sum of both sides' areas, each times the number of its boxes, is
+/// least, after that sum; `None` if all boxes are in one slice.
+fn best<const N: usize>(slices: &[Slice; N]) -> Option<(f32, usize)> {
+    let mut behind = [None; N];
+    let mut side = Slice::EMPTY;
+    for at in (1..N).rev() {
+        side.join(&slices[at]);
+        behind[at] = (side.count > 0).then(|| side.cost());
+    }
+    let mut best: Option<(f32, usize)> = None;
+    let mut side = Slice::EMPTY;
+    for at in 1..N {
+        side.join(&slices[at - 1]);
+        let Some(behind) = behind[at].filter(|_| side.count > 0) else { continue };
+        let cost = side.cost() + behind;
+        if best.is_none_or(|(least, _)| cost < least) {
+            best = Some((cost, at));
         }
     }
-    best.map(|(_, place)| place)
+    best
 }
 
 #[cfg(test)]

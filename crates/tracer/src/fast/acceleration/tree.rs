@@ -28,7 +28,7 @@ use crate::parallel::map;
 const LEAF: u32 = 4;
 
 /// The number of objects from which they are parted by planes.
-const VERY_MANY: usize = 32_768;
+const VERY_MANY: usize = 4096;
 
 /// A node: its bounding box and its contents.
 #[derive(Clone, Copy, Debug)]

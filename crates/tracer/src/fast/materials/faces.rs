@@ -1,8 +1,8 @@
 //! The faces of meshes: normals at vertices, colours at vertices, and the inside of closed glass.
 //!
 //! Normals are mixed in lanes. The weights of a hit come from the edges that the tests of its triangle use, so that a
-//! hit needs nothing but its triangle and the three normals. As patterns are, colours and glass are computed lane by lane,
-//! with the functions of the reference tracer.
+//! hit needs nothing but its triangle and the three normals. As patterns are, colours are computed lane by lane, with the
+//! functions of the reference tracer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -19,7 +19,6 @@ use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Hits, ROOM, RayBatch};
 use crate::fast::rays::kind::Kind;
 use crate::meshes::{FaceHit, Faces, Run};
-use crate::reference::onward_normal;
 
 /// The faces of a scene, at least one of which has more than a triangle.
 #[derive(Debug)]
@@ -42,8 +41,11 @@ struct ShadedRun<E> {
     index: usize,
     /// The unit normals at the corners of each face; zeros for a flat one. Empty if all are flat.
     normals: Vec<[[E; 3]; 3]>,
-    /// Whether faces have colours or glass.
-    has_more: bool,
+    /// Whether colours vary within faces.
+    is_colored: bool,
+    /// The index of refraction of glass, or 0; and 1 for a closed body of glass.
+    ior: E,
+    is_filled: E,
 }
 
 /// The data of the faces that a packet hits, lane by lane.
@@ -54,6 +56,9 @@ struct Gathered<E> {
     normals: [[[E; 16]; 3]; 3],
     /// 1 for lanes that hit such a face.
     is_face: [E; 16],
+    /// For lanes that hit glass: its index of refraction, and 1 if it is the inside of a closed body. 0 for all others.
+    ior: [E; 16],
+    is_filled: [E; 16],
     /// The lanes whose faces have more than normals: the lane, and the index of the run in this list.
     more: [(usize, usize); 16],
     more_count: usize,
@@ -111,15 +116,16 @@ impl<E: Real> ShadedFaces<E> {
     fn gather(&self, scene: &Prepared<E>, hits: &Hits<E>, lanes: Range<usize>, into: &mut Gathered<E>) {
         into.more_count = 0;
         into.is_face = [E::narrow(0.0); 16];
+        into.ior = [E::narrow(0.0); 16];
         for (lane, at) in lanes.enumerate() {
             if !hits.is_hit(at) {
                 continue;
             }
             let order = hits.order.0[at].to_index();
             let Some(run) = self.run_of(order) else { continue };
-            let ShadedRun { orders, normals, has_more, .. } = &self.runs[run];
+            let ShadedRun { orders, normals, is_colored, ior, is_filled, .. } = &self.runs[run];
             let entry = &scene.entries[order];
-            if *has_more || entry.is_body {
+            if *is_colored || entry.is_body {
                 into.more[into.more_count] = (lane, run);
                 into.more_count += 1;
             }
@@ -127,6 +133,7 @@ impl<E: Real> ShadedFaces<E> {
                 continue;
             }
             into.is_face[lane] = E::narrow(1.0);
+            (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
             let normals = normals.get(order - orders.start).copied().unwrap_or([[E::narrow(0.0); 3]; 3]);
             let triangle = scene.shapes.triangle(entry.index as usize);
             for corner in 0..3 {
@@ -139,7 +146,7 @@ impl<E: Real> ShadedFaces<E> {
         }
     }
 
-    /// Adds the colours of faces and the inside of glass. A face with holes is shaded by the functions of the reference
+    /// Adds the colours of faces. A face with holes is shaded by the functions of the reference
     /// tracer alone.
     #[inline(never)]
     fn add_more<S: Simd, const EYE: bool>(
@@ -172,21 +179,6 @@ impl<E: Real> ShadedFaces<E> {
             } else {
                 let ShadedRun { orders, index, .. } = &self.runs[run];
                 let run = &self.faces.runs()[*index];
-                if let Some(glass) = material.finish().and_then(|finish| finish.glass) {
-                    let outwards = scene.shapes.triangle(scene.entries[order].index as usize).normal;
-                    let outwards = DVec3::from_array(outwards.map(E::widen));
-                    let within = run.is_filled() && outwards.dot(direction) > 0.0;
-                    if within {
-                        hits.sides[1].0[lane] = E::narrow(1.0);
-                    }
-                    let normal = read(&hits.normal, lane);
-                    let onward =
-                        onward_normal(direction, normal, face, Some((glass, within, !run.is_filled())));
-                    write(&mut hits.onward, lane, onward);
-                }
-                if !run.is_colored() {
-                    continue;
-                }
                 run.colors(order - orders.start, weights.map(|of| of[of_packet].widen()), material)
             };
             let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
@@ -210,9 +202,10 @@ impl<E: Real> ShadedRun<E> {
         } else {
             vec![]
         };
-        let glass = || scene.objects[orders.start].material().finish().is_some_and(|f| f.glass.is_some());
-        let has_more = run.is_colored() || run.is_filled() || glass();
-        Self { orders, index, normals, has_more }
+        let glass = scene.objects[orders.start].material().finish().and_then(|finish| finish.glass);
+        let ior = E::narrow(glass.map_or(0.0, |glass| glass.ior()));
+        let is_filled = E::narrow(if run.is_filled() { 1.0 } else { 0.0 });
+        Self { orders, index, normals, is_colored: run.is_colored(), ior, is_filled }
     }
 }
 
@@ -224,6 +217,8 @@ impl<E: Real> Gathered<E> {
             moments: nothing,
             normals: nothing,
             is_face: [E::narrow(0.0); 16],
+            ior: [E::narrow(0.0); 16],
+            is_filled: [E::narrow(0.0); 16],
             more: [(0, 0); 16],
             more_count: 0,
         }
@@ -246,7 +241,7 @@ impl<E: Real> Gathered<E> {
             return [one, zero, zero];
         }
         let direction = Vec3::<S, E>::load(simd, &queue.direction, at);
-        let offset = Lanes::<S, E>::from_slice(simd, &hits.sides[0].0[lanes]);
+        let offset = Lanes::<S, E>::from_slice(simd, &hits.sides[0].0[lanes.clone()]);
         let point = start.sub(face.scale(offset));
         let edges: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.edges[k], 0));
         let areas: [Lanes<S, E>; 3] = [0, 1, 2].map(|k: usize| {
@@ -289,8 +284,30 @@ impl<E: Real> Gathered<E> {
         lift.scale_add(one, start).store(&mut hits.start, at);
         let towards = direction.dot(normal).min(zero);
         let mirrored = normal.scale_add(towards * constant::<S, E>(simd, -2.0), direction);
-        let onward = Vec3::select(mirrored.dot(face).simd_gt(zero), normal, face);
-        onward.store(&mut hits.onward, at);
+        let mut goes_on = mirrored.dot(face).simd_gt(zero);
+        let ior = Lanes::<S, E>::from_slice(simd, &self.ior[..Lanes::<S, E>::LEN]);
+        let is_glass = ior.simd_gt(zero);
+        if is_glass.any_true() {
+            let is_filled =
+                Lanes::<S, E>::from_slice(simd, &self.is_filled[..Lanes::<S, E>::LEN]).simd_gt(zero);
+            let outwards = normals_of_faces(simd, &edges);
+            let within = is_glass & is_filled & outwards.dot(direction).simd_gt(zero);
+            let is_within = Lanes::<S, E>::from_slice(simd, &hits.sides[1].0[lanes.clone()]);
+            within.select(one, is_within).store_slice(&mut hits.sides[1].0[lanes]);
+            // A pane without an inside bends nothing.
+            let ior = is_glass.select(ior, one);
+            let (before, behind) = (within.select(ior, one), within.select(one, ior));
+            let cosine = zero - direction.dot(normal);
+            let aside = normal.scale_add(cosine, direction);
+            let ratio = (before / behind).min(constant::<S, E>(simd, f64::MAX));
+            let sine = aside.dot(aside).sqrt() * ratio;
+            let is_total = cosine.simd_le(zero) | sine.simd_ge(one);
+            let cosine_behind = ((one - sine) * (one + sine)).max(zero).sqrt();
+            let bent = aside.scale(ratio).sub(normal.scale(cosine_behind));
+            let is_above = bent.dot(face).simd_ge(zero) & !is_total;
+            goes_on &= !(is_glass & is_filled & is_above);
+        }
+        Vec3::select(goes_on, normal, face).store(&mut hits.onward, at);
         weights
     }
 }
@@ -314,6 +331,12 @@ impl<E: Real> Hits<E> {
             self.normal[axis].0.copy_from_slice(&self.onward[axis]);
         }
     }
+}
+
+/// Returns normals of triangles, on the sides from which their corners go round counterclockwise.
+#[inline(always)]
+fn normals_of_faces<S: Simd, E: Real>(_: S, edges: &[Vec3<S, E>; 3]) -> Vec3<S, E> {
+    edges[1].cross(edges[2])
 }
 
 fn read<E: Real>(columns: &[impl AsRef<[E]>; 3], lane: usize) -> DVec3 {

@@ -173,6 +173,10 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                         facing &= shows(simd, hits, at, glossy, (normal, towards, seen.direction));
                     }
                     let mut lit = facing;
+                    if GLASS {
+                        // Glass is around a ray that comes from within it.
+                        lit &= !hits.are_within(simd, at);
+                    }
                     let start = hits.shadow_start(simd, at, towards);
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
