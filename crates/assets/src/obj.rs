@@ -463,3 +463,58 @@ fn bounded_looks(line: usize, count: usize) -> Result<(), Fault> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_numbers_are_those_of_the_standard_library() {
+        let words = [
+            "0",
+            "-0",
+            "1.",
+            ".5",
+            "-.25",
+            "0.1",
+            "-3.141593",
+            "123456789012345",
+            "9007199254740991",
+            "9007199254740993",
+            "0.30000000000001",
+            "00012.5000",
+            "1e5",
+            "-1.5E-3",
+            "inf",
+            "nan",
+            "",
+            "-",
+            ".",
+            "-.",
+            "1.2.3",
+            "+1",
+            "1x",
+            "--1",
+        ];
+        for word in words {
+            let expected = word.parse().ok().filter(|x: &f64| x.is_finite()).map(f64::to_bits);
+            assert_eq!(number(word.as_bytes()).map(f64::to_bits), expected, "{word}");
+        }
+        let mut state = 1u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            let (digits, places) = (state >> (11 + state % 50), (state >> 7) as usize % 8);
+            let word = format!("{:.places$}", digits as f64 / 1e3);
+            assert_eq!(number(word.as_bytes()), word.parse().ok(), "{word}");
+        }
+    }
+
+    #[test]
+    fn indices_have_nine_digits_at_most() {
+        assert_eq!(index(1, b"-123456789").unwrap(), -123_456_789);
+        assert_eq!(index(1, b"000000007").unwrap(), 7);
+        for word in ["", "-", "1234567890", "1.5", "+1", "4294967297", "--1", "1 "] {
+            assert!(index(1, word.as_bytes()).is_err(), "{word}");
+        }
+    }
+}
