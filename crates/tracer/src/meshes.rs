@@ -315,6 +315,11 @@ impl Faces {
         look.alpha * of_picture * of_vertices < cutoff
     }
 
+    /// Returns whether any mesh is a closed body of glass.
+    pub(crate) fn have_inside(&self) -> bool {
+        self.runs.iter().any(|run| run.is_filled)
+    }
+
     /// Returns whether the object at `order` is a face of a closed body of glass.
     pub(crate) fn is_filled(&self, order: usize) -> bool {
         self.run_of(order).is_some_and(|run| run.is_filled)
