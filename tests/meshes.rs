@@ -10,7 +10,9 @@ use image::RgbImage;
 use rayfold_scene::assets::{Library, MemoryFiles};
 use rayfold_scene::{Limits, Object, Scene, parse_with_files};
 use rayfold_tracer::probe::nearest_hits;
-use rayfold_tracer::{Exposure, RenderOptions, first_hits, reference, render, render_picture};
+use rayfold_tracer::{
+    Exposure, Precision, RenderOptions, first_hits, precision, reference, render, render_picture,
+};
 
 /// The triangles of a ball of radius 1, seen counterclockwise from outside, of about 2n² triangles.
 fn ball(n: usize) -> Vec<[DVec3; 3]> {
@@ -71,6 +73,8 @@ fn library() -> Library {
         ("fine.obj", obj(&ball(40), true, false)),
         ("colored.obj", obj(&ball(6), true, true)),
         ("open.obj", obj(&open, true, false)),
+        ("sheets.obj", sheets(0.1)),
+        ("near.obj", sheets(1e-8)),
         ("quads.obj", QUADS.to_vec()),
         (
             "quads.mtl",
@@ -82,6 +86,17 @@ fn library() -> Library {
         ("leaf.png", leaf()),
         ("leaf.gltf", quads_gltf(LEAF)),
     ]))
+}
+
+/// Two squares, one before the other, whose normals are not the same.
+fn sheets(apart: f64) -> Vec<u8> {
+    let mut text = String::from("vn .3 .1 1\nvn -.5 .2 1\n");
+    for z in [0.0, apart] {
+        for [x, y] in [[-1, -1], [1, -1], [1, 1], [-1, 1]] {
+            writeln!(text, "v {x} {y} {z}").unwrap();
+        }
+    }
+    (text + "f 1//1 2//1 3//1 4//1\nf 5//2 6//2 7//2 8//2\n").into_bytes()
 }
 
 /// Two squares that stand in the corner of a room, one of them with a picture; and normals that are those of no face.
@@ -222,10 +237,13 @@ fn without_a_material_a_mesh_has_the_colours_of_its_file() {
 /// Compares the packets with the reference tracer: at most one level, but for some pixels at outlines. Models are written
 /// out, and drawn from trees of their own.
 fn compare(lines: &str) {
-    let scene = scene(lines);
-    let plain = reference::render(&scene, &RenderOptions::default()).unwrap();
+    compare_scene(&scene(lines), lines);
+}
+
+fn compare_scene(scene: &Scene, lines: &str) {
+    let plain = reference::render(scene, &RenderOptions::default()).unwrap();
     for models in [None, Some(true)] {
-        let fast = render(&scene, &RenderOptions { models, ..RenderOptions::default() }).unwrap();
+        let fast = render(scene, &RenderOptions { models, ..RenderOptions::default() }).unwrap();
         let is_off =
             |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1);
         let off = fast.pixels().zip(plain.pixels()).filter(|pair| is_off(*pair)).count();
@@ -268,6 +286,49 @@ fn the_packets_draw_meshes_like_the_reference() {
             ));
         }
     }
+}
+
+#[test]
+fn normals_are_drawn_in_single_precision_where_that_is_enough() {
+    let plain = |lines: &str| {
+        first_frame(&format!(
+            "Screen 96 72\nLook .6 1.2 4  0 0 0  36\nBackground .8 .9 1\nIlight .9 .9 .85  -1 -2 -1.5\n\
+             Ilight .2 .1 .3  1 .3 -1\n{lines}\nTrace"
+        ))
+    };
+    let floor = "Triangle -9 -1.1 -9  0 -1.2 9  9 -1 -9  .1 .1 .1 .5 .6 .5\n";
+    for mesh in ["round.obj", "fine.obj", "sheets.obj", "open.obj"] {
+        for object in [
+            format!("Mesh \"{mesh}\" .1 .1 .1 .7 .7 .6"),
+            format!("{floor}Mesh \"{mesh}\" .1 .1 .1 .7 .7 .6"),
+            format!(
+                "{floor}Sphere .3 .2 .9 1.3 .1 .1 .1 .5 .5 .5\nMesh \"{mesh}\" .1 .1 .1 .7 .7 .6 smooth 60"
+            ),
+            format!(
+                "{floor}Group g\nMesh \"{mesh}\" .1 .1 .1 .7 .7 .6\nEnd\nUse g .3 .1 -.4 10 20 30 .8\nUse g -1 .2 0 0 40 0 .5"
+            ),
+        ] {
+            let scene = plain(&object);
+            assert_eq!(precision(&scene), Precision::F32, "{object}");
+            compare_scene(&scene, &object);
+            for tile in [(4, 4), (16, 16)] {
+                let options = RenderOptions { tile: Some(tile), ..RenderOptions::default() };
+                assert!(render(&scene, &options).unwrap() == drawn(&scene), "{tile:?} {object}");
+            }
+        }
+    }
+    for object in [
+        "Mesh \"near.obj\" .1 .1 .1 .7 .7 .6",
+        "Mesh \"round.obj\" .1 .1 .1 .4 .4 .4 .3 .3 .3",
+        "Samples 4 0\nMesh \"round.obj\" .1 .1 .1 .7 .7 .6",
+        "Mesh \"round.obj\"",
+    ] {
+        let scene = plain(object);
+        assert_eq!(precision(&scene), Precision::F64, "{object}");
+        compare_scene(&scene, object);
+    }
+    let flat = plain("Mesh \"near.obj\" .1 .1 .1 .7 .7 .6 flat");
+    assert_eq!(precision(&flat), Precision::F32, "both sheets look alike");
 }
 
 #[test]

@@ -76,7 +76,7 @@ impl<const N: usize> From<[(&str, Vec<u8>); N]> for MemoryFiles {
 impl MemoryFiles {
     /// Adds or replaces a file.
     pub fn insert(&mut self, name: &str, bytes: Vec<u8>) {
-        let tag = fnv(&bytes);
+        let tag = hash(&bytes);
         self.files.insert(name.into(), (bytes, tag));
     }
 }
@@ -95,11 +95,20 @@ impl Files for MemoryFiles {
     }
 }
 
-/// Returns the FNV-1a hash of bytes.
-fn fnv(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+/// Returns a hash of bytes, by the steps of FNV-1a for words of eight bytes, in four interleaved sequences.
+fn hash(bytes: &[u8]) -> u64 {
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let step = |hash: u64, word: u64| (hash ^ word).wrapping_mul(PRIME).rotate_left(29);
+    let (blocks, rest) = bytes.as_chunks::<32>();
+    let mut hashes =
+        [0xcbf2_9ce4_8422_2325, 0x9e37_79b9_7f4a_7c15, 0x2545_f491_4f6c_dd1d, 0x6a09_e667_f3bc_c909];
+    for block in blocks {
+        for (hash, word) in hashes.iter_mut().zip(block.as_chunks::<8>().0) {
+            *hash = step(*hash, u64::from_le_bytes(*word));
+        }
+    }
+    let of_blocks = hashes.into_iter().fold(bytes.len() as u64, step);
+    rest.iter().fold(of_blocks, |hash, byte| step(hash, u64::from(*byte)))
 }
 
 /// The reason why a word in quotes is no name of a file.

@@ -64,8 +64,37 @@ fn rest_of(line: &[u8], word: &[u8]) -> String {
 }
 
 fn number(word: &[u8]) -> Option<f64> {
+    if let Some(number) = short_number(word) {
+        return Some(number);
+    }
     let text = std::str::from_utf8(word).ok()?;
     text.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// Returns the number of a word of a sign, digits and a point, if they are few. The digits and the power of ten are then exact,
+/// so that the quotient is rounded once, to the number that the word is nearest to (Clinger, 1990).
+fn short_number(word: &[u8]) -> Option<f64> {
+    const POWERS: [f64; 16] =
+        [1., 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+    let (is_negative, digits) = match word {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    let (mut whole, mut point) = (0u64, None);
+    if !(1..=16).contains(&digits.len()) {
+        return None;
+    }
+    for (at, byte) in digits.iter().enumerate() {
+        match byte.wrapping_sub(b'0') {
+            digit @ 0..=9 => whole = 10 * whole + u64::from(digit),
+            _ if *byte == b'.' && point.is_none() && digits.len() > 1 => point = Some(at),
+            _ => return None,
+        }
+    }
+    let places = point.map_or(0, |at| digits.len() - 1 - at);
+    // Sixteen digits may be more than a number holds.
+    let number = (whole < 1 << 53).then(|| whole as f64 / POWERS[places])?;
+    Some(if is_negative { -number } else { number })
 }
 
 /// Reads numbers, at most `N`. Returns how many there are.
@@ -102,11 +131,24 @@ fn index(line: usize, text: &[u8]) -> Result<i64, Fault> {
         [b'-', digits @ ..] => (digits, -1),
         digits => (digits, 1),
     };
-    let is_number = (1..=9).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit);
+    let (mut number, mut is_number) = (0u32, (1..=9).contains(&digits.len()));
+    for byte in digits.iter().take(9) {
+        let digit = byte.wrapping_sub(b'0');
+        is_number &= digit < 10;
+        number = number.wrapping_mul(10).wrapping_add(u32::from(digit));
+    }
     if !is_number {
         return Err(Fault::at(line, format!("`{}` is no index", String::from_utf8_lossy(text))));
     }
-    Ok(sign * digits.iter().fold(0, |n, digit| 10 * n + i64::from(digit - b'0')))
+    Ok(sign * i64::from(number))
+}
+
+/// Returns a word up to a slash, and what is behind it.
+fn field(word: &[u8]) -> (&[u8], &[u8]) {
+    match word.iter().position(|b| *b == b'/') {
+        Some(end) => (&word[..end], &word[end + 1..]),
+        None => (word, &[]),
+    }
 }
 
 /// A picture that a material names: the library of materials, the line in it, and the path.
@@ -240,15 +282,15 @@ impl Reader {
         let parts = &mut self.parts;
         let (mut first, mut last, mut count) = (None, None, 0);
         for word in words {
-            let mut fields = word.splitn(3, |b| *b == b'/');
-            let position = index(line, fields.next().unwrap_or_default())?;
-            let position = place(line, position, parts.positions.len(), "position")?;
-            let mut optional = |count: usize, what: &str| match fields.next() {
-                None | Some(b"") => Ok(NONE),
-                Some(field) => place(line, index(line, field)?, count, what),
+            let (of_position, rest) = field(word);
+            let (of_uv, rest) = field(rest);
+            let position = place(line, index(line, of_position)?, parts.positions.len(), "position")?;
+            let optional = |field: &[u8], count: usize, what: &str| match field {
+                b"" => Ok(NONE),
+                field => place(line, index(line, field)?, count, what),
             };
-            let uv = optional(parts.uvs.len(), "texture coordinate")?;
-            let normal = optional(parts.normals.len(), "normal")?;
+            let uv = optional(of_uv, parts.uvs.len(), "texture coordinate")?;
+            let normal = optional(rest, parts.normals.len(), "normal")?;
             self.has_normals |= normal != NONE;
             self.has_uvs |= uv != NONE;
             self.lacks_uvs |= uv == NONE;
@@ -420,4 +462,59 @@ fn bounded_looks(line: usize, count: usize) -> Result<(), Fault> {
         return Err(Fault::at(line, format!("more than {LOOKS} materials")));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_numbers_are_those_of_the_standard_library() {
+        let words = [
+            "0",
+            "-0",
+            "1.",
+            ".5",
+            "-.25",
+            "0.1",
+            "-3.141593",
+            "123456789012345",
+            "9007199254740991",
+            "9007199254740993",
+            "0.30000000000001",
+            "00012.5000",
+            "1e5",
+            "-1.5E-3",
+            "inf",
+            "nan",
+            "",
+            "-",
+            ".",
+            "-.",
+            "1.2.3",
+            "+1",
+            "1x",
+            "--1",
+        ];
+        for word in words {
+            let expected = word.parse().ok().filter(|x: &f64| x.is_finite()).map(f64::to_bits);
+            assert_eq!(number(word.as_bytes()).map(f64::to_bits), expected, "{word}");
+        }
+        let mut state = 1u64;
+        for _ in 0..20_000 {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            let (digits, places) = (state >> (11 + state % 50), (state >> 7) as usize % 8);
+            let word = format!("{:.places$}", digits as f64 / 1e3);
+            assert_eq!(number(word.as_bytes()), word.parse().ok(), "{word}");
+        }
+    }
+
+    #[test]
+    fn indices_have_nine_digits_at_most() {
+        assert_eq!(index(1, b"-123456789").unwrap(), -123_456_789);
+        assert_eq!(index(1, b"000000007").unwrap(), 7);
+        for word in ["", "-", "1234567890", "1.5", "+1", "4294967297", "--1", "1 "] {
+            assert!(index(1, word.as_bytes()).is_err(), "{word}");
+        }
+    }
 }

@@ -17,6 +17,22 @@ pub fn of<T>(work: impl FnOnce() -> T) -> Result<(f64, T)> {
     Ok(((after - before).as_secs_f64(), result))
 }
 
+/// Runs `work` on a pool. Returns the processor time in seconds of its busiest thread, and the result. That is the time by the
+/// clock on as many free cores, except for waiting.
+///
+/// # Errors
+/// Fails if a clock cannot be read.
+pub fn of_busiest<T: Send>(pool: &rayon::ThreadPool, work: impl FnOnce() -> T + Send) -> Result<(f64, T)> {
+    let times = || {
+        let time = |_: rayon::BroadcastContext<'_>| clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID);
+        pool.broadcast(time).into_iter().collect::<Result<Vec<_>, _>>()
+    };
+    let before = times()?;
+    let result = pool.install(work);
+    let passed = times()?.into_iter().zip(before).map(|(after, before)| Duration::from(after - before));
+    Ok((passed.max().unwrap_or_default().as_secs_f64(), result))
+}
+
 /// Runs `work`. Returns the user processor time in seconds of the child processes that it starts and waits for, and the
 /// result.
 ///

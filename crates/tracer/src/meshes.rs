@@ -11,6 +11,7 @@
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -19,6 +20,7 @@ use rayfold_scene::{
     Coefficients, Finish, ImageMap, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone,
     Triangle,
 };
+use rayon::prelude::*;
 
 use crate::RenderOptions;
 use crate::parts;
@@ -72,7 +74,7 @@ pub(crate) const ONE_FACE: f64 = 1.0 / (1 << 24) as f64;
 
 /// The faces of one mesh, as it is drawn once.
 #[derive(Debug)]
-struct Run {
+pub(crate) struct Run {
     /// The position of the first face, and the number of faces; of a mesh whose tree is shared, those of its looks.
     first: usize,
     count: usize,
@@ -126,6 +128,9 @@ pub(crate) struct FaceHit {
     pub(crate) face: DVec3,
 }
 
+/// The number of triangles that one thread makes at a time.
+const ALONE: usize = 4096;
+
 impl<'a> Expanded<'a> {
     pub(crate) fn new(scene: Cow<'a, Scene>, shared: Shared) -> Self {
         if !scene.objects.iter().any(|object| mesh(object).is_some()) {
@@ -174,7 +179,7 @@ impl Colors {
 /// Expands the meshes among objects.
 pub(crate) fn expanded(objects: &[Object], colors: Colors, shared: Shared) -> (Vec<Object>, Faces) {
     let shared = shared.among(objects);
-    let mut all = Vec::with_capacity(objects.len());
+    let mut all = Vec::new();
     let mut faces = Faces::default();
     // The objects that the mesh of a group becomes, by its place in memory.
     let mut of_groups: HashMap<*const Mesh, SharedSlice<Object>> = HashMap::new();
@@ -195,7 +200,13 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors, shared: Shared) -> (V
                 Some(placement.clone())
             }
             _ => {
-                all.append(&mut parts(mesh, colors, is_shared));
+                let mut parts = parts(mesh, colors, is_shared);
+                // A mesh alone is not copied.
+                if all.is_empty() {
+                    all = parts;
+                } else {
+                    all.append(&mut parts);
+                }
                 None
             }
         };
@@ -237,7 +248,7 @@ fn can_be_shared(mesh: &Mesh) -> bool {
 /// Returns the objects that a mesh becomes: its triangles, or one object for each look.
 fn parts(mesh: &Mesh, colors: Colors, is_shared: bool) -> Vec<Object> {
     if !is_shared {
-        return triangles(mesh, colors).collect();
+        return triangles(mesh, colors);
     }
     let looks = 0..mesh.model().looks().len();
     looks.map(|look| mesh.with_material(material(mesh, look, colors)).into()).collect()
@@ -251,14 +262,15 @@ fn glows_apart(model: &Model, look: usize) -> bool {
 }
 
 /// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
-fn triangles(mesh: &Mesh, colors: Colors) -> impl Iterator<Item = Object> {
+fn triangles(mesh: &Mesh, colors: Colors) -> Vec<Object> {
     let model = mesh.model();
     let materials: Vec<Material> =
         (0..model.looks().len()).map(|look| material(mesh, look, colors)).collect();
-    (0..model.triangle_count()).map(move |k| {
+    let triangle = |k: usize| {
         let triangle = Triangle::new(model.corners(k), materials[model.look(k)].clone());
         triangle.unwrap_or_else(|_| unreachable!("positions of a model are finite")).into()
-    })
+    };
+    (0..model.triangle_count()).into_par_iter().with_min_len(ALONE).map(triangle).collect()
 }
 
 /// Returns the material of the faces of a look.
@@ -307,6 +319,26 @@ impl Faces {
         self.runs.iter().any(|run| run.has_colors || run.glows || run.has_image)
     }
 
+    /// Returns the positions of objects, among so many, that have all materials and all kinds of shapes: of the faces of a mesh
+    /// that look alike only one.
+    pub(crate) fn examples(&self, count: usize) -> Vec<u32> {
+        let (mut examples, mut next) = (Vec::new(), 0);
+        for run in &self.runs {
+            examples.extend((next..run.first).map(|order| order as u32));
+            if run.is_shared {
+                next = run.first;
+                continue;
+            }
+            let mut is_known = vec![false; run.model.looks().len()];
+            let mut is_new = |k: &usize| !core::mem::replace(&mut is_known[run.model.look(*k)], true);
+            let faces = if run.model.looks().len() == 1 { 0..1 } else { 0..run.count };
+            examples.extend(faces.filter(|k| is_new(k)).map(|k| (run.first + k) as u32));
+            next = run.first + run.count;
+        }
+        examples.extend((next..count).map(|order| order as u32));
+        examples
+    }
+
     /// Returns the position before meshes were expanded of the object at `order`.
     pub(crate) fn origin(&self, order: usize) -> usize {
         match self.runs[..self.runs.partition_point(|run| run.first <= order)].last() {
@@ -343,9 +375,40 @@ impl Faces {
         look.alpha * of_picture * of_vertices < cutoff
     }
 
+    /// Returns whether any mesh is a closed body of glass.
+    pub(crate) fn have_inside(&self) -> bool {
+        self.runs.iter().any(|run| run.is_filled)
+    }
+
     /// Returns whether the object at `order` is a face of a closed body of glass.
     pub(crate) fn is_filled(&self, order: usize) -> bool {
         self.run_of(order).is_some_and(|run| run.is_filled)
+    }
+
+    /// Returns how much normals can turn, as a sine, where a hit is beside its place by a roundoff of its distance: in
+    /// roundoffs. A point p of the world is at `(p - center) * scale`, and no hit is nearer to the eye than `nearest`.
+    pub(crate) fn steepest(&self, (center, scale): (DVec3, f64), nearest: f64) -> f64 {
+        let of_run = |run: &Run| {
+            let of_face = |k: usize| {
+                let Some(normals) = run.normals(k) else { return 0.0 };
+                let corners = run.corners(k, center, scale);
+                let farthest = corners.into_iter().map(DVec3::length).fold(nearest, f64::max);
+                farthest * bend(corners, normals)
+            };
+            let faces = (0..run.count).into_par_iter().with_min_len(1024).map(of_face);
+            faces.reduce(|| 0.0, f64::max)
+        };
+        self.runs.iter().filter(|run| run.has_normals() && !run.is_shared).map(of_run).fold(0.0, f64::max)
+    }
+
+    /// Returns the runs of faces, in the order of the objects.
+    pub(crate) fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// Returns whether what is seen of the object at `order` varies with the place of a hit on it.
+    pub(crate) fn is_varied(&self, order: usize) -> bool {
+        self.run_of(order).is_some_and(|run| run.has_normals() || run.is_colored())
     }
 
     fn run_of(&self, order: usize) -> Option<&Run> {
@@ -370,12 +433,7 @@ impl Faces {
         let outwards = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let within = run.is_filled && outwards.dot(direction) > 0.0;
         let (mut normal, mut lift) = (face, DVec3::ZERO);
-        if let Some(normals) = run.model.normals(k) {
-            let turned = |n: DVec3| match &run.placement {
-                Some(placement) => placement.rotation() * n,
-                None => n,
-            };
-            let normals = normals.map(turned);
+        if let Some(normals) = run.normals(k) {
             let mixed: DVec3 = normals.iter().zip(weights).map(|(n, b)| *n * b).sum();
             let mixed = if mixed.dot(face) < 0.0 { -mixed } else { mixed }.normalize_or_zero();
             if mixed.dot(direction) < 0.0 {
@@ -386,26 +444,8 @@ impl Faces {
                 lift += b * n.dot(corner - point).max(0.0) * n;
             }
         }
-        let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
-        let look = || run.model.look(k);
-        if run.has_colors && run.model.is_varied(look()) {
-            let level = run.level(k, weights, Slot::Color);
-            color = run.model.color(k, weights, level, run.is_linear);
-        }
-        let finish = material.finish();
-        if run.has_image
-            && let (Some(image), Some(uvs)) = (finish.and_then(|f| f.image.as_ref()), run.model.uvs(k))
-        {
-            let [u, v] = [0, 1].map(|axis: usize| {
-                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
-            });
-            let v = if run.model.has_uvs_from_top() { v } else { 1.0 - v };
-            color *= factor_at(image.file().picture(), [u, v], true, run.is_linear);
-        }
-        if run.glows && glows_apart(&run.model, look()) {
-            glow = run.model.glow(look(), run.level(k, weights, Slot::Glow), run.is_linear);
-        }
-        let glass = finish.and_then(|finish| finish.glass);
+        let [color, glow] = run.colors(k, weights, material);
+        let glass = material.finish().and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));
         let onward = onward_normal(direction, normal, face, glass);
         Some(Shading { normal, onward, lift, color, glow, within })
@@ -413,12 +453,71 @@ impl Faces {
 }
 
 impl Run {
-    fn is_shaded(&self) -> bool {
-        self.model.has_normals() || self.has_colors || self.glows || self.has_image || self.is_filled
+    pub(crate) fn is_shaded(&self) -> bool {
+        self.model.has_normals() || self.is_colored() || self.is_filled
+    }
+
+    /// Returns whether colours vary within its faces.
+    pub(crate) fn is_colored(&self) -> bool {
+        self.has_colors || self.glows || self.has_image
+    }
+
+    /// Returns whether its faces can have normals of their own.
+    pub(crate) fn has_normals(&self) -> bool {
+        self.model.has_normals()
+    }
+
+    /// Returns whether it is a closed body of glass.
+    pub(crate) fn is_filled(&self) -> bool {
+        self.is_filled
+    }
+
+    /// Returns whether the tree of its model is shared. Then its looks stand for its faces among all objects.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.is_shared
+    }
+
+    /// Returns the positions of its faces among all objects.
+    pub(crate) fn orders(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    /// Returns the normals at the corners of a face, or `None` if it is flat.
+    pub(crate) fn normals(&self, k: usize) -> Option<[DVec3; 3]> {
+        let normals = self.model.normals(k)?;
+        Some(match &self.placement {
+            Some(placement) => normals.map(|n| placement.rotation() * n),
+            None => normals,
+        })
+    }
+
+    /// Returns the factor of the ambient and diffuse coefficients of a face at a place, given by its barycentric weights, and
+    /// the colour that is added.
+    pub(crate) fn colors(&self, k: usize, weights: [f64; 3], material: &Material) -> [DVec3; 2] {
+        let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
+        let look = || self.model.look(k);
+        if self.has_colors && self.model.is_varied(look()) {
+            let level = self.level(k, weights, Slot::Color);
+            color = self.model.color(k, weights, level, self.is_linear);
+        }
+        if self.has_image
+            && let Some(image) = material.finish().and_then(|finish| finish.image.as_ref())
+            && let Some(uvs) = self.model.uvs(k)
+        {
+            let [u, v] = [0, 1].map(|axis: usize| {
+                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
+            });
+            let v = if self.model.has_uvs_from_top() { v } else { 1.0 - v };
+            color *= factor_at(image.file().picture(), [u, v], true, self.is_linear);
+        }
+        if self.glows && glows_apart(&self.model, look()) {
+            glow = self.model.glow(look(), self.level(k, weights, Slot::Glow), self.is_linear);
+        }
+        [color, glow]
     }
 
     /// Returns the corners of a face in coordinates in which a point p of the world is at `(p - center) * scale`.
-    fn corners(&self, k: usize, center: DVec3, scale: f64) -> [DVec3; 3] {
+    pub(crate) fn corners(&self, k: usize, center: DVec3, scale: f64) -> [DVec3; 3] {
         self.model.corners(k).map(|p| match &self.placement {
             Some(placement) => (placement.point(p) - center) * scale,
             None => (p - center) * scale,
@@ -446,6 +545,18 @@ impl Run {
 /// Returns the number of the triangle that the order of a hit on a shared model has.
 pub(crate) fn hit_face(order: f64) -> usize {
     (order.fract() / ONE_FACE) as usize
+}
+
+/// Returns how fast the normal changes across a face: the most that it turns over a length, divided by that length.
+fn bend([a, b, c]: [DVec3; 3], normals: [DVec3; 3]) -> f64 {
+    let (p, q) = (b - a, c - a);
+    let length = p.length();
+    let along = p / length;
+    let beside = q - q.dot(along) * along;
+    let of_p = (normals[1] - normals[0]) / length;
+    let of_q = (normals[2] - normals[0] - q.dot(along) * of_p) / beside.length();
+    let bend = of_p.length() + of_q.length();
+    if bend.is_nan() { f64::INFINITY } else { bend }
 }
 
 /// Returns the barycentric weights of a point of a triangle, none below 0.

@@ -23,6 +23,27 @@ pub(crate) fn map<T: Sync, U: Send>(items: &[T], f: impl Fn(&T) -> U + Send + Sy
     if items.len() < SHARED { items.iter().map(f).collect() } else { items.par_iter().map(f).collect() }
 }
 
+/// Does as [`map`] does, with the index of each item.
+pub(crate) fn map_numbered<T: Sync, U: Send>(
+    items: &[T],
+    f: impl Fn((usize, &T)) -> U + Send + Sync,
+) -> Vec<U> {
+    if items.len() < SHARED {
+        items.iter().enumerate().map(f).collect()
+    } else {
+        items.par_iter().enumerate().map(f).collect()
+    }
+}
+
+/// Returns `items.iter().all(f)`, computed on all cores if there are many items.
+pub(crate) fn all<T: Sync>(items: &[T], f: impl Fn(&T) -> bool + Send + Sync) -> bool {
+    if items.len() < SHARED {
+        items.iter().all(f)
+    } else {
+        items.par_chunks(SHARED).all(|items| items.iter().all(&f))
+    }
+}
+
 /// Draws these rows of an image, counted from the top, in bands of `side` rows, the first of which begins at the top of
 /// the image. `draw` gets the buffers that `scratch` makes for a worker, the first row of its band, and the band's
 /// bytes.

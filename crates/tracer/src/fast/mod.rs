@@ -55,7 +55,8 @@ pub(crate) use crate::fast::probe::Finder;
 /// The columns and rows of a tile.
 const SIDE: (u32, u32) = (16, 16);
 
-/// The columns and rows of a tile in scenes of more than `MANY` objects: a small tile shows few of them.
+/// The columns and rows of a tile in scenes of more than `MANY` objects, none of which is a body of glass: a small tile shows
+/// few of them.
 const SMALL_SIDE: (u32, u32) = (8, 8);
 const MANY: usize = 512;
 
@@ -412,7 +413,9 @@ impl<'a, E: Real> Setup<'a, E> {
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
         let size = (scene.screen.width(), scene.screen.height());
-        let many = geometry.solids.len() > MANY;
+        // Rays in glass are many, and go apart soon: the more of them wait together, the fuller are packets.
+        let has_glass = || geometry.faces.as_ref().is_some_and(|faces| faces.have_inside());
+        let many = geometry.solids.len() > MANY && !has_glass();
         let side = options.tile.unwrap_or(if many { SMALL_SIDE } else { SIDE });
         let grid = Grid { size, side, margin: MARGIN, lens: None };
         let prepared = Prepared::<E>::new(ranked, geometry, options.tree, &grid)?;

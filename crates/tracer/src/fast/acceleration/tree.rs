@@ -1,8 +1,9 @@
 //! A bounding volume hierarchy for scenes of many objects.
 //!
-//! `obvhs` groups the objects, and their overlap [clusters](crate::fast::acceleration::overlap). The bounding boxes are computed here, in
-//! the kernels' precision and wide enough for every rounding error of their tests ([`padded`]). So the tree never hides
-//! an object that a test of all objects would hit.
+//! `obvhs` groups the objects, and their overlap [clusters](crate::fast::acceleration::overlap). Very many objects without such
+//! clusters are [parted by planes](crate::fast::acceleration::binned), which is sooner done. The bounding boxes are computed
+//! here, in the kernels' precision and wide enough for every rounding error of their tests ([`padded`]). So the tree never
+//! hides an object that a test of all objects would hit.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -11,7 +12,9 @@ use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
+use rayon::prelude::*;
 
+use crate::fast::acceleration::binned::{Grown, Twig};
 use crate::fast::acceleration::candidates::MASKED;
 use crate::fast::acceleration::overlap::OverlapClusters;
 use crate::fast::arithmetic::real::Real;
@@ -23,6 +26,9 @@ use crate::parallel::map;
 
 /// The largest number of objects in a leaf.
 const LEAF: u32 = 4;
+
+/// The number of objects from which they are parted by planes.
+const VERY_MANY: usize = 4096;
 
 /// A node: its bounding box and its contents.
 #[derive(Clone, Copy, Debug)]
@@ -120,7 +126,7 @@ pub(crate) enum Copies {
 }
 
 /// An object that a tree can group.
-pub(crate) trait Grouped: Copy + Sync {
+pub(crate) trait Grouped: Copy + Send + Sync {
     fn bounds(&self) -> Bounds;
 
     /// Returns the number of its kind. All solids of a leaf have the same number.
@@ -175,6 +181,9 @@ fn plant<T: Grouped>(solids: &mut Vec<T>, copies: Copies) -> Branches {
         Aabb { min: Vec3A::from(min.as_vec3()), max: Vec3A::from(max.as_vec3()) }
     });
     let clusters = Clusters::new(solids, &boxes, copies);
+    if matches!(clusters, Clusters::Single(VERY_MANY..)) && are_of_one_kind(solids) {
+        return plant_many(solids, &boxes);
+    }
     let items: Vec<Item> = (0..clusters.len()).map(|at| Item(clusters.bounds(&boxes, at))).collect();
     let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
     let grown = build_bvh2(&items, params, &mut Default::default());
@@ -200,6 +209,18 @@ fn plant<T: Grouped>(solids: &mut Vec<T>, copies: Copies) -> Branches {
     }
     *solids = order;
     Branches::bounded(branches, solids)
+}
+
+fn are_of_one_kind<T: Grouped>(solids: &[T]) -> bool {
+    solids.iter().all(|solid| solid.number() == solids[0].number())
+}
+
+/// Sorts very many solids of one kind into the order of a tree's leaves, and returns its topology.
+fn plant_many<T: Grouped>(solids: &mut Vec<T>, boxes: &[Aabb]) -> Branches {
+    let Grown { nodes, order } = Grown::new(boxes, LEAF as usize);
+    *solids = map(&order, |&at| solids[at as usize]);
+    let branch = |&Twig { first, count }: &Twig| Branch { first, count, ..Branch::EMPTY };
+    Branches::bounded(map(&nodes, branch), solids)
 }
 
 /// The items that a tree is built of: single solids, and clusters.
@@ -308,14 +329,23 @@ impl Branch {
 impl Branches {
     /// Computes the bounding boxes of the branches.
     fn bounded<T: Grouped>(mut branches: Vec<Branch>, solids: &[T]) -> Self {
+        let of_leaf = |branch: &mut Branch| {
+            let first = branch.first as usize;
+            let solids = &solids[first..first + branch.count as usize];
+            branch.bounds = solids.iter().map(Grouped::bounds).fold(branch.bounds, join);
+        };
+        if branches.len() < VERY_MANY {
+            branches.iter_mut().filter(|branch| branch.count > 0).for_each(of_leaf);
+        } else {
+            branches.par_iter_mut().filter(|branch| branch.count > 0).for_each(of_leaf);
+        }
         for at in (0..branches.len()).rev() {
             let Branch { first, count, bounds } = branches[at];
             let first = first as usize;
-            branches[at].bounds = if count == 0 {
-                [branches[first].bounds, branches[first + 1].bounds].into_iter().fold(bounds, join)
-            } else {
-                solids[first..first + count as usize].iter().map(Grouped::bounds).fold(bounds, join)
-            };
+            if count == 0 {
+                let children = [branches[first].bounds, branches[first + 1].bounds];
+                branches[at].bounds = children.into_iter().fold(bounds, join);
+            }
         }
         Self(branches)
     }
@@ -340,7 +370,11 @@ fn leaf<T: Grouped>(branches: &mut Vec<Branch>, at: usize, solids: &[T], from: u
 impl<E: Real> Tree<E> {
     /// Makes a tree. `solids` are in the order of [`group`]; `index` maps the index of each in that order to its index
     /// in the array of its kind.
-    pub(crate) fn new<T: Grouped>(branches: &Branches, solids: &[T], index: impl Fn(usize) -> u32) -> Self {
+    pub(crate) fn new<T: Grouped>(
+        branches: &Branches,
+        solids: &[T],
+        index: impl Fn(usize) -> u32 + Send + Sync,
+    ) -> Self {
         let branches = &branches.0;
         // Children are swapped so that the first comes first along the axis on which their centres are farthest apart.
         let mut place: Vec<u32> = (0..branches.len() as u32).collect();
@@ -367,7 +401,7 @@ impl<E: Real> Tree<E> {
             let (low, high) = padded(bounds);
             Node { low, high, first, content }
         };
-        Self { nodes: place.iter().map(node).collect() }
+        Self { nodes: map(&place, node) }
     }
 }
 

@@ -13,6 +13,7 @@ use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 use rayfold_scene::Placement;
 use rayfold_scene::assets::Model;
+use rayon::prelude::*;
 
 use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
@@ -29,6 +30,9 @@ use crate::fast::shapes::{RayPrecalculations, Seen, Shape, Shapes, Solid, Sorted
 use crate::fast::shared::Surface;
 use crate::meshes::{ONE_FACE, hit_face};
 use crate::scale::below_inverse;
+
+/// The number of triangles that one thread makes at a time.
+const ALONE: usize = 4096;
 
 /// The triangles of a model, in coordinates in which it is in a cube from -1 to 1.
 #[derive(Debug)]
@@ -56,14 +60,15 @@ impl<E: Real> ModelTree<E> {
 
     fn new(model: &Model) -> Self {
         let count = model.triangle_count();
-        let corners = || (0..count).flat_map(|k| model.corners(k));
         let [low, high] = model.bounds();
         let center = low + 0.5 * (high - low);
         let scale = below_inverse((high - center).max(center - low).max_element());
         let place = |p: DVec3| (p - center) * scale;
         let half = place(high).max(-place(low));
-        let radius = corners().map(|p| place(p).length_squared()).fold(0.0, f64::max).sqrt();
-        let solids = (0..count).filter_map(|k| {
+        let all = || (0..count).into_par_iter().with_min_len(ALONE);
+        let reach = |k: usize| model.corners(k).into_iter().map(|p| place(p).length()).fold(0.0, f64::max);
+        let radius = all().map(reach).reduce(|| 0.0, f64::max);
+        let solids = all().filter_map(|k| {
             let triangle = RenderSpaceTriangle::new(&model.corners(k), center, scale)?;
             Some(Solid { shape: Shape::Triangle(triangle), order: k as u32 })
         });

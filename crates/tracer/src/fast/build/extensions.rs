@@ -23,7 +23,7 @@ pub(crate) struct Extensions<E> {
     finishes: Option<Finishes>,
     glass: Option<Glass<E>>,
     fog: Option<Fog>,
-    shaded: Option<ShadedFaces>,
+    shaded: Option<ShadedFaces<E>>,
     paths: Option<Paths>,
 }
 
@@ -62,7 +62,7 @@ impl<E: Real> Extensions<E> {
 
     /// Returns the faces of meshes, if any has more than a triangle.
     #[inline(always)]
-    pub(crate) fn shaded(&self) -> Option<&ShadedFaces> {
+    pub(crate) fn shaded(&self) -> Option<&ShadedFaces<E>> {
         if parts::BUILT.meshes { self.shaded.as_ref() } else { None }
     }
 
@@ -114,12 +114,17 @@ impl<E: Real> Extensions<E> {
     }
 }
 
-/// Returns whether the scene uses any of these features. If it does, it is drawn in `f64`.
-pub(crate) fn is_needed(geometry: &Geometry) -> bool {
+/// Returns whether the scene uses any of these features.
+fn is_needed(geometry: &Geometry) -> bool {
+    needs_double(geometry) || geometry.faces.is_some()
+}
+
+/// Returns whether the scene uses any of these features that are drawn in `f64`: all except the normals of meshes.
+pub(crate) fn needs_double(geometry: &Geometry) -> bool {
     !geometry.bodies.is_empty()
         || !geometry.lamps.is_empty()
         || geometry.is_finished
         || geometry.is_foggy
         || geometry.goes_round
-        || geometry.faces.is_some()
+        || geometry.are_distinct()
 }

@@ -10,19 +10,20 @@
 //! The choice does not depend on the order of the objects.
 
 use glam::DVec3;
-use rayfold_scene::Scene;
+use rayfold_scene::{Object, Scene};
 
 use crate::camera::Axis;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::arithmetic::rounding::OFFSET;
 use crate::fast::bodies;
-use crate::fast::build::extensions::is_needed;
+use crate::fast::build::extensions::needs_double;
 use crate::fast::materials::glass::SURFACES_OF_ONE;
 use crate::fast::placement::coincidence::surfaces_z_fight;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::placed::{RenderSpaceShape, Sight};
 use crate::fast::rays::view::View;
 use crate::fast::shapes::{Shape, Solid};
+use crate::parallel::all;
 use crate::{Precision, RenderOptions};
 
 /// The accumulated rounding error of an outline as seen from the eye, in roundoffs of its distance.
@@ -46,6 +47,10 @@ const START: f64 = OFFSET + POINT;
 ///
 /// [`LATE`]: crate::fast::arithmetic::rounding::LATE
 const SHADOW: f64 = 16.0;
+
+/// The accumulated rounding error of the place in a face for which its normals are mixed, in roundoffs of its distance: 6 of
+/// the ray's direction and of the distance along it, and 8 of the sides of the edges.
+const MIXED: f64 = 16.0;
 
 /// The number of pairs of an occluder and a possible receiver that are compared before the search is given up.
 const PAIRS: usize = 1 << 22;
@@ -79,15 +84,16 @@ const DOUBLE: Range = Range { least: 1e-100, most: 1e100, count: 1 << 32 };
 /// Returns the precision of a setting. It is never [`Precision::Auto`], and `None` if no kernel can represent the
 /// scene.
 pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scene) -> Option<Precision> {
-    let colors = Colors::of(scene, options.bounces(scene));
+    let colors = Colors::of(geometry, scene, options.bounces(scene));
     let is_pinhole = matches!(geometry.view, View::Pinhole { .. });
     // These numbers are not precise enough to decide on which side of such a surface the eye is.
     let is_at_eye = is_pinhole && geometry.bodies.iter().any(bodies::Solid::is_at_origin);
     if is_at_eye || !DOUBLE.holds(geometry, scene, &colors) || is_too_deep(&geometry.view) {
         return None;
     }
-    // The errors of the extensions have bounds for `f64` alone, and pictures may have many pixels.
-    let single = !is_needed(geometry)
+    // The errors of most extensions have bounds for `f64` alone, and pictures may have many pixels.
+    let single = !needs_double(geometry)
+        && !bends_rays(geometry, scene)
         && scene.sky_picture().is_none()
         && match options.precision {
             Precision::F64 => false,
@@ -95,6 +101,20 @@ pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
             Precision::Auto => SINGLE.holds(geometry, scene, &colors) && is_enough(geometry, scene, &colors),
         };
     Some(if single { Precision::F32 } else { Precision::F64 })
+}
+
+/// Returns whether rays go on from faces with normals of their own, or pixels have several rays from such faces. For these the
+/// errors of normals have bounds for `f64` alone.
+fn bends_rays(geometry: &Geometry, scene: &Scene) -> bool {
+    let is_mirror = |object: &Object| object.material().mirror() != DVec3::ZERO;
+    geometry.faces.is_some() && (scene.samples.most() > 1 || geometry.examples(scene).any(is_mirror))
+}
+
+/// Returns whether the errors of the normals of faces are invisible.
+fn are_normals_fine(geometry: &Geometry, sight: &Sight) -> bool {
+    let Some(faces) = &geometry.faces else { return true };
+    let nearest = if sight.parallel { 1.0 } else { 0.0 };
+    MIXED * sight.roundoff * faces.steepest((geometry.center, geometry.scale), nearest) <= sight.normal
 }
 
 /// Returns whether parallel rays go so far that the errors of `f64` there are visible in a pixel.
@@ -123,7 +143,7 @@ impl Range {
         widest < self.most
             && colors.largest < self.most
             && scene.objects.len() < self.count
-            && geometry.solids.iter().all(is_held)
+            && all(&geometry.solids, is_held)
     }
 }
 
@@ -138,13 +158,13 @@ struct Colors {
 }
 
 impl Colors {
-    fn of(scene: &Scene, bounces: u32) -> Self {
+    fn of(geometry: &Geometry, scene: &Scene, bounces: u32) -> Self {
         let mut arriving: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
         let (mut ambient, mut diffuse, mut mirror, mut least) = (0f64, 0f64, 0f64, 0f64);
         // The additional light that glass transmits.
         let mut through = 0f64;
         let mut glow = 0f64;
-        for object in scene.objects.iter() {
+        for object in geometry.examples(scene) {
             let material = object.material();
             ambient = ambient.max(material.ambient().abs().max_element());
             diffuse = diffuse.max(material.diffuse().abs().max_element());
@@ -163,8 +183,14 @@ impl Colors {
                 diffuse = diffuse.max(shine.color().abs().max_element());
             }
             if let Some(glass) = finish.glass {
-                let most = glass.color().abs().max_element().max(1.0);
-                through = through.max(most);
+                through = through.max(glass.color().abs().max_element().max(1.0));
+            }
+        }
+        if through > 1.0 {
+            // Each surface can be passed.
+            for object in scene.objects.iter() {
+                let glass = object.material().finish().and_then(|finish| finish.glass);
+                let most = glass.map_or(1.0, |glass| glass.color().abs().max_element().max(1.0));
                 arriving *= most.powi(SURFACES_OF_ONE as i32);
             }
         }
@@ -234,7 +260,8 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         point: POINT,
         start: START,
     };
-    geometry.solids.iter().all(|solid| solid.shape.is_fine(&sight))
+    all(&geometry.solids, |solid| solid.shape.is_fine(&sight))
+        && are_normals_fine(geometry, &sight)
         && are_shadows_fine(geometry, &sight)
         && !surfaces_z_fight(geometry, scene, pixel)
 }

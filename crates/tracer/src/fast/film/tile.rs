@@ -384,7 +384,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
-    shade_faces::<S, E, EYE>(Some(beyond), queue, hits);
+    shade_faces::<S, E, EYE>(simd, scene, Some(beyond), queue, hits);
     glow::<S, E, EYE>(Some(beyond), queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.bodies().is_some() {
@@ -458,7 +458,7 @@ fn shade_softly<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     settle_shared::<S, E, N, EYE>(simd, scene, queue, hits);
     surfaces_of_all::<S, E, N, EYE>(simd, scene, met.background, queue, hits);
     let is_painted = beyond.is_some_and(|beyond| paint::<S, E, EYE>(beyond, queue, hits));
-    shade_faces::<S, E, EYE>(beyond, queue, hits);
+    shade_faces::<S, E, EYE>(simd, scene, beyond, queue, hits);
     glow::<S, E, EYE>(beyond, queue, hits);
     occluders.find(simd, scene, hits);
     if beyond.is_some_and(|beyond| beyond.bodies().is_some()) {
@@ -486,12 +486,14 @@ fn paint<S: Simd, E: Real, const EYE: bool>(
 /// Gives hits the normals and colours of the faces of meshes.
 #[inline(always)]
 fn shade_faces<S: Simd, E: Real, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
     beyond: Option<&Extensions<E>>,
     queue: &RayBatch<E>,
     hits: &mut Hits<E>,
 ) {
     match beyond.and_then(Extensions::shaded) {
-        Some(faces) => faces.shade::<E, EYE>(queue, hits, Lanes::<S, E>::LEN),
+        Some(faces) => faces.shade::<S, EYE>(simd, scene, queue, hits),
         None if parts::BUILT.meshes => hits.forget_faces(),
         None => {}
     }

@@ -1,81 +1,344 @@
 //! The faces of meshes: normals at vertices, colours at vertices, and the inside of closed glass.
 //!
-//! As patterns are, they are computed lane by lane, with the functions of the reference tracer.
+//! Normals are mixed in lanes. The weights of a hit come from the edges that the tests of its triangle use, so that a
+//! hit needs nothing but its triangle and the three normals. As patterns are, colours are computed lane by lane, with the
+//! functions of the reference tracer.
 
+use std::ops::Range;
 use std::sync::Arc;
 
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::Scene;
+use rayon::prelude::*;
 
-use crate::fast::arithmetic::real::Real;
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::build::prepare::Prepared;
 use crate::fast::placement::geometry::Geometry;
-use crate::fast::rays::bounce::{Column, Hits, ROOM, RayBatch};
-use crate::meshes::{FaceHit, Faces};
+use crate::fast::rays::bounce::{Hits, ROOM, RayBatch};
+use crate::fast::rays::kind::Kind;
+use crate::meshes::{FaceHit, Faces, Run, hit_face};
 
 /// The faces of a scene, at least one of which has more than a triangle.
 #[derive(Debug)]
-pub(crate) struct ShadedFaces {
+pub(crate) struct ShadedFaces<E> {
     faces: Arc<Faces>,
+    /// The runs of faces that have more than triangles.
+    runs: Vec<ShadedRun<E>>,
     /// The scene, for its materials.
     scene: Scene,
     center: DVec3,
     scale: f64,
 }
 
-impl ShadedFaces {
+/// The faces of one mesh.
+#[derive(Debug)]
+struct ShadedRun<E> {
+    /// The positions of its faces among all objects.
+    orders: Range<usize>,
+    /// The index among all runs of faces.
+    index: usize,
+    /// Whether the faces are drawn from the tree of their model. Then their normals are looked up there.
+    is_shared: bool,
+    /// The unit normals at the corners of each face; zeros for a flat one. Empty if all are flat.
+    normals: Vec<[[E; 3]; 3]>,
+    /// Whether colours vary within faces.
+    is_colored: bool,
+    /// The index of refraction of glass, or 0; and 1 for a closed body of glass.
+    ior: E,
+    is_filled: E,
+}
+
+/// The data of the faces that a packet hits, lane by lane.
+struct Gathered<E> {
+    /// The edges opposite to the corners: their directions and moments.
+    edges: [[[E; 16]; 3]; 3],
+    moments: [[[E; 16]; 3]; 3],
+    normals: [[[E; 16]; 3]; 3],
+    /// 1 for lanes that hit such a face.
+    is_face: [E; 16],
+    /// For lanes that hit glass: its index of refraction, and 1 if it is the inside of a closed body. 0 for all others.
+    ior: [E; 16],
+    is_filled: [E; 16],
+    /// The lanes whose faces have more than normals: the lane, and the index of the run in this list.
+    more: [(usize, usize); 16],
+    more_count: usize,
+}
+
+impl<E: Real> ShadedFaces<E> {
     /// Returns `None` if there are none.
     pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         let faces = geometry.faces.clone()?;
-        Some(Self { faces, scene: scene.clone(), center: geometry.center, scale: geometry.scale })
+        let (scene, center, scale) = (scene.clone(), geometry.center, geometry.scale);
+        let runs = faces.runs().iter().enumerate().filter(|(_, run)| run.is_shaded());
+        let runs = runs.map(|(index, run)| ShadedRun::new(index, run, &scene)).collect();
+        Some(Self { faces, runs, scene, center, scale })
     }
 
     /// Gives hits the normals and colours of their faces. Rays that go on from them start as from triangles.
     /// `EYE` says that the rays start at the eye, and count for 1.
     #[inline(never)]
-    pub(crate) fn shade<E: Real, const EYE: bool>(
+    pub(crate) fn shade<S: Simd, const EYE: bool>(
         &self,
+        simd: S,
+        scene: &Prepared<E>,
         queue: &RayBatch<E>,
         hits: &mut Hits<E>,
-        lanes: usize,
     ) {
         let columns = [&mut hits.face, &mut hits.place, &mut hits.under, &mut hits.onward];
         columns.into_iter().flatten().for_each(|column| column.resize(ROOM, E::narrow(0.0)));
-        let zero = DVec3::ZERO;
-        for packet in 0..hits.packets.len() {
-            let (at, _) = hits.packets[packet];
-            for lane in at..at + lanes {
-                let (start, face) = (read(&hits.start, lane), read(&hits.normal, lane));
-                write(&mut hits.face, lane, face);
-                write(&mut hits.place, lane, start);
-                write(&mut hits.onward, lane, face);
-                write(&mut hits.under, lane, zero);
-                if !hits.is_hit(lane) {
-                    continue;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut gathered = Gathered::new();
+                for packet in 0..hits.packets.len() {
+                    let (at, _) = hits.packets[packet];
+                    self.gather(scene, hits, at..at + Lanes::<S, E>::LEN, &mut gathered);
+                    let weights = gathered.mix(simd, queue, hits, at);
+                    if gathered.more_count > 0 {
+                        self.add_more::<S, EYE>(scene, queue, hits, (at, &gathered, weights));
+                    }
                 }
-                let order = hits.order.0[lane].widen();
-                let offset = hits.sides[0].0[lane].widen();
+            },
+        );
+    }
+
+    /// Returns the index of the run of an object among those here.
+    #[inline(always)]
+    fn run_of(&self, order: usize) -> Option<usize> {
+        let at = match &self.runs[..] {
+            [_] => 0,
+            runs => runs.partition_point(|run| run.orders.start <= order).checked_sub(1)?,
+        };
+        self.runs[at].orders.contains(&order).then_some(at)
+    }
+
+    #[inline(always)]
+    fn gather(&self, scene: &Prepared<E>, hits: &Hits<E>, lanes: Range<usize>, into: &mut Gathered<E>) {
+        into.more_count = 0;
+        into.is_face = [E::narrow(0.0); 16];
+        into.ior = [E::narrow(0.0); 16];
+        for (lane, at) in lanes.enumerate() {
+            if !hits.is_hit(at) {
+                continue;
+            }
+            let order = hits.order.0[at].to_index();
+            let Some(run) = self.run_of(order) else { continue };
+            let ShadedRun { orders, normals, is_shared, is_colored, ior, is_filled, .. } = &self.runs[run];
+            let entry = &scene.entries[order];
+            if *is_colored || entry.is_body && !is_shared {
+                into.more[into.more_count] = (lane, run);
+                into.more_count += 1;
+            }
+            if *is_shared {
+                self.gather_shared(run, hits.order.0[at], into, lane);
+                continue;
+            }
+            if entry.is_body || entry.kind != Kind::Triangle {
+                continue;
+            }
+            (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
+            let normals = normals.get(order - orders.start).copied().unwrap_or([[E::narrow(0.0); 3]; 3]);
+            let edges = &scene.shapes.triangle(entry.index as usize).edges;
+            for (corner, (edge, normal)) in edges.iter().zip(normals).enumerate() {
+                into.put(lane, corner, [edge.direction, edge.moment, normal]);
+            }
+        }
+    }
+
+    /// Gathers the face of a hit on a model that has a tree of its own.
+    #[inline(always)]
+    fn gather_shared(&self, run: usize, order: E, into: &mut Gathered<E>, lane: usize) {
+        let ShadedRun { index, ior, is_filled, .. } = &self.runs[run];
+        let (run, k) = (&self.faces.runs()[*index], hit_face(order.widen()));
+        (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
+        let corners = run.corners(k, self.center, self.scale);
+        let normals = run.normals(k).unwrap_or_default();
+        for (corner, normal) in normals.into_iter().enumerate() {
+            let (next, last) = (corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
+            let edge = last - next;
+            let all = [edge, next.cross(edge), normal];
+            into.put(lane, corner, all.map(|v| v.to_array().map(E::narrow)));
+        }
+    }
+
+    /// Adds the colours of faces. A face with holes is shaded by the functions of the reference
+    /// tracer alone.
+    #[inline(never)]
+    fn add_more<S: Simd, const EYE: bool>(
+        &self,
+        scene: &Prepared<E>,
+        queue: &RayBatch<E>,
+        hits: &mut Hits<E>,
+        (at, gathered, weights): (usize, &Gathered<E>, [Lanes<S, E>; 3]),
+    ) {
+        for &(of_packet, run) in &gathered.more[..gathered.more_count] {
+            let lane = at + of_packet;
+            let face_order = hits.order.0[lane].widen();
+            let order = face_order as usize;
+            let material = self.scene.objects[order].material();
+            let (direction, face) = (read(&queue.direction, lane), read(&hits.face, lane));
+            let ShadedRun { orders, index, is_shared, .. } = &self.runs[run];
+            let [color, glow] = if scene.entries[order].is_body && !is_shared {
+                let (start, offset) = (read(&hits.start, lane), hits.sides[0].0[lane].widen());
                 let point = start - offset * face;
-                let direction = read(&queue.direction, lane);
                 let hit = FaceHit { point, center: self.center, scale: self.scale, direction, face };
-                let material = self.scene.objects[order as usize].material();
-                let Some(shading) = self.faces.shading(order, material, hit) else { continue };
+                let Some(shading) = self.faces.shading(face_order, material, hit) else { continue };
                 write(&mut hits.normal, lane, shading.normal);
                 write(&mut hits.onward, lane, shading.onward);
                 write(&mut hits.start, lane, start + shading.lift);
-                // A face that the start is lifted off can hide a light; a face that it starts on cannot.
-                if shading.lift.dot(face) <= offset {
-                    write(&mut hits.under, lane, -2.0 * offset * face);
-                }
-                let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
-                let color = read(&hits.color, lane) * shading.color + weight * shading.glow;
-                write(&mut hits.color, lane, color);
-                let diffuse = read(&hits.diffuse, lane) * shading.color;
-                write(&mut hits.diffuse, lane, diffuse);
+                let hides = shading.lift.dot(face) > offset;
+                let under = if hides { DVec3::ZERO } else { -2.0 * offset * face };
+                write(&mut hits.under, lane, under);
                 if shading.within {
                     hits.sides[1].0[lane] = E::narrow(1.0);
                 }
-            }
+                [shading.color, shading.glow]
+            } else {
+                let run = &self.faces.runs()[*index];
+                let k = if *is_shared { hit_face(face_order) } else { order - orders.start };
+                run.colors(k, weights.map(|of| of[of_packet].widen()), material)
+            };
+            let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
+            let seen = read(&hits.color, lane) * color + weight * glow;
+            write(&mut hits.color, lane, seen);
+            let diffuse = read(&hits.diffuse, lane) * color;
+            write(&mut hits.diffuse, lane, diffuse);
         }
+    }
+}
+
+impl<E: Real> ShadedRun<E> {
+    fn new(index: usize, run: &Run, scene: &Scene) -> Self {
+        let orders = run.orders();
+        let row = |k: usize| {
+            let normals = run.normals(k).unwrap_or_default();
+            normals.map(|normal| normal.to_array().map(E::narrow))
+        };
+        let is_shared = run.is_shared();
+        let normals = if run.has_normals() && !is_shared {
+            (0..orders.len()).into_par_iter().with_min_len(1024).map(row).collect()
+        } else {
+            vec![]
+        };
+        let glass = scene.objects[orders.start].material().finish().and_then(|finish| finish.glass);
+        let ior = E::narrow(glass.map_or(0.0, |glass| glass.ior()));
+        let is_filled = E::narrow(if run.is_filled() { 1.0 } else { 0.0 });
+        Self { orders, index, is_shared, normals, is_colored: run.is_colored(), ior, is_filled }
+    }
+}
+
+impl<E: Real> Gathered<E> {
+    fn new() -> Self {
+        let nothing = [[[E::narrow(0.0); 16]; 3]; 3];
+        Self {
+            edges: nothing,
+            moments: nothing,
+            normals: nothing,
+            is_face: [E::narrow(0.0); 16],
+            ior: [E::narrow(0.0); 16],
+            is_filled: [E::narrow(0.0); 16],
+            more: [(0, 0); 16],
+            more_count: 0,
+        }
+    }
+
+    /// Takes what a lane hits at a corner: the edge opposite to it, its moment, and the corner's normal.
+    #[inline(always)]
+    fn put(&mut self, lane: usize, corner: usize, all: [[E; 3]; 3]) {
+        self.is_face[lane] = E::narrow(1.0);
+        let columns = [&mut self.edges[corner], &mut self.moments[corner], &mut self.normals[corner]];
+        for (column, value) in columns.into_iter().flatten().zip(all.into_iter().flatten()) {
+            column[lane] = value;
+        }
+    }
+
+    /// Mixes the normals of a packet's hits, and lifts the starts of its shadow rays. Returns the weights of the corners.
+    #[inline(always)]
+    fn mix<S: Simd>(&self, simd: S, queue: &RayBatch<E>, hits: &mut Hits<E>, at: usize) -> [Lanes<S, E>; 3] {
+        let zero = constant::<S, E>(simd, 0.0);
+        let one = constant::<S, E>(simd, 1.0);
+        let minus = constant::<S, E>(simd, -1.0);
+        let lanes = at..at + Lanes::<S, E>::LEN;
+        let (start, face) = (Vec3::load(simd, &hits.start, at), Vec3::load(simd, &hits.normal, at));
+        face.store(&mut hits.face, at);
+        start.store(&mut hits.place, at);
+        let is_face = Lanes::<S, E>::from_slice(simd, &self.is_face[..Lanes::<S, E>::LEN]).simd_gt(zero);
+        if !is_face.any_true() {
+            face.store(&mut hits.onward, at);
+            Vec3::<S, E>::zero(simd).store(&mut hits.under, at);
+            return [one, zero, zero];
+        }
+        let direction = Vec3::<S, E>::load(simd, &queue.direction, at);
+        let offset = Lanes::<S, E>::from_slice(simd, &hits.sides[0].0[lanes.clone()]);
+        let point = start.sub(face.scale(offset));
+        let edges: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.edges[k], 0));
+        let areas: [Lanes<S, E>; 3] = [0, 1, 2].map(|k: usize| {
+            let moment = Vec3::<S, E>::load(simd, &self.moments[k], 0);
+            face.dot(edges[k].cross(point)) + face.dot(moment)
+        });
+        // The face may be seen from its other side.
+        let side = (areas[0] + areas[1] + areas[2]).simd_lt(zero).select(minus, one);
+        let areas = areas.map(|area| (area * side).max(zero));
+        let sum = areas[0] + areas[1] + areas[2];
+        let is_within = sum.simd_gt(zero);
+        let share = one / is_within.select(sum, one);
+        let [a, b, c] = areas.map(|area| area * share);
+        let weights = [is_within.select(a, one), b, c];
+        let normals: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.normals[k], 0));
+        let towards = |normal: Vec3<S, E>| normal.scale(normal.dot(face).simd_lt(zero).select(minus, one));
+        let mixed = normals[0].scale(weights[0]);
+        let mixed = normals[2].scale_add(weights[2], normals[1].scale_add(weights[1], mixed));
+        let length = mixed.dot(mixed).sqrt();
+        let is_any = length.simd_gt(zero);
+        let mixed = towards(mixed.scale(one / is_any.select(length, one)));
+        let is_mixed: Mask<S, E> = is_face & is_any & mixed.dot(direction).simd_lt(zero);
+        let normal = Vec3::select(is_mixed, mixed, face);
+        // The ways from the hit to the corners.
+        let ways = [(1, 2), (2, 0), (0, 1)].map(|(next, last): (usize, usize)| {
+            edges[next].scale(weights[last]).sub(edges[last].scale(weights[next]))
+        });
+        let mut lift = Vec3::<S, E>::zero(simd);
+        for corner in 0..3 {
+            let normal = towards(normals[corner]);
+            let above = normal.dot(ways[corner]).max(zero);
+            lift = normal.scale_add(above * weights[corner], lift);
+        }
+        let lift = Vec3::select(is_face, lift, Vec3::zero(simd));
+        // A face that the start is lifted off can hide a light; a face that it starts on cannot.
+        let is_low = is_face & lift.dot(face).simd_le(offset);
+        let under = face.scale(offset * constant::<S, E>(simd, -2.0));
+        Vec3::select(is_low, under, Vec3::zero(simd)).store(&mut hits.under, at);
+        normal.store(&mut hits.normal, at);
+        lift.scale_add(one, start).store(&mut hits.start, at);
+        let towards = direction.dot(normal).min(zero);
+        let mirrored = normal.scale_add(towards * constant::<S, E>(simd, -2.0), direction);
+        let mut goes_on = mirrored.dot(face).simd_gt(zero);
+        let ior = Lanes::<S, E>::from_slice(simd, &self.ior[..Lanes::<S, E>::LEN]);
+        let is_glass = ior.simd_gt(zero);
+        if is_glass.any_true() {
+            let is_filled =
+                Lanes::<S, E>::from_slice(simd, &self.is_filled[..Lanes::<S, E>::LEN]).simd_gt(zero);
+            let outwards = normals_of_faces(simd, &edges);
+            let within = is_glass & is_filled & outwards.dot(direction).simd_gt(zero);
+            let is_within = Lanes::<S, E>::from_slice(simd, &hits.sides[1].0[lanes.clone()]);
+            within.select(one, is_within).store_slice(&mut hits.sides[1].0[lanes]);
+            // A pane without an inside bends nothing.
+            let ior = is_glass.select(ior, one);
+            let (before, behind) = (within.select(ior, one), within.select(one, ior));
+            let cosine = zero - direction.dot(normal);
+            let aside = normal.scale_add(cosine, direction);
+            let ratio = (before / behind).min(constant::<S, E>(simd, f64::MAX));
+            let sine = aside.dot(aside).sqrt() * ratio;
+            let is_total = cosine.simd_le(zero) | sine.simd_ge(one);
+            let cosine_behind = ((one - sine) * (one + sine)).max(zero).sqrt();
+            let bent = aside.scale(ratio).sub(normal.scale(cosine_behind));
+            let is_above = bent.dot(face).simd_ge(zero) & !is_total;
+            goes_on &= !(is_glass & is_filled & is_above);
+        }
+        Vec3::select(goes_on, normal, face).store(&mut hits.onward, at);
+        weights
     }
 }
 
@@ -100,8 +363,14 @@ impl<E: Real> Hits<E> {
     }
 }
 
-fn read<E: Real>(columns: &[Column<E>; 3], lane: usize) -> DVec3 {
-    DVec3::new(columns[0].0[lane].widen(), columns[1].0[lane].widen(), columns[2].0[lane].widen())
+/// Returns normals of triangles, on the sides from which their corners go round counterclockwise.
+#[inline(always)]
+fn normals_of_faces<S: Simd, E: Real>(_: S, edges: &[Vec3<S, E>; 3]) -> Vec3<S, E> {
+    edges[1].cross(edges[2])
+}
+
+fn read<E: Real>(columns: &[impl AsRef<[E]>; 3], lane: usize) -> DVec3 {
+    DVec3::from_array(columns.each_ref().map(|column| column.as_ref()[lane].widen()))
 }
 
 fn write<E: Real>(columns: &mut [impl AsMut<[E]>; 3], lane: usize, v: DVec3) {

@@ -15,6 +15,7 @@ use crate::fast::materials::paths::Paths;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Column, Hits, ROOM, RayBatch};
 use crate::fast::rays::packet::Ray;
+use crate::parallel::map;
 use crate::reference::{self, coefficients, highlight};
 
 /// The surfaces of a scene that has some of these.
@@ -27,7 +28,16 @@ pub(crate) struct Finishes {
     pub(crate) has_highlights: bool,
     /// The glow of each object; empty if none glows.
     glows: Vec<DVec3>,
+    /// The square of the cosine from which the highlights of each object can be seen: [`NEVER`] without, and negative if they
+    /// can be seen from anywhere.
+    least_cosines: Vec<f32>,
 }
+
+/// More than the square of any cosine.
+const NEVER: f32 = 2.0;
+
+/// The brightness below which no highlight can be seen.
+const UNSEEN: f64 = 1.0 / (1u64 << 63) as f64;
 
 /// The highlights of a packet of hits.
 pub(crate) struct Gloss<'a> {
@@ -53,7 +63,17 @@ impl Finishes {
             vec![]
         };
         let (center, scale) = (geometry.center, geometry.scale);
-        Some(Self { scene: scene.clone(), center, scale, has_patterns, has_highlights, glows })
+        // Looked up only where there is glass.
+        let is_glass = |finish: &Finish| finish.glass.is_some();
+        let least_cosines = if finishes().any(is_glass) {
+            let light: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
+            let of = |finish: &Finish| least_cosine(finish, light);
+            map(&scene.objects, |object| object.material().finish().map_or(NEVER, of))
+        } else {
+            vec![]
+        };
+        let scene = scene.clone();
+        Some(Self { scene, center, scale, has_patterns, has_highlights, glows, least_cosines })
     }
 
     /// Whether any object glows.
@@ -152,24 +172,45 @@ impl Finishes {
         coefficients(object, place, normal, &surface, self.scene.tone == Tone::Srgb)
     }
 
-    /// Which lanes meet a surface with highlights; `orders` are those of what they meet.
+    /// Returns the lanes whose highlights of a light in the direction `towards` can be seen. `orders` are those of the objects
+    /// that the lanes meet, along `direction`.
     #[inline(always)]
-    pub(crate) fn shines<S: Simd, E: Real>(&self, simd: S, orders: &[E]) -> Mask<S, E> {
-        let mut shines = [E::narrow(0.0); 16];
-        for (lane, order) in orders.iter().enumerate() {
-            let object = self.scene.objects.get(order.to_index());
-            let finish = object.and_then(|object| object.material().finish());
-            if finish.is_some_and(|finish| finish.shine.is_some() || finish.rough.is_some()) {
-                shines[lane] = E::narrow(1.0);
+    pub(crate) fn shines<S: Simd, E: Real>(
+        &self,
+        simd: S,
+        orders: &[E],
+        normal: Vec3<S, E>,
+        (towards, direction): (Vec3<S, E>, Vec3<S, E>),
+    ) -> Mask<S, E> {
+        let mut least = [E::narrow(f64::from(NEVER)); 16];
+        for (least, order) in least.iter_mut().zip(orders) {
+            if let Some(of_object) = self.least_cosines.get(order.to_index()) {
+                *least = E::narrow(f64::from(*of_object));
             }
         }
-        let shines = Lanes::<S, E>::from_slice(simd, &shines[..Lanes::<S, E>::LEN]);
-        shines.simd_gt(constant::<S, E>(simd, 0.0))
+        let least = Lanes::<S, E>::from_slice(simd, &least[..Lanes::<S, E>::LEN]);
+        let halfway = towards.sub(direction);
+        let cosine = normal.dot(halfway);
+        let zero = constant::<S, E>(simd, 0.0);
+        let is_near = cosine.simd_gt(zero) & (cosine * cosine).simd_ge(least * halfway.dot(halfway));
+        is_near | least.simd_lt(zero)
     }
 
     pub(crate) fn gloss(&self) -> Gloss<'_> {
         let nothing = [DVec3::ZERO; 16];
         Gloss { finishes: self, sum: nothing, of_mirrors: nothing, is_seen: false }
+    }
+}
+
+/// Returns the square of the cosine from which the highlights of a finish in a light can be seen, and a little less.
+fn least_cosine(finish: &Finish, light: f64) -> f32 {
+    match finish.shine {
+        _ if finish.rough.is_some() => -1.0,
+        Some(shine) => {
+            let most = shine.color().abs().max_element().max(1.0) * light.max(1.0);
+            (0.999 * libm::pow(UNSEEN / most, 2.0 / shine.exponent())) as f32
+        }
+        None => NEVER,
     }
 }
 

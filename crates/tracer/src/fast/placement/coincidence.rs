@@ -10,9 +10,11 @@
 //! The result does not depend on the order of the objects.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicIsize, Ordering};
 
 use glam::DVec3;
 use rayfold_scene::{Material, Object, Scene};
+use rayon::prelude::*;
 
 use crate::fast::acceleration::tree::{Branches, Part};
 use crate::fast::arithmetic::real::Real;
@@ -22,6 +24,8 @@ use crate::fast::rays::bounds::{Bounds, join};
 use crate::fast::rays::placed::{Face, RenderSpaceShape};
 use crate::fast::rays::view::View;
 use crate::fast::shapes::{Shape, Solid};
+use crate::meshes::Faces;
+use crate::parallel::{all, map};
 
 /// The distance below which two surfaces may be hit at the same distance, in roundoffs of their coordinates.
 const ONE_SURFACE: f64 = 6.0;
@@ -38,23 +42,33 @@ const PAIRS: usize = 64;
 /// The number of pairs that are always compared, however few objects there are.
 const FEW_PAIRS: usize = 1 << 20;
 
+/// The number of nodes from which several threads search the tree, and the number of pairs that they share.
+const SHARED: usize = 1 << 16;
+const SHARES: usize = 256;
+
 /// Returns whether two surfaces cannot be ordered in single precision, where it is visible. `pixel` is the size of a
 /// pixel: an angle from the eye, or a length in parallel projection.
 pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -> bool {
-    let first = scene.objects.first().map(Object::material);
-    let has = |kind: fn(&Solid) -> bool| geometry.solids.iter().any(kind);
-    let touching = has(is_ball) && has(|solid| !is_ball(solid));
-    if !touching && scene.objects.iter().all(|object| Some(object.material()) == first) {
+    let has_none = |kind: fn(&Solid) -> bool| all(&geometry.solids, |solid| !kind(solid));
+    let has_balls = !has_none(is_ball);
+    let touching = has_balls && !has_none(|solid| !is_ball(solid));
+    let faces = geometry.faces.as_deref();
+    if !touching && faces.is_none() && geometry.have_one_material(scene) {
         return false;
     }
-    let is_mirror = |solid: &&Solid| scene.objects[solid.order as usize].material().mirror() != DVec3::ZERO;
-    let balls = geometry.solids.iter().filter_map(|solid| solid.shape.ball());
+    let is_mirror = |object: &Object| object.material().mirror() != DVec3::ZERO;
+    let mirrors = geometry.examples(scene).any(is_mirror).then(|| {
+        let is_mirror = |solid: &&Solid| is_mirror(&scene.objects[solid.order as usize]);
+        geometry.solids.iter().filter(is_mirror).map(|solid| solid.shape.bounds()).reduce(join)
+    });
+    let balls = geometry.solids.iter().filter(|_| has_balls).filter_map(|solid| solid.shape.ball());
     let search = Search {
         solids: &geometry.solids,
         objects: &scene.objects,
+        faces,
         pixel,
         parallel: matches!(geometry.view, View::Parallel { .. }),
-        mirrors: geometry.solids.iter().filter(is_mirror).map(|solid| solid.shape.bounds()).reduce(join),
+        mirrors: mirrors.flatten(),
         largest_ball: balls.map(on_sphere).fold(0.0, f64::max),
     };
     match &geometry.branches {
@@ -66,6 +80,8 @@ pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -
 struct Search<'a> {
     solids: &'a [Solid],
     objects: &'a [Object],
+    /// The faces whose normals or colours vary, if there are any.
+    faces: Option<&'a Faces>,
     pixel: f64,
     parallel: bool,
     /// The bounding box of all mirrors, if there are any.
@@ -101,77 +117,115 @@ impl Region {
     }
 }
 
-impl Search<'_> {
-    /// Searches the tree for a pair. Each unordered pair is visited once: a node is compared with itself and with the
-    /// nodes after it.
-    fn down(&self, branches: &Branches) -> bool {
-        let materials = self.contents(branches);
-        let mut left = (PAIRS * self.solids.len()).max(FEW_PAIRS) as isize;
-        let mut pending = vec![(0, 0)];
-        while let Some((a, b)) = pending.pop() {
-            if materials[a].cannot_blur(&materials[b]) {
-                continue;
+/// A search of a tree for a pair, by any number of threads.
+struct Walk<'a> {
+    search: &'a Search<'a>,
+    branches: &'a Branches,
+    contents: &'a [Content<'a>],
+    /// The number of pairs that may still be compared. If there is no pair to be found, all threads together compare the same
+    /// number, whatever the order.
+    left: AtomicIsize,
+}
+
+impl Walk<'_> {
+    /// Compares a pair of nodes, and adds those within to the pending ones. Returns whether a pair of solids is found, or may
+    /// be.
+    fn step(&self, (a, b): (usize, usize), pending: &mut Vec<(usize, usize)>) -> bool {
+        let Self { search, branches, contents, .. } = self;
+        if contents[a].cannot_blur(&contents[b]) {
+            return false;
+        }
+        // So many boxes in one place cannot be compared in time. Assuming that a pair exists is safe, because more precision
+        // is never wrong.
+        let is_too_much = |count: isize| self.left.fetch_sub(count, Ordering::Relaxed) < count;
+        if is_too_much(1) {
+            return true;
+        }
+        if a != b && !search.touch(branches.bounds(a), branches.bounds(b)) {
+            return false;
+        }
+        match (branches.part(a), branches.part(b)) {
+            (Part::Solids(of), _) if a == b => return search.within(of),
+            (Part::Children(first, second), _) if a == b => {
+                // Pairs that are nearest to each other come first, so that a cluster is found at once.
+                pending.extend([(first, second), (second, second), (first, first)]);
             }
-            left -= 1;
-            if left < 0 {
-                // So many boxes in one place cannot be compared in time. Assuming that a pair exists is safe, because
-                // more precision is never wrong.
-                return true;
+            (Part::Solids(of), Part::Solids(others)) => {
+                let steepest = search.region(branches.bounds(a), branches.bounds(b)).steepest();
+                let is_over = is_too_much((of.len() * others.len() / 4) as isize);
+                let others = &search.solids[others];
+                let is_blurred = |one: &Solid| others.iter().any(|other| search.blur(one, other, steepest));
+                return is_over || search.solids[of].iter().any(is_blurred);
             }
-            if a != b && !self.touch(branches.bounds(a), branches.bounds(b)) {
-                continue;
-            }
-            match (branches.part(a), branches.part(b)) {
-                (Part::Solids(of), _) if a == b => {
-                    if self.within(of) {
-                        return true;
-                    }
-                }
-                (Part::Children(first, second), _) if a == b => {
-                    // Pairs that are nearest to each other come first, so that a cluster is found at once.
-                    pending.extend([(first, second), (second, second), (first, first)]);
-                }
-                (Part::Solids(of), Part::Solids(others)) => {
-                    left -= (of.len() * others.len() / 4) as isize;
-                    let steepest = self.region(branches.bounds(a), branches.bounds(b)).steepest();
-                    let others = &self.solids[others];
-                    let is_blurred = |one: &Solid| others.iter().any(|other| self.blur(one, other, steepest));
-                    if self.solids[of].iter().any(is_blurred) {
-                        return true;
-                    }
-                }
-                (Part::Children(first, second), Part::Solids(_)) => pending.extend([(first, b), (second, b)]),
-                (Part::Solids(_), Part::Children(first, second)) => pending.extend([(a, first), (a, second)]),
-                (Part::Children(first, second), Part::Children(third, fourth)) => {
-                    pending.extend([(first, third), (first, fourth), (second, third), (second, fourth)]);
-                }
+            (Part::Children(first, second), Part::Solids(_)) => pending.extend([(first, b), (second, b)]),
+            (Part::Solids(_), Part::Children(first, second)) => pending.extend([(a, first), (a, second)]),
+            (Part::Children(first, second), Part::Children(third, fourth)) => {
+                pending.extend([(first, third), (first, fourth), (second, third), (second, fourth)]);
             }
         }
         false
     }
+}
+
+impl Search<'_> {
+    /// Searches the tree for a pair. Each unordered pair is visited once: a node is compared with itself and with the
+    /// nodes after it.
+    fn down(&self, branches: &Branches) -> bool {
+        let contents = self.contents(branches);
+        let most = (PAIRS * self.solids.len()).max(FEW_PAIRS);
+        let left = AtomicIsize::new(most as isize);
+        let walk = Walk { search: self, branches, contents: &contents, left };
+        let mut pending = vec![(0, 0)];
+        if branches.len() >= SHARED {
+            // Level by level, until there is enough to share.
+            while !pending.is_empty() && pending.len() < SHARES {
+                let above = core::mem::take(&mut pending);
+                if above.into_iter().any(|pair| walk.step(pair, &mut pending)) {
+                    return true;
+                }
+            }
+        }
+        let finds_one = |pair: (usize, usize)| {
+            let mut pending = vec![pair];
+            while let Some(pair) = pending.pop() {
+                if walk.step(pair, &mut pending) {
+                    return true;
+                }
+            }
+            false
+        };
+        if pending.len() < SHARES {
+            pending.into_iter().rev().any(finds_one)
+        } else {
+            pending.into_par_iter().any(finds_one)
+        }
+    }
 
     /// Returns the contents of each node.
     fn contents(&self, branches: &Branches) -> Vec<Content<'_>> {
-        let nothing = Content { material: None, balls: false, faces: false };
-        let mut contents = vec![nothing; branches.len()];
+        let of_leaf = |at: &usize| match branches.part(*at) {
+            Part::Children(..) => Content { material: None, balls: false, faces: false },
+            Part::Solids(of) => {
+                let solids = &self.solids[of];
+                let balls = is_ball(&solids[0]);
+                let is_varied = solids.iter().any(|solid| self.is_varied(solid));
+                let first = (!is_varied).then(|| self.material(&solids[0]));
+                let material =
+                    first.filter(|first| solids.iter().all(|solid| self.material(solid) == *first));
+                Content { material, balls, faces: !balls }
+            }
+        };
+        let numbers: Vec<usize> = (0..branches.len()).collect();
+        let mut contents = map(&numbers, of_leaf);
         for at in (0..contents.len()).rev() {
-            contents[at] = match branches.part(at) {
-                Part::Solids(of) => {
-                    let solids = &self.solids[of];
-                    let first = self.material(&solids[0]);
-                    let balls = is_ball(&solids[0]);
-                    let is_one = solids.iter().all(|solid| self.material(solid) == first);
-                    Content { material: is_one.then_some(first), balls, faces: !balls }
-                }
-                Part::Children(first, second) => {
-                    let (a, b) = (&contents[first], &contents[second]);
-                    Content {
-                        material: a.material.filter(|_| a.material == b.material),
-                        balls: a.balls || b.balls,
-                        faces: a.faces || b.faces,
-                    }
-                }
-            };
+            if let Part::Children(first, second) = branches.part(at) {
+                let (a, b) = (&contents[first], &contents[second]);
+                contents[at] = Content {
+                    material: a.material.filter(|_| a.material == b.material),
+                    balls: a.balls || b.balls,
+                    faces: a.faces || b.faces,
+                };
+            }
         }
         contents
     }
@@ -240,7 +294,12 @@ impl Search<'_> {
     }
 
     fn differ(&self, one: &Solid, other: &Solid) -> bool {
-        self.material(one) != self.material(other)
+        self.material(one) != self.material(other) || self.is_varied(one) || self.is_varied(other)
+    }
+
+    /// Returns whether the normal or the colour of a solid varies. Then no other looks as it does.
+    fn is_varied(&self, solid: &Solid) -> bool {
+        self.faces.is_some_and(|faces| faces.is_varied(solid.order as usize))
     }
 
     /// Returns whether two spheres z-fight: they are within the slack of each other on a strip as wide as a pixel.

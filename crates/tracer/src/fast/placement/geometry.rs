@@ -23,7 +23,7 @@ use crate::fast::rays::view::{View, middle, view};
 use crate::fast::shapes::{Shape, Solid, reach};
 use crate::fast::shared::SharedSurfaces;
 use crate::meshes::Faces;
-use crate::parallel::map;
+use crate::parallel::{map, map_numbered};
 use crate::sampling::places::spread;
 use crate::sampling::rough::Energies;
 use crate::scale::below_inverse;
@@ -52,6 +52,8 @@ pub(crate) struct Geometry {
     pub(crate) is_foggy: bool,
     /// The objects that share surfaces, after [the search for them](Self::with_shared_surfaces).
     pub(crate) shared: Option<SharedSurfaces>,
+    /// The positions of objects that have all materials and all kinds of shapes, in a scene of meshes. Their faces are many.
+    examples: Option<Vec<u32>>,
     /// The faces that triangles are, if they have more than triangles.
     pub(crate) faces: Option<Arc<Faces>>,
     /// The holes of faces, if any can have some. Those faces are among the bodies.
@@ -85,9 +87,11 @@ impl Geometry {
             Camera::Look(look) => look.eye(),
             Camera::Orthographic => middle(scene.screen),
         };
+        let examples = faces.map(|faces| faces.examples(scene.objects.len()));
+        let examples_of = |scene| each_example(scene, examples.as_deref());
         let reaches = map(&scene.objects, |object| reach(object, center));
         let reach = reaches.into_iter().fold(0.0, f64::max);
-        let has_bodies = scene.objects.iter().any(is_body);
+        let has_bodies = examples_of(scene).any(is_body);
         let of_bodies =
             scene.objects.iter().filter(|_| has_bodies).map(|object| bodies::reach(object, center));
         let of_lamps =
@@ -104,14 +108,16 @@ impl Geometry {
         }
         let scale = below_inverse(reach);
         let view = view(scene, scale);
-        let shapes = map(&scene.objects, |object| Shape::new(object, center, scale));
-        let solids = shapes.into_iter().enumerate();
-        let solids = solids.filter_map(|(order, shape)| Some(Solid { shape: shape?, order: order as u32 }));
-        let mut solids: Vec<Solid> = solids.collect();
+        let solid = |(order, object): (usize, &Object)| {
+            Some(Solid { shape: Shape::new(object, center, scale)?, order: order as u32 })
+        };
+        let solids: Vec<Option<Solid>> = map_numbered(&scene.objects, solid);
+        // In the same memory.
+        let mut solids: Vec<Solid> = solids.into_iter().flatten().collect();
         let holes = faces.filter(|faces| faces.have_holes());
         let holes = holes.map(|faces| Arc::new(bodies::Holes { faces: faces.clone(), center, scale }));
         let cutouts = holes.iter().flat_map(|holes| take_cutouts(&mut solids, &holes.faces)).collect();
-        let is_finished = scene.objects.iter().any(|object| object.material().finish().is_some());
+        let is_finished = examples_of(scene).any(|object| object.material().finish().is_some());
         // If objects are at the same distance, one that is not glass is visible.
         let copies = if is_finished { Copies::Kept } else { Copies::Dropped };
         let branches = group(&mut solids, tree, copies);
@@ -142,6 +148,7 @@ impl Geometry {
             goes_round: scene.goes_round(),
             is_foggy: scene.fog.get().is_some(),
             shared: None,
+            examples,
             faces: faces.filter(|faces| faces.are_shaded()).cloned(),
             holes,
             scale,
@@ -158,11 +165,22 @@ impl Geometry {
 
     /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.
     pub(crate) fn with_shared_planes(mut self, scene: &Scene) -> Self {
-        if self.are_distinct() || !have_one_material(scene) {
+        if self.are_distinct() || !self.have_one_material(scene) {
             let solids: &mut Vec<Solid> = Arc::make_mut(&mut self.solids);
             planes::share(solids);
         }
         self
+    }
+
+    /// Returns objects that have all materials and all kinds of shapes of the scene.
+    pub(crate) fn examples<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = &'a Object> {
+        each_example(scene, self.examples.as_deref())
+    }
+
+    /// Returns whether all objects have the same material.
+    pub(crate) fn have_one_material(&self, scene: &Scene) -> bool {
+        let first = scene.objects.first().map(Object::material);
+        self.examples(scene).all(|object| Some(object.material()) == first)
     }
 
     /// Returns whether surfaces of one material can have unlike colours.
@@ -217,10 +235,11 @@ fn merged(mut bodies: Vec<bodies::Solid>, cutouts: Vec<bodies::Solid>) -> Vec<bo
     bodies
 }
 
-/// Returns whether all objects have the same material.
-pub(crate) fn have_one_material(scene: &Scene) -> bool {
-    let first = scene.objects.first().map(Object::material);
-    scene.objects.iter().all(|object| Some(object.material()) == first)
+/// Returns the objects at the positions of `examples`, or all objects.
+fn each_example<'a>(scene: &'a Scene, examples: Option<&'a [u32]>) -> impl Iterator<Item = &'a Object> {
+    let some = examples.into_iter().flatten().map(|&at| &scene.objects[at as usize]);
+    let all = examples.is_none().then_some(scene.objects.iter()).into_iter().flatten();
+    some.chain(all)
 }
 
 /// Returns whether an object may be a body.

@@ -6,7 +6,7 @@
 use glam::DVec3;
 use rayfold_scene::{Object, Scene};
 
-use crate::fast::placement::geometry::{Geometry, have_one_material};
+use crate::fast::placement::geometry::Geometry;
 use crate::fast::shapes::Shape;
 use crate::fast::shared::surface::{ASIDE, Flat, Plain, SAME, Surface};
 use crate::fast::shared::{Pair, SharedSurfaces};
@@ -63,7 +63,7 @@ impl Geometry {
 /// The pairs of a scene, sorted by the second object and then by the first.
 fn find(geometry: &Geometry, scene: &Scene) -> Vec<Pair> {
     let is_plain = geometry.bodies.is_empty() && !geometry.is_finished && !geometry.are_distinct();
-    if is_plain && have_one_material(scene) {
+    if is_plain && geometry.have_one_material(scene) {
         return vec![];
     }
     let mut parts: Vec<Part> = Vec::new();

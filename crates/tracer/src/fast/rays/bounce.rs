@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use crate::fast::arithmetic::real::{Lanes, Real, Vec3};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3};
 use crate::fast::rays::packet::Nearest;
 
 /// The largest number of pixels in a tile.
@@ -149,6 +149,13 @@ impl<E: Real> Hits<E> {
         } else {
             Vec3::load(simd, &self.place, at)
         }
+    }
+
+    /// Returns the hits of rays that come from within the glass that they hit. Scenes without glass have none.
+    #[inline(always)]
+    pub(crate) fn are_within<S: Simd>(&self, simd: S, at: usize) -> Mask<S, E> {
+        let within = Lanes::<S, E>::from_slice(simd, &self.sides[1].0[at..at + Lanes::<S, E>::LEN]);
+        within.simd_gt(Lanes::<S, E>::splat(simd, E::narrow(0.0)))
     }
 
     /// Stores the hits of a packet of rays. If none hits anything, stores the background as their colour.

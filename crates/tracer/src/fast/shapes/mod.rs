@@ -340,6 +340,12 @@ impl<E: Real> Shapes<E> {
         }
     }
 
+    /// Returns the triangle at an index.
+    #[inline(always)]
+    pub(super) fn triangle(&self, at: usize) -> &Triangle<E> {
+        &self.triangles[at]
+    }
+
     /// Returns whether the eye is outside a convex shape. Then the part that is visible from the eye is not in the
     /// shape's own shadow.
     #[inline(always)]

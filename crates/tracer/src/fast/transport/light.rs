@@ -170,9 +170,13 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, glossy);
+                        facing &= shows(simd, hits, at, glossy, (normal, towards, seen.direction));
                     }
                     let mut lit = facing;
+                    if GLASS {
+                        // Glass is around a ray that comes from within it.
+                        lit &= !hits.are_within(simd, at);
+                    }
                     let start = hits.shadow_start(simd, at, towards);
                     if lit.any_true() {
                         let candidates = obstacles.candidates(others, F::KINDS);
@@ -214,7 +218,7 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     };
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, glossy);
+                        facing &= shows(simd, hits, at, glossy, (normal, towards, seen.direction));
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies
@@ -250,20 +254,24 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
     );
 }
 
-/// Returns the hits of a packet that show the light that reaches them. Most glass scatters none and needs no shadow
-/// rays.
+/// Returns the hits of a packet that show the light that reaches them from a direction. Most glass scatters none and needs
+/// no shadow rays, except where it shows a highlight.
 #[inline(always)]
 pub(crate) fn shows<S: Simd, E: Real>(
     simd: S,
     hits: &Hits<E>,
     at: usize,
     glossy: Option<&Finishes>,
+    (normal, towards, direction): (Vec3<S, E>, Vec3<S, E>, Vec3<S, E>),
 ) -> Mask<S, E> {
     let zero = constant::<S, E>(simd, 0.0);
     let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
     let scatters = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
     match glossy {
-        Some(finishes) => scatters | finishes.shines(simd, &hits.order.0[at..at + Lanes::<S, E>::LEN]),
+        Some(finishes) => {
+            let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
+            scatters | finishes.shines(simd, orders, normal, (towards, direction))
+        }
         None => scatters,
     }
 }

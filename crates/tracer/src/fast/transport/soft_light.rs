@@ -236,7 +236,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, finishes);
+                        facing &= shows(simd, hits, at, finishes, (normal, towards, seen.direction));
                     }
                     let mut lit = facing;
                     if lit.any_true() {
@@ -289,7 +289,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     };
                     let mut facing = cosine.simd_gt(zero);
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, finishes);
+                        facing &= shows(simd, hits, at, finishes, (normal, towards, seen.direction));
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies

@@ -54,6 +54,11 @@ impl<S: Simd, E: Real> IncidentLight<S, E> {
                     if !open.any_true() {
                         break;
                     }
+                    // Lanes that have arrived go along with one that has not, so that they ask for no more objects.
+                    let lane = open.to_bitmask().trailing_zeros() as usize;
+                    let of = |v: Vec3<S, E>| Vec3::splat(simd, [v.x[lane], v.y[lane], v.z[lane]]);
+                    ray.origin = Vec3::select(open, ray.origin, of(ray.origin));
+                    ray.direction = Vec3::select(open, ray.direction, of(ray.direction));
                     let mut found = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
                     if let Some(bodies) = beyond.bodies() {
                         bodies.intersect(simd, ANY, ray, &mut found);
