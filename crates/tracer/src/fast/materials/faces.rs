@@ -136,11 +136,11 @@ impl<E: Real> ShadedFaces<E> {
             (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
             let normals = normals.get(order - orders.start).copied().unwrap_or([[E::narrow(0.0); 3]; 3]);
             let triangle = scene.shapes.triangle(entry.index as usize);
-            for corner in 0..3 {
-                for axis in 0..3 {
-                    into.edges[corner][axis][lane] = triangle.edges[corner].direction[axis];
-                    into.moments[corner][axis][lane] = triangle.edges[corner].moment[axis];
-                    into.normals[corner][axis][lane] = normals[corner][axis];
+            for (corner, (edge, normal)) in triangle.edges.iter().zip(normals).enumerate() {
+                for (axis, normal) in normal.into_iter().enumerate() {
+                    into.edges[corner][axis][lane] = edge.direction[axis];
+                    into.moments[corner][axis][lane] = edge.moment[axis];
+                    into.normals[corner][axis][lane] = normal;
                 }
             }
         }
