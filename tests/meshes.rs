@@ -316,7 +316,7 @@ fn normals_are_drawn_in_single_precision_where_that_is_enough() {
     for object in [
         "Mesh \"near.obj\" .1 .1 .1 .7 .7 .6",
         "Mesh \"round.obj\" .1 .1 .1 .4 .4 .4 .3 .3 .3",
-        "Mesh \"round.obj\"",
+        "Mesh \"colored.obj\"",
     ] {
         let scene = plain(object);
         assert_eq!(precision(&scene), Precision::F64, "{object}");
