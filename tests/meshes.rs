@@ -292,7 +292,7 @@ fn the_packets_draw_meshes_like_the_reference() {
 fn normals_are_drawn_in_single_precision_where_that_is_enough() {
     let plain = |lines: &str| {
         first_frame(&format!(
-            "Screen 96 72\nLook .6 1.2 4  0 0 0  36\nBackground .8 .9 1\nIlight .9 .9 .85  -1 -2 -1.5\n\
+            "Screen 48 36\nLook .6 1.2 4  0 0 0  36\nBackground .8 .9 1\nIlight .9 .9 .85  -1 -2 -1.5\n\
              Ilight .2 .1 .3  1 .3 -1\n{lines}\nTrace"
         ))
     };
@@ -320,13 +320,14 @@ fn normals_are_drawn_in_single_precision_where_that_is_enough() {
     for object in [
         "Mesh \"near.obj\" .1 .1 .1 .7 .7 .6",
         "Mesh \"round.obj\" .1 .1 .1 .4 .4 .4 .3 .3 .3",
-        "Samples 4 0\nMesh \"round.obj\" .1 .1 .1 .7 .7 .6",
-        "Mesh \"round.obj\"",
+        "Mesh \"colored.obj\"",
     ] {
         let scene = plain(object);
         assert_eq!(precision(&scene), Precision::F64, "{object}");
         compare_scene(&scene, object);
     }
+    let sampled = plain("Samples 4 0\nMesh \"round.obj\" .1 .1 .1 .7 .7 .6");
+    assert_eq!(precision(&sampled), Precision::F64);
     let flat = plain("Mesh \"near.obj\" .1 .1 .1 .7 .7 .6 flat");
     assert_eq!(precision(&flat), Precision::F32, "both sheets look alike");
 }

@@ -228,13 +228,12 @@ impl Subtree {
     fn flatten(self, at: usize, all: &mut Vec<Twig>) {
         let first = all.len() as u32;
         match self {
-            Self::Nodes(nodes) => {
-                let mut moved = nodes.iter().map(|twig| match twig.count {
-                    0 => Twig { first: twig.first - 1 + first, count: 0 },
-                    _ => *twig,
-                });
-                all[at] = moved.next().unwrap_or_default();
-                all.extend(moved);
+            Self::Nodes(mut nodes) => {
+                for twig in nodes.iter_mut().filter(|twig| twig.count == 0) {
+                    twig.first = twig.first - 1 + first;
+                }
+                all[at] = nodes[0];
+                all.extend_from_slice(&nodes[1..]);
             }
             Self::Pair(pair) => {
                 all[at] = Twig { first, count: 0 };
