@@ -40,7 +40,19 @@ struct Part {
     height: u32,
 }
 
+impl Picture {
+    /// Makes the final picture that is shown already, for another request.
+    pub(crate) fn again(number: u32, image: &RgbaImage) -> Self {
+        Self { number, image: image.clone(), took: Duration::ZERO, is_final: true }
+    }
+}
+
 impl Packer {
+    /// Returns the picture that was packed last.
+    pub(crate) fn before(&self) -> &RgbaImage {
+        &self.before
+    }
+
     /// Returns the header of a picture and the part that differs from the previous picture, with four bytes per
     /// pixel: red, green, blue, alpha.
     pub(crate) fn pack(&mut self, picture: Picture) -> Vec<u8> {

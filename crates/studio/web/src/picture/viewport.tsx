@@ -10,7 +10,7 @@ import { actions } from "../actions";
 import { visible } from "../parts/visible";
 import type { Handle } from "../protocol";
 import { PICTURE_HEADER } from "../protocol";
-import { ask, ghosts, guides, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
+import { ask, drag as dragTo, dragNext, ghosts, guides, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
 
 type Point = readonly [number, number];
 
@@ -132,7 +132,7 @@ export function Viewport(): JSX.Element {
   const drag = (event: PointerEvent): void => {
     if (held.current?.what !== "drag") return;
     const [x, y] = at(event);
-    ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
+    dragTo({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
   };
   raw.current = drag;
   const move = (event: PointerEvent): void => {
@@ -164,6 +164,7 @@ export function Viewport(): JSX.Element {
   };
   const release = (): void => {
     const rectangle = boxed.value;
+    dragNext();
     if (rectangle) ask({ ask: "box", from: [rectangle[0], rectangle[1]], to: [rectangle[2], rectangle[3]], extend: false });
     else if (held.current) ask({ ask: "release" });
     boxed.value = null;
