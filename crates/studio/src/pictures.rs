@@ -3,7 +3,7 @@
 //! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request of another
 //! picture. While something moves, a rendering is completed, in a smaller size if it would take too long ([`Pace`]), so
 //! that there is always a picture. It then has one ray per pixel, or a few where light goes round, whatever the script
-//! says. At rest, a slow picture begins with sketches: few pixels with as few rays, then more. A picture with several rays
+//! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few pixels with as few rays, then more. A picture with several rays
 //! per pixel is shown after each pass over it. What moved is at rest soon after the last request, even while it is held.
 //! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
 //! waits behind another is outdated when it is shown.
@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 use rayfold_scene::{Samples, Scene, Screen, Script};
 use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
-use crate::pace::Pace;
-use crate::packing::{Packer, Picture};
+use crate::pace::{Effort, Pace};
+use crate::packing::{Packer, Picture, Quality};
 
 /// The largest number of pictures that the page has not shown yet while something moves.
 const MOVING_UNDER_WAY: u32 = 1;
@@ -211,8 +211,14 @@ impl Shared {
                 Some(finished) if finished.is_same(&wanted) => {
                     Ok(Picture::again(wanted.number, packer.borrow().before()))
                 }
-                _ if wanted.moving => self.sketch(&wanted, pace.moving(&wanted.scene), &mut pace),
-                _ => self.at_rest(&wanted, &mut pace, &pack),
+                _ if wanted.moving => {
+                    let effort = pace.moving(&wanted.scene);
+                    self.sketch(&wanted, effort, &mut pace)
+                }
+                _ => {
+                    pace.rested();
+                    self.at_rest(&wanted, &mut pace, &pack)
+                }
             };
             let at_rest = self.change(|desk| desk.at_rest.take());
             match drawn {
@@ -242,7 +248,7 @@ impl Shared {
         let mut share = pace.share(scene, PATIENCE);
         // With one ray per pixel, a sketch of the full size is the picture.
         while share < 1.0 || is_sampled {
-            let sketch = self.sketch(wanted, share, pace)?;
+            let sketch = self.sketch(wanted, Effort { share, bounces: None }, pace)?;
             // A sketch that the page cannot show in time is skipped: a finer one follows.
             if let Some(number) = self.another() {
                 send(Picture { number, ..sketch });
@@ -266,30 +272,32 @@ impl Shared {
         let image = drawing.draw_progressively(|image| {
             if let Some(number) = self.another() {
                 let image = image.into_rgba8();
-                send(Picture { number, image, took: start.elapsed(), is_final: false });
+                send(Picture { number, image, took: start.elapsed(), quality: Quality::Coarse });
             }
         })?;
         if !is_sampled {
-            pace.drawn(scene.screen, begin.elapsed());
+            pace.drawn(scene.screen, None, begin.elapsed());
         }
         let image = image.into_rgba8();
-        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: true })
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality: Quality::Final })
     }
 
-    /// Renders a picture with one ray per pixel, and with this share of its width and height.
-    fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Picture, RenderError> {
+    /// Renders a picture with one ray per pixel, or a few where light goes round.
+    fn sketch(&self, wanted: &Wanted, effort: Effort, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
         let few = if whole.goes_round() { FEW } else { 1 };
         let samples = Samples::new(few, 0.0).unwrap_or_default();
-        let scene = Scene { screen: smaller(whole.screen, share), samples, ..whole.clone() };
-        let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
+        let scene = Scene { screen: smaller(whole.screen, effort.share), samples, ..whole.clone() };
+        let options =
+            RenderOptions { cancel: Some(&self.cancel), bounces: effort.bounces, ..RenderOptions::default() };
         let drawing = Drawing::new(&scene, &options)?;
         pace.prepared(start.elapsed());
         let begin = Instant::now();
         let image = drawing.draw_picture()?.into_rgba8();
-        pace.drawn(scene.screen, begin.elapsed());
-        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false })
+        pace.drawn(scene.screen, effort.bounces, begin.elapsed());
+        let quality = if effort.bounces.is_some() { Quality::Simple } else { Quality::Coarse };
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality })
     }
 
     /// Returns the number of another picture of what is at rest, if one may be sent to the page, and counts it.

@@ -172,6 +172,8 @@ async function measure(run, { name, script, grab }) {
     await page("Page.navigate", { url: "about:blank" });
     await open();
     const first = await evaluate("probe.first");
+    // The small pictures of materials and scenes are drawn once.
+    for (let round = 0; round < 400 && !(await evaluate("[...document.images].every(({ complete, offsetParent }) => complete || offsetParent === null)")); round += 1) await wait(50);
     await wait(800);
     const [left, top] = await box("canvas");
     const [x, y] = [left + grab[0] * SIZE[0], top + grab[1] * SIZE[1]];
