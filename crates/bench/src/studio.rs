@@ -1,6 +1,7 @@
 //! `rayfold-bench studio`: the studio's page in a real browser. Measures the time to the first picture, the pictures
-//! per second while an object is dragged, and the latency from the pointer to the canvas.
-//! `crates/studio/web/tests/bench.mjs` drives the browser; this program makes the report from its figures.
+//! per second while an object is dragged, their sizes, the latency from the pointer to the canvas, and the time to the
+//! final picture when the hand rests. `crates/studio/web/tests/bench.mjs` drives the browser; this program makes the
+//! report from its figures.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,9 +17,50 @@ use crate::plot::{Labels, Series, shares};
 /// The width and height of the picture.
 const SIZE: (u32, u32) = (960, 540);
 
-/// The goals: pictures per second, milliseconds from the pointer to the canvas for 95 % of the pictures, milliseconds
-/// to the first picture.
-const GOALS: (f64, f64, f64) = (55.0, 25.0, 1000.0);
+/// A scene that is measured.
+struct Subject {
+    name: &'static str,
+    /// The script of its first frame, below `scenes`.
+    script: &'static str,
+    /// The place of the dragged object, in shares of the picture's width and height.
+    grab: [f64; 2],
+    /// The object that is dragged.
+    object: &'static str,
+}
+
+/// The measured scenes.
+const SUBJECTS: [Subject; 3] = [
+    Subject { name: "hello", script: "hello/frame01.txt", grab: [0.59, 0.67], object: "a sphere" },
+    Subject {
+        name: "clockwork",
+        script: "clockwork/clockwork.txt",
+        grab: [0.36, 0.52],
+        object: "the brass wheel",
+    },
+    Subject {
+        name: "glass",
+        script: "glass/glass.txt",
+        grab: [0.5, 0.43],
+        object: "the table with all that stands on it",
+    },
+];
+
+/// The goals of all scenes.
+const GOALS: Goals = Goals { rate: 55.0, late: 25.0, first: 1000.0, least: 0.25, rested: 1000.0 };
+
+/// Limits of what is measured.
+struct Goals {
+    /// The least number of pictures per second.
+    rate: f64,
+    /// The most milliseconds from the pointer to the canvas for 95 % of the moves.
+    late: f64,
+    /// The most milliseconds to the first picture.
+    first: f64,
+    /// The least share of the picture's width and height that is drawn while something moves.
+    least: f64,
+    /// The most milliseconds from the last move to the final picture.
+    rested: f64,
+}
 
 /// The end of the plot, in milliseconds.
 const LONGEST_SHOWN_MS: f64 = 60.0;
@@ -35,7 +77,7 @@ pub struct Args {
     /// Use this browser
     #[arg(long, default_value = "chromium")]
     browser: PathBuf,
-    /// Measure this often; the run with the least other load counts
+    /// Measure each scene this often; of each the run with the least other load counts
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
     /// Drag an object for this many seconds in each run
@@ -46,6 +88,7 @@ pub struct Args {
 /// The results of a run, from the browser's driver.
 #[derive(Debug, Deserialize)]
 struct Run {
+    scene: String,
     run: u32,
     /// The time from opening the page to its first picture, in milliseconds.
     first: f64,
@@ -60,6 +103,10 @@ struct Run {
     sizes: BTreeMap<String, u32>,
     /// The latencies from the pointer to the canvas, in milliseconds.
     waits: Vec<f64>,
+    /// The milliseconds from the last move to the final picture while the button stays down; `None` if it does not come.
+    rested: Option<f64>,
+    /// The milliseconds from the release of the button to the final picture.
+    released: Option<f64>,
 }
 
 impl Run {
@@ -85,6 +132,22 @@ impl Run {
         let whole = self.sizes.get(&format!("{}x{}", SIZE.0, SIZE.1)).copied().unwrap_or(0);
         f64::from(whole) / f64::from(self.pictures.max(1))
     }
+
+    /// Returns the least and the median size of the pictures, as shares of the width or the height, whichever is less.
+    fn shares(&self) -> (f64, f64) {
+        let share = |size: &String| {
+            let (width, height) = size.split_once('x')?;
+            let (width, height): (f64, f64) = (width.parse().ok()?, height.parse().ok()?);
+            Some((width / f64::from(SIZE.0)).min(height / f64::from(SIZE.1)))
+        };
+        let mut shares: Vec<f64> = Vec::new();
+        for (size, count) in &self.sizes {
+            shares.extend(std::iter::repeat_n(share(size).unwrap_or(f64::NAN), *count as usize));
+        }
+        shares.sort_by(f64::total_cmp);
+        let at = |at: usize| shares.get(at).copied().unwrap_or(f64::NAN);
+        (at(0), at(shares.len() / 2))
+    }
 }
 
 /// Measures and writes the report.
@@ -94,9 +157,13 @@ impl Run {
 pub fn run(args: &Args) -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folder = tempfile::tempdir()?;
-    let script = folder.path().join("hello.txt");
-    let hello = std::fs::read_to_string(root.join("scenes/hello/frame01.txt"))?;
-    std::fs::write(&script, widened(&hello)?)?;
+    let mut scenes = Vec::new();
+    for subject in &SUBJECTS {
+        let text = std::fs::read_to_string(root.join("scenes").join(subject.script))?;
+        let script = folder.path().join(subject.name).with_extension("txt");
+        std::fs::write(&script, widened(&text)?)?;
+        scenes.push(serde_json::json!({ "name": subject.name, "script": script, "grab": subject.grab }));
+    }
     let program = match &args.program {
         Some(program) => program.canonicalize().with_context(|| program.display().to_string())?,
         None => std::env::current_exe()?.with_file_name("rayfold"),
@@ -104,8 +171,8 @@ pub fn run(args: &Args) -> Result<()> {
     let driver = root.join("crates/studio/web/tests/bench.mjs");
     let output = Command::new("node")
         .arg(&driver)
-        .arg(&script)
         .args([args.runs, args.seconds].map(|number| number.to_string()))
+        .arg(serde_json::Value::from(scenes).to_string())
         .env("RAYFOLD", &program)
         .env("CHROMIUM", &args.browser)
         .stderr(Stdio::inherit())
@@ -115,15 +182,27 @@ pub fn run(args: &Args) -> Result<()> {
     let text = String::from_utf8(output.stdout)?;
     let runs: Vec<Run> =
         text.lines().map(serde_json::from_str).collect::<Result<_, _>>().context("the driver's figures")?;
-    let quietest = runs.iter().min_by(|a, b| a.others.total_cmp(&b.others)).context("no run was measured")?;
-    ensure!(quietest.waits.len() > 10, "the browser has shown next to nothing");
+    let quietest = quietest(&runs)?;
+    for run in &quietest {
+        ensure!(run.waits.len() > 10, "the browser has shown next to nothing of {}", run.scene);
+    }
     std::fs::create_dir_all(&args.output)?;
-    OutputFile::write(args.output.join("studio.md"), report(&runs, quietest), false)?;
+    OutputFile::write(args.output.join("studio.md"), report(&runs, &quietest), false)?;
     write_csv(&args.output.join("studio.csv"), &runs)?;
-    plot(&args.output.join("studio.svg"), &runs, quietest)
+    plot(&args.output.join("studio.svg"), &quietest)
 }
 
-/// Returns the scene in another size. The width of its window changes in proportion to that of its picture.
+/// Returns the run with the least other load of each scene.
+fn quietest(runs: &[Run]) -> Result<Vec<&Run>> {
+    let of = |subject: &Subject| {
+        let runs = runs.iter().filter(|run| run.scene == subject.name);
+        let least = runs.min_by(|a, b| a.others.total_cmp(&b.others));
+        least.with_context(|| format!("no run of {} was measured", subject.name))
+    };
+    SUBJECTS.iter().map(of).collect()
+}
+
+/// Returns the scene in another size. The width of a window changes in proportion to that of its picture.
 fn widened(text: &str) -> Result<String> {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let screen = lines.iter_mut().find(|line| line.starts_with("Screen ")).context("no Screen")?;
@@ -131,121 +210,166 @@ fn widened(text: &str) -> Result<String> {
     ensure!(sides.len() == 2, "a Screen with two sides");
     *screen = format!("Screen {} {}", SIZE.0, SIZE.1);
     let wider = f64::from(SIZE.0) / f64::from(SIZE.1) * sides[1] / sides[0];
-    let camera = lines.iter_mut().find(|line| line.starts_with("Camera ")).context("no Camera")?;
-    let mut words: Vec<String> = camera.split_whitespace().map(str::to_owned).collect();
-    for at in [words.len() - 4, words.len() - 2] {
-        words[at] = (words[at].parse::<f64>()? * wider).to_string();
+    // The angle of `Look` is that of the height.
+    if let Some(camera) = lines.iter_mut().find(|line| line.starts_with("Camera ")) {
+        let mut words: Vec<String> = camera.split_whitespace().map(str::to_owned).collect();
+        for at in [words.len() - 4, words.len() - 2] {
+            words[at] = (words[at].parse::<f64>()? * wider).to_string();
+        }
+        *camera = words.join(" ");
     }
-    *camera = words.join(" ");
     Ok(lines.join("\n") + "\n")
 }
 
-fn report(runs: &[Run], quietest: &Run) -> String {
-    let (rate, late, first) = GOALS;
+fn report(runs: &[Run], quietest: &[&Run]) -> String {
     let word = |is_met: bool| if is_met { "met" } else { "missed" };
+    let objects: Vec<_> =
+        SUBJECTS.iter().map(|subject| format!("{} of `scenes/{}`", subject.object, subject.name)).collect();
     let mut text = format!(
         "# The studio\n\n\
-         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frame of \
-         `scenes/hello` at {} x {}, in headless Chromium on the machine that draws; one of its spheres is dragged on a \
-         circle, by 125 pointer moves per second. The studio sends only the part of a picture that differs from the \
-         one before. Moving the view changes all of it, and is not measured here. The driver uses the browser's \
-         debugging protocol without the Network domain, which would copy every picture.\n\n\
-         *Pointer to canvas* is the time from the pointer's event to the end of `putImageData` of the first picture \
-         that was requested with it or after it; it excludes the browser's time to show its canvas. *First picture* is \
-         the time from opening the page in a running browser. *Others* is the share of all processors used by programs \
-         outside the measurement, *processor ms* the time of the studio and the browser. Of {} runs the one with the \
-         least other load counts, run {}.\n\n\
-         | | measured | goal | |\n\
-         | --- | --: | --: | --- |\n\
-         | pictures per second | {:.1} | {rate} | {} |\n\
-         | pointer to canvas, 95 % within, ms | {:.1} | {late} | {} |\n\
-         | first picture, ms | {:.0} | {first} | {} |\n\n\
-         ![The share of moves that are on the canvas by milliseconds](studio.svg)\n\n\
-         ## All runs\n\n\
-         | run | others | pictures per second | at whole size | processor ms per picture | pointer to canvas: half \
-         within, ms | 95 % | 99 % | first picture, ms |\n\
-         | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n",
+         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frames of three \
+         scenes at {} x {}, in headless Chromium on the machine that draws. In each an object is dragged on a circle, by \
+         125 pointer moves per second: {}. The studio sends only the part of a picture that differs from the one before. \
+         Moving the view changes all of it, and is not measured here. The driver uses the browser's debugging protocol \
+         without the Network domain, which would copy every picture.\n\n\
+         - *Pointer to canvas* is the time from the pointer's event to the end of `putImageData` of the first picture \
+         that was requested with it or after it; it excludes the browser's time to show its canvas.\n\
+         - *Least size* and *median size* are those of the pictures while the object moves, as shares of the width or of \
+         the height, whichever is less. A smaller picture is stretched. Where even the smallest takes too long, its rays follow \
+         fewer mirrors and glass. In `clockwork` and `glass` nearly all surfaces mirror or are glass, so a change can reach \
+         every pixel, and all of a picture is drawn.\n\
+         - *Final after a rest* is the time from the last move to the final picture, which is the one of `rayfold \
+         render`, while the button stays down; *after a release* is the time from the release of the button, of an \
+         object that was moving.\n\
+         - *First picture* is the time from opening the page in a running browser.\n\
+         - *Others* is the share of all processors used by programs outside the measurement, *processor ms* the time of \
+         the studio and the browser.\n\n\
+         Of {} runs of a scene the one with the least other load counts.\n\n\
+         | scene | | measured | goal | |\n\
+         | --- | --- | --: | --: | --- |\n",
         SIZE.0,
         SIZE.1,
-        runs.len(),
-        quietest.run,
-        quietest.rate(),
-        word(quietest.rate() >= rate),
-        quietest.quantile(0.95),
-        word(quietest.quantile(0.95) <= late),
-        quietest.first,
-        word(quietest.first <= first),
+        objects.join(", "),
+        runs.iter().filter(|run| run.scene == quietest[0].scene).count(),
+    );
+    // Writing to a String cannot fail.
+    for run in quietest {
+        let (least, median) = run.shares();
+        let late = run.quantile(0.95);
+        let rows = [
+            ("pictures per second", format!("{:.1}", run.rate()), "55", run.rate() >= GOALS.rate),
+            ("pointer to canvas, 95 % within, ms", format!("{late:.1}"), "25", late <= GOALS.late),
+            ("least size", percent(least), "25 %", least >= GOALS.least),
+            ("final after a rest, ms", whole(run.rested), "1000", is_soon(run.rested)),
+            ("final after a release, ms", whole(run.released), "1000", is_soon(run.released)),
+            ("first picture, ms", format!("{:.0}", run.first), "1000", run.first <= GOALS.first),
+        ];
+        for (what, measured, goal, is_met) in rows {
+            let _ = writeln!(text, "| {} | {what} | {measured} | {goal} | {} |", run.scene, word(is_met));
+        }
+        let _ = writeln!(text, "| {} | median size | {} | | |", run.scene, percent(median));
+    }
+    text.push_str(
+        "\n![The share of moves that are on the canvas by milliseconds](studio.svg)\n\n\
+         ## All runs\n\n\
+         | scene | run | others | pictures per second | least size | median | at whole size | processor ms per picture \
+         | pointer to canvas: half within, ms | 95 % | 99 % | final after a rest, ms | after a release | first picture, \
+         ms |\n\
+         | --- | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |\n",
     );
     for run in runs {
-        // Writing to a String cannot fail.
+        let (least, median) = run.shares();
         let _ = writeln!(
             text,
-            "| {} | {:.0} % | {:.1} | {:.0} % | {:.1} | {:.1} | {:.1} | {:.1} | {:.0} |",
+            "| {} | {} | {:.0} % | {:.1} | {} | {} | {} | {:.1} | {:.1} | {:.1} | {:.1} | {} | {} | {:.0} |",
+            run.scene,
             run.run,
             100.0 * run.others,
             run.rate(),
-            100.0 * run.whole(),
+            percent(least),
+            percent(median),
+            percent(run.whole()),
             run.work(),
             run.quantile(0.5),
             run.quantile(0.95),
             run.quantile(0.99),
+            whole(run.rested),
+            whole(run.released),
             run.first,
         );
     }
     text
 }
 
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// Returns a time in whole milliseconds.
+fn whole(ms: Option<f64>) -> String {
+    ms.map_or_else(|| "never".into(), |ms| format!("{ms:.0}"))
+}
+
+fn is_soon(ms: Option<f64>) -> bool {
+    ms.is_some_and(|ms| ms <= GOALS.rested)
+}
+
 fn write_csv(path: &Path, runs: &[Run]) -> Result<()> {
     let mut csv = csv::Writer::from_path(path).with_context(|| path.display().to_string())?;
     let columns = [
+        "scene",
         "run",
         "others",
         "seconds",
         "pictures",
         "pictures_a_second",
+        "least_size",
+        "median_size",
         "at_whole_size",
         "processor_ms_a_picture",
         "p50_ms",
         "p95_ms",
         "p99_ms",
+        "rested_ms",
+        "released_ms",
         "first_ms",
     ];
     csv.write_record(columns)?;
     for run in runs {
+        let (least, median) = run.shares();
         let figures = [
             run.others,
             run.seconds,
             f64::from(run.pictures),
             run.rate(),
+            least,
+            median,
             run.whole(),
             run.work(),
             run.quantile(0.5),
             run.quantile(0.95),
             run.quantile(0.99),
+            run.rested.unwrap_or(f64::NAN),
+            run.released.unwrap_or(f64::NAN),
             run.first,
         ];
         let figures = figures.map(|figure| format!("{:.3}", figure));
-        csv.write_record(std::iter::once(run.run.to_string()).chain(figures))?;
+        csv.write_record([run.scene.clone(), run.run.to_string()].into_iter().chain(figures))?;
     }
     Ok(csv.flush()?)
 }
 
-fn plot(path: &Path, runs: &[Run], quietest: &Run) -> Result<()> {
+fn plot(path: &Path, quietest: &[&Run]) -> Result<()> {
     let course = |run: &Run| {
         let mut waits = run.waits.clone();
         waits.sort_by(f64::total_cmp);
         let of = waits.len() as f64;
         waits.iter().enumerate().map(|(at, wait)| (*wait, 100.0 * (at + 1) as f64 / of)).collect()
     };
-    let series: Vec<_> = runs
+    let series: Vec<_> = quietest
         .iter()
         .map(|run| Series {
-            name: format!(
-                "run {}, others {:.0} %{}",
-                run.run,
-                100.0 * run.others,
-                if run.run == quietest.run { ": the quietest" } else { "" }
-            ),
+            name: format!("{}, run {}, others {:.0} %", run.scene, run.run, 100.0 * run.others),
             points: course(run),
             joined: true,
         })
@@ -255,7 +379,7 @@ fn plot(path: &Path, runs: &[Run], quietest: &Run) -> Result<()> {
         x: "milliseconds",
         y: "share of the pointer's moves that are on the canvas, %",
     };
-    shares(path, &labels, LONGEST_SHOWN_MS, &[(GOALS.1, 95.0)], &series)
+    shares(path, &labels, LONGEST_SHOWN_MS, &[(GOALS.late, 95.0)], &series)
 }
 
 #[cfg(test)]
@@ -265,6 +389,7 @@ mod tests {
     fn measured(waits: Vec<f64>) -> Run {
         let sizes = BTreeMap::from([("960x540".to_owned(), 90), ("480x270".to_owned(), 30)]);
         Run {
+            scene: "hello".into(),
             run: 3,
             first: 400.0,
             seconds: 2.0,
@@ -273,6 +398,8 @@ mod tests {
             pictures: 120,
             sizes,
             waits,
+            rested: Some(300.0),
+            released: None,
         }
     }
 
@@ -284,11 +411,36 @@ mod tests {
     }
 
     #[test]
+    fn sizes_are_those_of_the_pictures() {
+        assert_eq!(measured(vec![]).shares(), (0.5, 1.0));
+        let sizes = BTreeMap::from([("960x540".to_owned(), 1), ("120x68".to_owned(), 5)]);
+        assert_eq!(Run { sizes, ..measured(vec![]) }.shares(), (0.125, 0.125));
+    }
+
+    #[test]
     fn a_goal_that_is_missed_is_called_so() {
         let run = measured(vec![30.0; 100]);
-        let text = report(std::slice::from_ref(&run), &run);
-        assert!(text.contains("| pictures per second | 60.0 | 55 | met |"), "{text}");
+        let text = report(std::slice::from_ref(&run), &[&run]);
+        assert!(text.contains("| hello | pictures per second | 60.0 | 55 | met |"), "{text}");
         assert!(text.contains("| 30.0 | 25 | missed |"), "{text}");
+        assert!(text.contains("| hello | least size | 50 % | 25 % | met |"), "{text}");
+        assert!(text.contains("| final after a rest, ms | 300 | 1000 | met |"), "{text}");
+        assert!(text.contains("| final after a release, ms | never | 1000 | missed |"), "{text}");
+    }
+
+    #[test]
+    fn the_quietest_run_of_each_scene_counts() {
+        let of = |subject: &Subject, run, others| Run {
+            scene: subject.name.into(),
+            run,
+            others,
+            ..measured(vec![])
+        };
+        let runs: Vec<_> =
+            SUBJECTS.iter().flat_map(|subject| [of(subject, 1, 0.2), of(subject, 2, 0.1)]).collect();
+        let found: Vec<_> = quietest(&runs).unwrap().iter().map(|run| (&run.scene[..], run.run)).collect();
+        assert_eq!(found, [("hello", 2), ("clockwork", 2), ("glass", 2)]);
+        assert!(quietest(&runs[..4]).is_err(), "one scene is missing");
     }
 
     #[test]
@@ -298,5 +450,11 @@ mod tests {
         let parsed = rayfold_scene::parse("a", wide.as_bytes(), &Default::default());
         assert!(parsed.script.is_some() && parsed.diagnostics.is_empty(), "{:?}", parsed.diagnostics);
         assert!(wide.contains("Screen 960 540\n") && wide.contains(" -0.4 0.7"), "{wide}");
+    }
+
+    #[test]
+    fn a_view_with_an_angle_is_wider_by_its_screen() {
+        let text = "Screen 320 240\nLook 0 4 6  0 0 0  36\nTrace";
+        assert_eq!(widened(text).unwrap(), text.replace("320 240", "960 540") + "\n");
     }
 }

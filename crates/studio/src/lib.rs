@@ -26,6 +26,7 @@ mod line;
 mod materials;
 mod names;
 mod output;
+mod pace;
 mod packing;
 mod page;
 mod pictures;

@@ -10,7 +10,7 @@ use std::time::Duration;
 use image::RgbaImage;
 
 /// The number of bytes before the pixels, which are little-endian numbers: the picture's number, width, height,
-/// rendering time in microseconds, and 1 if it is final or 0 if a finer one follows; then left, top, width and height
+/// rendering time in microseconds, and its [`Quality`]; then left, top, width and height
 /// of the part whose pixels follow.
 pub(crate) const HEADER: usize = 36;
 
@@ -21,8 +21,18 @@ pub(crate) struct Picture {
     pub(crate) number: u32,
     pub(crate) image: RgbaImage,
     pub(crate) took: Duration,
-    /// No finer picture follows.
-    pub(crate) is_final: bool,
+    pub(crate) quality: Quality,
+}
+
+/// The quality of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quality {
+    /// A finer one follows.
+    Coarse = 0,
+    /// It is that of the renderer.
+    Final = 1,
+    /// A finer one follows. This one has fewer mirror images, and less is seen through glass.
+    Simple = 2,
 }
 
 /// A packer of a sequence of pictures, all of which are shown.
@@ -40,16 +50,28 @@ struct Part {
     height: u32,
 }
 
+impl Picture {
+    /// Makes the final picture that is shown already, for another request.
+    pub(crate) fn again(number: u32, image: &RgbaImage) -> Self {
+        Self { number, image: image.clone(), took: Duration::ZERO, quality: Quality::Final }
+    }
+}
+
 impl Packer {
+    /// Returns the picture that was packed last.
+    pub(crate) fn before(&self) -> &RgbaImage {
+        &self.before
+    }
+
     /// Returns the header of a picture and the part that differs from the previous picture, with four bytes per
     /// pixel: red, green, blue, alpha.
     pub(crate) fn pack(&mut self, picture: Picture) -> Vec<u8> {
-        let Picture { number, image, took, is_final } = picture;
+        let Picture { number, image, took, quality } = picture;
         let part = differing(&self.before, &image);
         let micros = u32::try_from(took.as_micros()).unwrap_or(u32::MAX);
         let (across, down) = (part.width as usize, part.height as usize);
         let mut bytes = Vec::with_capacity(HEADER + across * down * 4);
-        let size = [number, image.width(), image.height(), micros, u32::from(is_final)];
+        let size = [number, image.width(), image.height(), micros, quality as u32];
         for number in size.into_iter().chain([part.left, part.top, part.width, part.height]) {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
@@ -118,7 +140,7 @@ pub(crate) mod tests {
 
     fn pack(packer: &mut Packer, image: &RgbaImage) -> Vec<u8> {
         let (number, took) = (1, Duration::ZERO);
-        packer.pack(Picture { number, image: image.clone(), took, is_final: true })
+        packer.pack(Picture { number, image: image.clone(), took, quality: Quality::Final })
     }
 
     #[test]

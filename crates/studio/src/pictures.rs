@@ -1,9 +1,10 @@
 //! Rendering of the pictures that the page requests, on a thread of its own. The newest request wins.
 //!
-//! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request. While
-//! something moves, a rendering is completed, in a smaller size if it would take too long, so that there is always a
-//! picture. It then has one ray per pixel, or a few where light goes round, whatever the script says. At rest, a slow
-//! picture begins with sketches: few pixels with as few rays, then more. A picture with several rays per pixel is shown after each pass over it.
+//! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request of another
+//! picture. While something moves, a rendering is completed, in a smaller size if it would take too long ([`Pace`]), so
+//! that there is always a picture. It then has one ray per pixel, or a few where light goes round, whatever the script
+//! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few pixels with as few rays, then more. A picture with several rays
+//! per pixel is shown after each pass over it. What moved is at rest soon after the last request, even while it is held.
 //! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
 //! waits behind another is outdated when it is shown.
 
@@ -13,10 +14,11 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rayfold_scene::{Camera, Samples, Scene, Screen, Script};
+use rayfold_scene::{Samples, Scene, Screen, Script};
 use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
-use crate::packing::{Packer, Picture};
+use crate::pace::{Effort, Pace};
+use crate::packing::{Packer, Picture, Quality};
 
 /// The largest number of pictures that the page has not shown yet while something moves.
 const MOVING_UNDER_WAY: u32 = 1;
@@ -24,14 +26,11 @@ const MOVING_UNDER_WAY: u32 = 1;
 /// The same limit at rest, where sketches precede the final picture.
 const RESTING_UNDER_WAY: u32 = 2;
 
-/// The time limit for a picture while something moves, in seconds.
-const MOVING: f64 = 0.03;
+/// The time from the last request of something that moves to its rest.
+const REST: Duration = Duration::from_millis(120);
 
 /// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
 const PATIENCE: f64 = 0.1;
-
-/// The smallest share of width and height that is drawn while something moves, and that of the first sketch.
-const LEAST: f64 = 0.125;
 
 /// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
 const FEW: u32 = 4;
@@ -63,7 +62,23 @@ pub(crate) struct Motion {
     pub(crate) is_free: bool,
 }
 
+impl Wanted {
+    /// Returns whether the same picture is requested, at the same quality.
+    fn is_same(&self, other: &Self) -> bool {
+        let is_same_motion = match (&self.motion, &other.motion) {
+            (Some(own), Some(other)) => own.is_same(other),
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        self.moving == other.moving && is_same_motion && self.scene == other.scene
+    }
+}
+
 impl Motion {
+    fn is_same(&self, other: &Self) -> bool {
+        let of = |motion: &Self| (motion.frame, motion.is_free);
+        Arc::ptr_eq(&self.script, &other.script) && of(self) == of(other)
+    }
+
     /// Returns the scene this many frames after the frame.
     fn after(&self, scene: &Scene, frames: f64) -> Scene {
         let Some(then) = self.script.frame_after(self.frame, frames) else { return scene.clone() };
@@ -89,8 +104,13 @@ struct Desk {
     wanted: Option<Wanted>,
     under_way: u32,
     closed: bool,
-    /// The rendering in progress may be cancelled.
-    at_rest: bool,
+    /// The request that is being drawn at full quality, which may be cancelled. It has the number of the last request of
+    /// its picture.
+    at_rest: Option<Wanted>,
+    /// The last request of something that moves, once its picture is being drawn or was.
+    moved: Option<Wanted>,
+    /// The moment at which that is at rest.
+    rests: Option<Instant>,
 }
 
 impl Painter {
@@ -110,9 +130,18 @@ impl Painter {
     /// Requests a picture, in place of any that is waiting.
     pub(crate) fn want(&self, wanted: Wanted) {
         self.0.change(|desk| {
-            if desk.at_rest {
-                self.0.cancel.store(true, Ordering::Relaxed);
+            let is_cancelled = self.0.cancel.load(Ordering::Relaxed);
+            match &mut desk.at_rest {
+                // It goes on, and answers this request, too.
+                Some(at_rest) if !is_cancelled && at_rest.is_same(&wanted) => {
+                    at_rest.number = wanted.number;
+                    return;
+                }
+                Some(_) => self.0.cancel.store(true, Ordering::Relaxed),
+                None => {}
             }
+            desk.moved = None;
+            desk.rests = wanted.moving.then(|| Instant::now() + REST);
             desk.wanted = Some(wanted);
         });
     }
@@ -130,11 +159,13 @@ impl Painter {
 }
 
 impl Shared {
-    fn change(&self, change: impl FnOnce(&mut Desk)) {
-        change(&mut self.desk.lock().unwrap_or_else(PoisonError::into_inner));
+    fn change<T>(&self, change: impl FnOnce(&mut Desk) -> T) -> T {
+        let changed = change(&mut self.desk.lock().unwrap_or_else(PoisonError::into_inner));
         self.news.notify_all();
+        changed
     }
 
+    /// Waits for a request that can be drawn. Returns `None` when the painter is closed.
     fn next(&self) -> Option<Wanted> {
         let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -145,31 +176,58 @@ impl Shared {
             let has_room = |wanted: &mut Wanted| {
                 under_way < if wanted.moving { MOVING_UNDER_WAY } else { RESTING_UNDER_WAY }
             };
-            if let Some(wanted) = desk.wanted.take_if(has_room) {
+            let left = desk.rests.map(|rests| rests.saturating_duration_since(Instant::now()));
+            let mut next = desk.wanted.take_if(has_room);
+            if next.is_none() && desk.wanted.is_none() && left == Some(Duration::ZERO) {
+                let at_rest = |moved: Wanted| Wanted { moving: false, ..moved };
+                desk.moved = desk.moved.take().map(at_rest);
+                next = desk.moved.take_if(has_room);
+            }
+            if let Some(wanted) = next {
                 desk.under_way += 1;
-                desk.at_rest = !wanted.moving;
+                if wanted.moving {
+                    desk.moved = Some(wanted.clone());
+                } else {
+                    (desk.at_rest, desk.rests) = (Some(wanted.clone()), None);
+                }
                 self.cancel.store(false, Ordering::Relaxed);
                 return Some(wanted);
             }
-            desk = self.news.wait(desk).unwrap_or_else(PoisonError::into_inner);
+            desk = match left.filter(|left| !left.is_zero()) {
+                Some(left) => self.news.wait_timeout(desk, left).unwrap_or_else(PoisonError::into_inner).0,
+                None => self.news.wait(desk).unwrap_or_else(PoisonError::into_inner),
+            };
         }
     }
 
     fn work(&self, send: &impl Fn(Vec<u8>) -> bool) {
         let mut pace = Pace::default();
         let packer = RefCell::new(Packer::default());
-        let send = |picture| send(packer.borrow_mut().pack(picture));
+        let pack = |picture| send(packer.borrow_mut().pack(picture));
+        // The request whose final picture was sent last, with nothing after it.
+        let mut finished: Option<Wanted> = None;
         while let Some(wanted) = self.next() {
-            let drawn = if wanted.moving {
-                self.sketch(&wanted, pace.share(&wanted.scene, MOVING), &mut pace)
-            } else {
-                self.at_rest(&wanted, &mut pace, &send)
+            let drawn = match finished.take() {
+                Some(finished) if finished.is_same(&wanted) => {
+                    Ok(Picture::again(wanted.number, packer.borrow().before()))
+                }
+                _ if wanted.moving => {
+                    let effort = pace.moving(&wanted.scene);
+                    self.sketch(&wanted, effort, &mut pace)
+                }
+                _ => {
+                    pace.rested();
+                    self.at_rest(&wanted, &mut pace, &pack)
+                }
             };
+            let at_rest = self.change(|desk| desk.at_rest.take());
             match drawn {
                 Ok(picture) => {
-                    if !send(picture) {
+                    let number = at_rest.as_ref().map_or(wanted.number, |wanted| wanted.number);
+                    if !pack(Picture { number, ..picture }) {
                         return;
                     }
+                    finished = at_rest;
                 }
                 // The rendering was cancelled for a newer one, or the picture is beyond the limits.
                 Err(_) => self.change(|desk| desk.under_way = desk.under_way.saturating_sub(1)),
@@ -190,10 +248,10 @@ impl Shared {
         let mut share = pace.share(scene, PATIENCE);
         // With one ray per pixel, a sketch of the full size is the picture.
         while share < 1.0 || is_sampled {
-            let sketch = self.sketch(wanted, share, pace)?;
+            let sketch = self.sketch(wanted, Effort { share, bounces: None }, pace)?;
             // A sketch that the page cannot show in time is skipped: a finer one follows.
-            if self.another() {
-                send(sketch);
+            if let Some(number) = self.another() {
+                send(Picture { number, ..sketch });
             }
             if share >= 1.0 {
                 break;
@@ -212,79 +270,52 @@ impl Shared {
         let drawing = Drawing::exposed(exposure, &options)?;
         let begin = Instant::now();
         let image = drawing.draw_progressively(|image| {
-            if self.another() {
+            if let Some(number) = self.another() {
                 let image = image.into_rgba8();
-                send(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false });
+                send(Picture { number, image, took: start.elapsed(), quality: Quality::Coarse });
             }
         })?;
         if !is_sampled {
-            pace.drawn(scene.screen, begin.elapsed());
+            pace.drawn(scene.screen, None, begin.elapsed());
         }
         let image = image.into_rgba8();
-        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: true })
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality: Quality::Final })
     }
 
-    /// Renders a picture with one ray per pixel, and with this share of its width and height.
-    fn sketch(&self, wanted: &Wanted, share: f64, pace: &mut Pace) -> Result<Picture, RenderError> {
+    /// Renders a picture with one ray per pixel, or a few where light goes round.
+    fn sketch(&self, wanted: &Wanted, effort: Effort, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
         let few = if whole.goes_round() { FEW } else { 1 };
         let samples = Samples::new(few, 0.0).unwrap_or_default();
-        let scene = Scene { screen: smaller(whole.screen, share), samples, ..whole.clone() };
-        let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
+        let scene = Scene { screen: smaller(whole.screen, effort.share), samples, ..whole.clone() };
+        let options =
+            RenderOptions { cancel: Some(&self.cancel), bounces: effort.bounces, ..RenderOptions::default() };
         let drawing = Drawing::new(&scene, &options)?;
         pace.prepared(start.elapsed());
         let begin = Instant::now();
         let image = drawing.draw_picture()?.into_rgba8();
-        pace.drawn(scene.screen, begin.elapsed());
-        Ok(Picture { number: wanted.number, image, took: start.elapsed(), is_final: false })
+        pace.drawn(scene.screen, effort.bounces, begin.elapsed());
+        let quality = if effort.bounces.is_some() { Quality::Simple } else { Quality::Coarse };
+        Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality })
     }
 
-    /// Returns whether another picture may be sent to the page. If so, counts it.
-    fn another(&self) -> bool {
-        let mut is_free = false;
+    /// Returns the number of another picture of what is at rest, if one may be sent to the page, and counts it.
+    fn another(&self) -> Option<u32> {
         self.change(|desk| {
-            is_free = desk.under_way < RESTING_UNDER_WAY;
-            desk.under_way += u32::from(is_free);
-        });
-        is_free
+            let number = desk.at_rest.as_ref()?.number;
+            if desk.under_way >= RESTING_UNDER_WAY {
+                return None;
+            }
+            desk.under_way += 1;
+            Some(number)
+        })
     }
 }
 
-/// The duration of the last renderings with one ray per pixel.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pace {
-    /// The seconds before the first pixel.
-    preparing: f64,
-    /// The seconds per pixel, once a picture was rendered.
-    per_pixel: Option<f64>,
-}
-
-impl Pace {
-    fn prepared(&mut self, took: Duration) {
-        self.preparing = took.as_secs_f64();
-    }
-
-    fn drawn(&mut self, screen: Screen, took: Duration) {
-        self.per_pixel = Some(took.as_secs_f64() / screen.pixels() as f64);
-    }
-
-    /// Returns the share of width and height that can be rendered in this many seconds. The pixels of an orthographic
-    /// camera are world units, so its size does not change.
-    fn share(&self, scene: &Scene, seconds: f64) -> f64 {
-        if matches!(scene.camera, Camera::Orthographic) {
-            return 1.0;
-        }
-        let Some(per_pixel) = self.per_pixel else { return LEAST };
-        // Preparing takes the same time for few pixels as for many.
-        let left = (seconds - self.preparing).max(seconds / 3.0);
-        (left / (per_pixel * scene.screen.pixels() as f64)).sqrt().clamp(LEAST, 1.0)
-    }
-}
-
-/// Returns a share of a screen's size.
+/// Returns a share of a screen's size, rounded up.
 fn smaller(screen: Screen, share: f64) -> Screen {
-    let side = |side: u32| (f64::from(side) * share).round().max(1.0) as u32;
+    let side = |side: u32| (f64::from(side) * share).ceil().max(1.0) as u32;
     Screen::new(side(screen.width()), side(screen.height())).unwrap_or(screen)
 }
 
@@ -436,21 +467,89 @@ mod tests {
         painter.close();
     }
 
+    /// Returns the pixels of the pictures.
+    fn shown(pictures: &[Vec<u8>]) -> image::RgbaImage {
+        let mut shown = Shown::default();
+        pictures.iter().for_each(|picture| shown.put(picture));
+        shown.0
+    }
+
+    /// Returns the width and height of a picture.
+    fn size(picture: &[u8]) -> [u32; 2] {
+        [4, 8].map(|at| number_at(picture, at))
+    }
+
     #[test]
-    fn what_takes_too_long_is_drawn_smaller() {
-        let mut scene = pinhole(1, "Sphere 1  0 0 0  0 0 0  1 1 1").scene;
-        scene.screen = Screen::new(1000, 500).unwrap();
-        let share = |preparing, per_pixel| Pace { preparing, per_pixel }.share(&scene, MOVING);
-        let whole = MOVING / 500_000.0;
-        assert_eq!(share(0.0, None), LEAST, "before anything is known");
-        assert_eq!(share(0.0, Some(0.0)), 1.0);
-        assert!((share(0.0, Some(4.0 * whole)) - 0.5).abs() < 1e-9);
-        assert!((share(0.5 * MOVING, Some(2.0 * whole)) - 0.5).abs() < 1e-9);
-        assert_eq!(share(9.0, Some(whole)), share(8.0, Some(whole)), "preparing is not to make it tiny");
-        assert_eq!(share(0.0, Some(1.0)), LEAST);
-        let size = |share| (smaller(scene.screen, share).width(), smaller(scene.screen, share).height());
-        assert_eq!([size(1.0), size(0.5), size(LEAST)], [(1000, 500), (500, 250), (125, 63)]);
-        let flat = Scene { camera: Camera::Orthographic, ..scene.clone() };
-        assert_eq!(Pace { preparing: 0.0, per_pixel: Some(1.0) }.share(&flat, MOVING), 1.0);
+    fn what_is_held_still_is_refined_and_its_release_draws_nothing_anew() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        let mut request = pinhole(1, "Samples 16\nSphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3");
+        let expected = render(&request.scene, &RenderOptions::default()).unwrap();
+        request.moving = true;
+        let mut seen = drawn(&painter, &pictures, request.clone());
+        assert!(!is_final(&seen[0]) && seen.iter().all(|picture| number(picture) == 1));
+        assert_eq!(shown(&seen), DynamicImage::ImageRgb8(expected).into_rgba8());
+        let released = Wanted { number: 2, moving: false, ..request.clone() };
+        let last = drawn(&painter, &pictures, released.clone());
+        assert_eq!((last.len(), last[0].len(), number(&last[0])), (1, HEADER, 2), "it is there already");
+        seen.extend(last);
+        // What moves on is drawn coarsely again.
+        let mut moves = pinhole(3, "Samples 16\nSphere 1  0.5 0 0  0.2 0.1 0.1  0.7 0.5 0.3");
+        moves.moving = true;
+        painter.want(moves);
+        let moved = pictures.recv_timeout(Duration::from_secs(20)).unwrap();
+        painter.shown();
+        assert!(number(&moved) == 3 && !is_final(&moved));
+        painter.close();
+    }
+
+    #[test]
+    fn a_release_does_not_interrupt_what_is_refined() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        let mut request = pinhole(1, "Samples 1024\nSphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3");
+        request.scene.screen = Screen::new(480, 320).unwrap();
+        let expected = render(&request.scene, &RenderOptions::default()).unwrap();
+        request.moving = true;
+        painter.want(request.clone());
+        let next = || {
+            let picture = pictures.recv_timeout(Duration::from_secs(60)).unwrap();
+            painter.shown();
+            picture
+        };
+        // One while it moves, and one at rest.
+        let mut seen = vec![next(), next()];
+        assert!(number(&seen[1]) == 1 && !is_final(&seen[1]), "the rest is under way");
+        painter.want(Wanted { number: 2, moving: false, ..request });
+        while !is_final(&seen[seen.len() - 1]) {
+            seen.push(next());
+        }
+        assert_eq!(number(&seen[seen.len() - 1]), 2);
+        let sizes: Vec<_> = seen[1..].iter().map(|picture| size(picture)).collect();
+        assert!(sizes.is_sorted(), "it begins anew: {sizes:?}");
+        assert_eq!(shown(&seen), DynamicImage::ImageRgb8(expected).into_rgba8());
+        painter.close();
+    }
+
+    #[test]
+    fn what_moves_has_at_least_a_quarter_of_the_size_each_way() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        // A hundred balls of glass, which take longer than a picture may.
+        let balls: String =
+            (0..100).map(|at| format!("Sphere .3 {} {} 0 clear\n", at % 10 - 5, at / 10 - 5)).collect();
+        for (number, shift) in [(1, 0), (2, 1), (3, 2)] {
+            let text =
+                format!("Depth 16\nMaterial clear glass 1 1 1 1.5\nSphere 1 {shift} 0 2 clear\n{balls}");
+            let mut request = pinhole(number, &text);
+            request.scene.screen = Screen::new(1602, 1001).unwrap();
+            request.moving = true;
+            painter.want(request);
+            let picture = pictures.recv_timeout(Duration::from_secs(60)).unwrap();
+            painter.shown();
+            let [width, height] = size(&picture);
+            assert!(4 * width >= 1602 && 4 * height >= 1001, "{width} x {height}");
+        }
+        painter.close();
     }
 }

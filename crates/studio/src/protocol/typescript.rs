@@ -92,8 +92,9 @@ const HEAD: &str = "// The messages between page and server. Made of the server'
                     //\n\
                     // Points are in pixels of the picture. Lines count from 0.\n";
 
-const FOOT: &str = "/**\n * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it is final; then left, top, width and\n \
-                    * height of the part that differs from the previous picture, whose pixels follow; little-endian.\n */\n";
+const FOOT: &str = "/**\n * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it is final or 2 if it is simplified;\n \
+                    * then left, top, width and height of the part that differs from the previous picture, whose pixels follow;\n \
+                    * little-endian.\n */\n";
 
 /// Returns the declaration of a type. The page does not change messages, so all lists are read-only.
 fn declared<T: TS>(config: &Config) -> String {

@@ -516,7 +516,8 @@ total: number, } | { "is": "failed",
 why: string, };
 
 /**
- * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it is final; then left, top, width and
- * height of the part that differs from the previous picture, whose pixels follow; little-endian.
+ * Bytes before the pixels of a picture: number, width, height, microseconds, 1 if it is final or 2 if it is simplified;
+ * then left, top, width and height of the part that differs from the previous picture, whose pixels follow;
+ * little-endian.
  */
 export const PICTURE_HEADER = 36;

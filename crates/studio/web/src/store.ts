@@ -33,7 +33,13 @@ export const searching = signal(false);
 /** Whether the list of keys is open. */
 export const help = signal(false);
 
-export const selection = computed(() => state.value?.selection ?? []);
+let kept: readonly number[] = [];
+/** The same array as long as the same lines are selected, so that what shows them is left alone. */
+export const selection = computed(() => {
+  const now = state.value?.selection ?? [];
+  if (String(now) !== String(kept)) kept = now;
+  return kept;
+});
 export const selected = computed(() => new Set(selection.value));
 export const commands = computed(() => new Map(tables.value.map((table) => [table.name, table])));
 
@@ -47,6 +53,9 @@ const early: ServerMessage[] = [];
 let hearText: (tell: ServerMessage) => void = (tell) => void early.push(tell);
 let hovering = false;
 let nextHover: ClientMessage | null = null;
+let nextDrag: ClientMessage | null = null;
+/** The number of the last message about a drag. */
+let dragged = 0;
 let gestures = 0;
 /** The number of messages sent. */
 let sent = 0;
@@ -75,6 +84,21 @@ export function ask(wish: ClientMessage): void {
   socket.send(JSON.stringify(wish));
 }
 
+/** Drags what is held. While a reply is awaited, only the newest place is kept. */
+export function drag(wish: ClientMessage): void {
+  nextDrag = wish;
+  if ((state.value?.asked ?? 0) >= dragged) dragNext();
+}
+
+/** Sends the place that was kept. */
+export function dragNext(): void {
+  const wish = nextDrag;
+  nextDrag = null;
+  if (!wish) return;
+  ask(wish);
+  dragged = sent;
+}
+
 /** Selects lines. The selection is shown at once, so that repeated keys continue from it. */
 export function select(lines: readonly number[]): void {
   if (state.value) state.value = { ...state.value, selection: lines };
@@ -101,7 +125,7 @@ export function connect(): void {
   opened.onopen = () => {
     connected.value = true;
     hovering = false;
-    sent = 0;
+    [sent, dragged] = [0, 0];
     dispatchEvent(new Event("resize"));
   };
   opened.onmessage = (message: MessageEvent<string | ArrayBuffer>) => {
@@ -135,6 +159,7 @@ function hear(tell: ServerMessage): void {
       // A state that was sent before the server received the last selection does not undo it.
       const isOld = chosen !== null && tell.state.asked < chosen.sent;
       state.value = isOld && chosen ? { ...tell.state, selection: chosen.lines } : tell.state;
+      if (tell.state.asked >= dragged) dragNext();
     }
     if (tell.hovered !== undefined) {
       hovered.value = tell.hovered;

@@ -1,8 +1,10 @@
 // Measures the page in headless Chromium: how soon the first picture is there, how many come a second while an object is
-// dragged, and how long each takes from the pointer to the canvas. Writes a line of JSON a run; `rayfold-bench studio`
-// makes the report of them.
+// dragged, how large they are, how long each takes from the pointer to the canvas, and how soon the picture is final when
+// the hand rests. Writes a line of JSON for each run of a scene; `rayfold-bench studio` makes the report of them.
 //
-//     RAYFOLD=target/release/rayfold CHROMIUM=chromium node tests/bench.mjs SCRIPT RUNS SECONDS
+//     RAYFOLD=target/release/rayfold CHROMIUM=chromium node tests/bench.mjs RUNS SECONDS SCENES
+//
+// SCENES is JSON: a list of { name, script, grab }, where `grab` is the place of an object, in shares of the picture.
 //
 // It speaks the browser's debugging protocol itself, over a pipe and without its Network domain: that one copies every
 // picture to whoever listens, and halves their rate.
@@ -14,7 +16,7 @@ import { join } from "node:path";
 
 import { start } from "./processes.mjs";
 
-const [script, runs = "5", seconds = "5"] = process.argv.slice(2);
+const [runs, seconds, scenes] = process.argv.slice(2).map((word) => JSON.parse(word));
 
 /** Width and height of the picture. */
 const SIZE = [960, 540];
@@ -25,18 +27,18 @@ const MOVE_MS = 8;
 /** Once round the circle on which the object is dragged, in milliseconds, and the circle's radius in pixels. */
 const [ROUND_MS, RADIUS] = [2000, 50];
 
-/** Where the object is, in shares of the picture. */
-const [GRAB_X, GRAB_Y] = [0.59, 0.67];
+/** The longest wait for a final picture, in milliseconds. */
+const PATIENCE_MS = 5000;
 
 /** A second, as the system counts processor time. */
 const JIFFIES = 100;
 
 /** Runs in the page before its own scripts: notes when what was asked for by the pointer is on the canvas. */
 const PROBE = `(() => {
-  const probe = { first: null, sizes: {}, pictures: 0, waits: [], sent: 0, asked: [], recording: false };
+  const probe = { first: null, sizes: {}, pictures: 0, waits: [], sent: 0, asked: [], recording: false, final: null };
   window.probe = probe;
-  let pointer = 0;
-  for (const moved of ["pointermove", "pointerrawupdate"]) addEventListener(moved, (event) => (pointer = event.timeStamp), true);
+  // Each move waits for a message that was sent with it or after it, and for the picture of that.
+  addEventListener("pointerrawupdate", (event) => probe.recording && probe.asked.push({ number: null, at: event.timeStamp, picture: null }), true);
   const Socket = window.WebSocket;
   window.WebSocket = class extends Socket {
     constructor(...args) {
@@ -45,18 +47,29 @@ const PROBE = `(() => {
         if (typeof data !== "string" || !data.includes('"asked"')) return;
         const asked = Number(/"asked":(\\d+)/.exec(data)[1]);
         const picture = /"picture":\\[(\\d+)/.exec(data);
-        for (const drag of probe.asked) if (drag.picture === null && drag.number <= asked && picture) drag.picture = Number(picture[1]);
+        const { settling } = probe;
+        if (settling && settling.number !== null && settling.number <= asked && picture) settling.picture ??= Number(picture[1]);
+        for (const drag of probe.asked) if (drag.picture === null && drag.number !== null && drag.number <= asked && picture) drag.picture = Number(picture[1]);
       });
     }
     send(text) {
       probe.sent += 1;
-      if (probe.recording && text.startsWith('{"ask":"drag"')) probe.asked.push({ number: probe.sent, at: pointer, picture: null });
+      if (probe.settling && probe.settling.from !== null && /"ask":"(drag|release)"/.test(text)) probe.settling.number ??= probe.sent;
+      if (text.startsWith('{"ask":"drag"')) for (const drag of probe.asked) drag.number ??= probe.sent;
       super.send(text);
     }
+  };
+  // Notes how long the final picture takes after the next of these pointer events.
+  probe.settles = (...kinds) => {
+    probe.final = null;
+    const settling = (probe.settling = { from: null, number: null, picture: null });
+    for (const kind of kinds) addEventListener(kind, (event) => (settling.from ??= event.timeStamp), { capture: true, once: true });
   };
   addEventListener("picture", ({ detail, target }) => {
     const now = performance.now();
     probe.first ??= now;
+    const { settling } = probe;
+    if (settling && settling.picture !== null && detail >= settling.picture && target.dataset.final === "true") probe.final ??= now - settling.from;
     if (!probe.recording) return;
     probe.pictures += 1;
     const size = target.width + "x" + target.height;
@@ -122,7 +135,7 @@ function ours(roots) {
   return [...of].filter(([pid]) => isOurs(pid)).reduce((sum, [, { time }]) => sum + time, 0);
 }
 
-async function measure(run) {
+async function measure(run, { name, script, grab }) {
   const folder = mkdtempSync(join(tmpdir(), "rayfold-bench-"));
   const path = join(folder, "scene.txt");
   cpSync(script, path);
@@ -159,9 +172,11 @@ async function measure(run) {
     await page("Page.navigate", { url: "about:blank" });
     await open();
     const first = await evaluate("probe.first");
+    // The small pictures of materials and scenes are drawn once.
+    for (let round = 0; round < 400 && !(await evaluate("[...document.images].every(({ complete, offsetParent }) => complete || offsetParent === null)")); round += 1) await wait(50);
     await wait(800);
     const [left, top] = await box("canvas");
-    const [x, y] = [left + GRAB_X * SIZE[0], top + GRAB_Y * SIZE[1]];
+    const [x, y] = [left + grab[0] * SIZE[0], top + grab[1] * SIZE[1]];
     const mouse = (type, x, y, buttons) => page("Input.dispatchMouseEvent", { type, x, y, button: buttons || type === "mouseReleased" ? "left" : "none", buttons, clickCount: 1 });
     await mouse("mouseMoved", x, y, 0);
     await mouse("mousePressed", x, y, 1);
@@ -170,7 +185,7 @@ async function measure(run) {
     const pids = [studio.server.pid, browser.pid, process.pid];
     const moves = [];
     // The first second is not counted: caches fill, and the browser compiles.
-    for (let now = 0; now < 1000 * (1 + Number(seconds)); now = performance.now() - begin) {
+    for (let now = 0; now < 1000 * (1 + seconds); now = performance.now() - begin) {
       if (from === null && now >= 1000) {
         await evaluate("probe.recording = true");
         [from, before] = [performance.now(), { ...processors(), ours: ours(pids) }];
@@ -183,13 +198,27 @@ async function measure(run) {
     const took = (performance.now() - from) / 1000;
     const [total, own] = [processors(), ours(pids)];
     await Promise.all(moves);
-    await mouse("mouseReleased", x, y, 0);
+    // The hand rests, with the button down; then it lets go while it moves.
+    const settled = async (kinds, act) => {
+      await evaluate(`probe.settles(${kinds})`);
+      await act();
+      for (let waited = 0; waited < PATIENCE_MS; waited += 20) {
+        await wait(20);
+        const took = await evaluate("probe.final");
+        if (took !== null) return took;
+      }
+      return null;
+    };
+    const rested = await settled('"pointermove", "pointerrawupdate"', () => mouse("mouseMoved", x + RADIUS / 2, y, 1));
+    await mouse("mouseMoved", x, y + 10, 1);
+    await wait(2 * MOVE_MS);
+    const released = await settled('"pointerup"', () => mouse("mouseReleased", x, y + 10, 0));
     const selected = await evaluate(`document.querySelectorAll("[aria-selected=true]").length`);
     if (selected === 0) throw new Error("no object is where the pointer went down");
     const probe = await evaluate("JSON.stringify({ sizes: probe.sizes, pictures: probe.pictures, waits: probe.waits })");
     const others = (total.busy - before.busy - (own - before.ours)) / (total.all - before.all);
     const processorMs = (1000 * (own - before.ours)) / JIFFIES;
-    console.log(JSON.stringify({ run, first, seconds: took, others, processorMs, ...JSON.parse(probe) }));
+    console.log(JSON.stringify({ scene: name, run, first, rested, released, seconds: took, others, processorMs, ...JSON.parse(probe) }));
   } finally {
     await browser.ask("Browser.close").catch(() => {});
     await browser.ended;
@@ -199,4 +228,4 @@ async function measure(run) {
   }
 }
 
-for (let run = 1; run <= Number(runs); run += 1) await measure(run);
+for (let run = 1; run <= runs; run += 1) for (const scene of scenes) await measure(run, scene);

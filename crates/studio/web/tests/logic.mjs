@@ -68,3 +68,55 @@ test("a number is read with a comma or a point, and nothing else is one", async 
   assert.deepEqual(["1,5", "-.5", "−2", "1e3", " 4 "].map(parsed), [1.5, -0.5, -2, 1000, 4]);
   for (const text of ["", "1,2,3", "1.5,2", "x", "Infinity", "0x10"]) assert.ok(Number.isNaN(parsed(text)), text);
 });
+
+/** The page's connection to a server that is played here: what was sent, and how the server answers. */
+async function connected(t) {
+  const sent = [];
+  let socket;
+  class Socket {
+    static OPEN = 1;
+    readyState = 1;
+    constructor() {
+      socket = this;
+    }
+    send(text) {
+      sent.push(JSON.parse(text));
+    }
+  }
+  const globals = { WebSocket: Socket, location: { href: "http://127.0.0.1/" }, dispatchEvent: () => true };
+  const before = Object.keys(globals).map((name) => [name, Object.getOwnPropertyDescriptor(globalThis, name)]);
+  for (const [name, value] of Object.entries(globals)) Object.defineProperty(globalThis, name, { value, configurable: true, writable: true });
+  t.after(() => before.forEach(([name, was]) => (was ? Object.defineProperty(globalThis, name, was) : delete globalThis[name])));
+  const store = await load("store.ts");
+  store.connect();
+  socket.onopen();
+  return { store, sent, hear: (tell) => socket.onmessage({ data: JSON.stringify(tell) }) };
+}
+
+test("of a drag the newest place is sent as soon as the one before it is answered, and before the release", async (t) => {
+  const { store, sent, hear } = await connected(t);
+  const places = () => sent.splice(0).map(({ ask, x }) => x ?? ask);
+  store.ask({ ask: "press" });
+  hear({ state: { asked: 1, selection: [] } });
+  for (const x of [1, 2, 3]) store.drag({ ask: "drag", x });
+  assert.deepEqual(places(), ["press", 1], "one is under way");
+  hear({ state: { asked: 1, selection: [] } });
+  assert.deepEqual(places(), [], "an answer to something before it");
+  hear({ state: { asked: 2, selection: [] } });
+  assert.deepEqual(places(), [3]);
+  hear({ state: { asked: 3, selection: [] } });
+  assert.deepEqual(places(), [], "nothing is sent twice");
+  for (const x of [4, 5]) store.drag({ ask: "drag", x });
+  store.dragNext();
+  store.ask({ ask: "release" });
+  assert.deepEqual(places(), [4, 5, "release"], "the last place counts");
+});
+
+test("a selection that stays is the same array", async (t) => {
+  const { store, hear } = await connected(t);
+  const after = (selection) => (hear({ state: { asked: 9, selection } }), store.selection.value);
+  const first = after([1, 2]);
+  assert.equal(after([1, 2]), first);
+  assert.deepEqual(after([2, 1]), [2, 1]);
+  assert.deepEqual(after([]), []);
+});

@@ -344,6 +344,38 @@ test("only who knows the address gets in, and only from this page", async (t) =>
   }
 });
 
+test("what is dragged is refined while it is held, and the page says that it is simplified until then", async (t) => {
+  // Balls of glass behind each other, which take too long with all their mirror images.
+  const balls = Array.from({ length: 60 }, (_, at) => `Sphere 0.45 ${(at % 5) - 2} ${(Math.floor(at / 5) % 4) - 1.5} ${-Math.floor(at / 20)} clear`);
+  const text = `Screen 400 300\nDepth 14\nBackground 0.6 0.7 0.9\nLook 0 0 9  0 0 0  36\nIlight 1 1 1  1 -1 -1\nMaterial clear glass 0.98 0.98 0.98 1.5\n${balls.join("\n")}\nSphere 0.5  0 0 2  clear\nTrace\n`;
+  const { page, settled, check } = await open(t, { text, size: [1024, 768] });
+  const canvas = page.locator("canvas");
+  const seen = () => canvas.evaluate(({ width, height, dataset }) => ({ width, height, isFinal: dataset.final === "true" }));
+  const note = page.getByText("Mirrors and glass are simplified while this moves");
+  await settled();
+  const whole = await seen();
+  await canvas.evaluate((canvas) => {
+    window.least = 1e9;
+    canvas.addEventListener("picture", () => (window.least = Math.min(window.least, canvas.width)));
+  });
+  const [x, y] = await over(page, 0.5, 0.5);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let step = 1; !(await note.isVisible()); step += 1) {
+    assert.ok(step < 200, "nothing is simplified");
+    await page.mouse.move(x + (step % 20), y);
+    await page.waitForTimeout(30);
+  }
+  assert.ok((await page.evaluate(() => window.least)) >= whole.width / 4, "at least a quarter");
+  // The button is still down.
+  await until(async () => (await seen()).isFinal);
+  assert.deepEqual(await seen(), whole);
+  assert.equal(await note.count(), 0);
+  await page.mouse.up();
+  await settled();
+  check();
+});
+
 test("pictures keep up with a drag, and what was changed is written when the server is told to end", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
   const { page } = studio;

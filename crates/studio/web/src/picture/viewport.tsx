@@ -10,7 +10,7 @@ import { actions } from "../actions";
 import { visible } from "../parts/visible";
 import type { Handle } from "../protocol";
 import { PICTURE_HEADER } from "../protocol";
-import { ask, ghosts, guides, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
+import { ask, drag as dragTo, dragNext, ghosts, guides, hover, hovered, hoverOutline, lines, onPicture, outline, select, selected, state } from "../store";
 
 type Point = readonly [number, number];
 
@@ -47,6 +47,8 @@ const FINGER = 22;
 
 /** Width and height of the panel, in the window's pixels. */
 const room = signal<Point>([1, 1]);
+/** The picture has fewer mirror images than the final one. */
+const simplified = signal(false);
 
 /** The rectangle of a box selection. */
 const boxed = signal<readonly [number, number, number, number] | null>(null);
@@ -82,7 +84,7 @@ export function Viewport(): JSX.Element {
     onPicture((picture) => {
       const head = new DataView(picture, 0, PICTURE_HEADER);
       const field = (at: number): number => head.getUint32(4 * at, true);
-      const [number, width, height, isFinal] = [field(0), field(1), field(2), field(4) === 1];
+      const [number, width, height, quality] = [field(0), field(1), field(2), field(4)];
       const [left, top, across, down] = [field(5), field(6), field(7), field(8)];
       const target = context.canvas;
       if (target.width !== width || target.height !== height) [target.width, target.height] = [width, height];
@@ -90,7 +92,8 @@ export function Viewport(): JSX.Element {
       if (across > 0) context.putImageData(new ImageData(new Uint8ClampedArray(picture, PICTURE_HEADER), across, down), left, top);
       ask({ ask: "shown" });
       target.dataset["picture"] = String(number);
-      target.dataset["final"] = String(isFinal);
+      target.dataset["final"] = String(quality === 1);
+      simplified.value = quality === 2;
       target.dispatchEvent(new CustomEvent("picture", { detail: number }));
     });
     return () => {
@@ -132,7 +135,7 @@ export function Viewport(): JSX.Element {
   const drag = (event: PointerEvent): void => {
     if (held.current?.what !== "drag") return;
     const [x, y] = at(event);
-    ask({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
+    dragTo({ ask: "drag", x, y, upright: event.shiftKey, snap: event.ctrlKey || event.metaKey, whole: event.altKey });
   };
   raw.current = drag;
   const move = (event: PointerEvent): void => {
@@ -164,6 +167,7 @@ export function Viewport(): JSX.Element {
   };
   const release = (): void => {
     const rectangle = boxed.value;
+    dragNext();
     if (rectangle) ask({ ask: "box", from: [rectangle[0], rectangle[1]], to: [rectangle[2], rectangle[3]], extend: false });
     else if (held.current) ask({ ask: "release" });
     boxed.value = null;
@@ -241,6 +245,7 @@ export function Viewport(): JSX.Element {
         </svg>
       </div>
       {now && picture && <ViewCube axes={now.axes} />}
+      {simplified.value && <p class="under simple">Mirrors and glass are simplified while this moves.</p>}
       {now && !picture && <p class="hint">The scene is empty: drag a shape in from the left, or click one.</p>}
       {under && !held.current && !selected.value.has(hovered.value ?? -1) && (
         <p class="under">{visible(under.name ?? under.subject ?? under.command ?? "")}</p>

@@ -148,6 +148,7 @@ export function open(host: HTMLElement): () => void {
       showProblems(editor, faults);
     }),
     effect(() => {
+      void lines.value;
       const line = selection.value.at(-1);
       if (line !== undefined && !place) reveal(line);
       if (place && place.file === state.value?.file) {

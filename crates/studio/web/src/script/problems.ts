@@ -67,7 +67,7 @@ export function showProblems(view: EditorView, faults: readonly FaultState[]): v
     const from = line.from + offset(line.text, fault.column);
     return [{ from, to: Math.min(line.to, from + fault.length), fault }];
   });
-  view.dispatch({ effects: show.of(problems) });
+  if (problems.length > 0 || view.state.field(underlined).size > 0) view.dispatch({ effects: show.of(problems) });
 }
 
 /** The problems at a position. */
