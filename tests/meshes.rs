@@ -606,3 +606,32 @@ fn a_model_that_is_used_often_is_drawn_as_written_out() {
         );
     }
 }
+
+/// Large, small and far from the origin, and seen from within.
+#[test]
+fn models_with_trees_of_their_own_are_exact_at_every_scale() {
+    for (scale, at) in [(1.0, 0.0), (1e-5, 0.0), (1e4, 0.0), (1.0, 1e4), (1e-3, 40.0), (300.0, -7e3)] {
+        let place =
+            |x: f64, y: f64, z: f64| format!("{} {} {}", at + scale * x, at + scale * y, at + scale * z);
+        let lines = |eye: String, object: &str| {
+            first_frame(&format!(
+                "Screen 96 72\nLook {eye} {} 40\nBackground .2 .3 .5\nIlight .8 .8 .7 -.4 -1 -.3\nMaterial red ambient .1 0 0 \
+                 diffuse .8 .2 .1\nMaterial chrome diffuse .1 .1 .1 mirror .8 .8 .8\nGroup g\nMesh {object}\nEnd\n\
+                 Use g {} 10 50 30 {}\nUse g {} 80 5 0 {}\nTriangle {} {} {} .1 .1 .1 .6 .6 .6\nTrace",
+                place(0.0, 0.0, 0.0),
+                place(-0.9, 0.1, 0.0),
+                0.8 * scale,
+                place(1.0, -0.2, -0.5),
+                scale,
+                place(-9.0, -1.5, -9.0),
+                place(9.0, -1.5, -9.0),
+                place(0.0, -1.5, 9.0),
+            ))
+        };
+        for object in ["\"round.obj\" red", "\"flat.obj\" chrome", "\"colored.obj\"", "\"quads.obj\""] {
+            for eye in [place(0.3, 0.9, 5.0), place(-0.8, 0.2, 0.1)] {
+                compare_scene(&lines(eye.clone(), object), &format!("{object} {scale} {at} {eye}"));
+            }
+        }
+    }
+}

@@ -25,7 +25,7 @@ use crate::fast::film::cover::{cover_hits, let_through};
 use crate::fast::film::trace::{aim_along_axis, trace_bodies, trace_primary, trace_queue};
 use crate::fast::materials::sky::{show_panorama, show_sky};
 use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns};
-use crate::fast::rays::kind::ByKind;
+use crate::fast::rays::kind::{ByKind, Kind};
 use crate::fast::rays::pixels::Rays;
 use crate::fast::transport::light::{Occluders, add_all_lights, add_sun_light};
 use crate::fast::transport::paths::{PathNumbers, spawn_paths};
@@ -493,7 +493,17 @@ fn shade_faces<S: Simd, E: Real, const EYE: bool>(
     hits: &mut Hits<E>,
 ) {
     match beyond.and_then(Extensions::shaded) {
-        Some(faces) => faces.shade::<S, EYE>(simd, scene, queue, hits),
+        Some(faces) => faces.shade::<S, EYE>(
+            simd,
+            #[inline(always)]
+            |order| {
+                let entry = &scene.entries[order];
+                let is_triangle = !entry.is_body && entry.kind == Kind::Triangle;
+                is_triangle.then(|| scene.shapes.triangle(entry.index as usize))
+            },
+            queue,
+            hits,
+        ),
         None if parts::BUILT.meshes => hits.forget_faces(),
         None => {}
     }

@@ -14,10 +14,9 @@ use rayfold_scene::Scene;
 use rayon::prelude::*;
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
-use crate::fast::build::prepare::Prepared;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Hits, ROOM, RayBatch};
-use crate::fast::rays::kind::Kind;
+use crate::fast::shapes::triangle::Triangle;
 use crate::meshes::{FaceHit, Faces, Run, hit_face};
 
 /// The faces of a scene, at least one of which has more than a triangle.
@@ -61,8 +60,9 @@ struct Gathered<E> {
     /// For lanes that hit glass: its index of refraction, and 1 if it is the inside of a closed body. 0 for all others.
     ior: [E; 16],
     is_filled: [E; 16],
-    /// The lanes whose faces have more than normals: the lane, and the index of the run in this list.
-    more: [(usize, usize); 16],
+    /// The lanes whose faces have more than normals: the lane, the index of the run in this list, and whether the face is
+    /// shaded by the functions of the reference tracer alone, because it has holes.
+    more: [(usize, usize, bool); 16],
     more_count: usize,
 }
 
@@ -77,12 +77,13 @@ impl<E: Real> ShadedFaces<E> {
     }
 
     /// Gives hits the normals and colours of their faces. Rays that go on from them start as from triangles.
-    /// `EYE` says that the rays start at the eye, and count for 1.
+    /// `EYE` says that the rays start at the eye, and count for 1. `triangle` returns the triangle that an object is, unless
+    /// it is a body.
     #[inline(never)]
-    pub(crate) fn shade<S: Simd, const EYE: bool>(
+    pub(crate) fn shade<'t, S: Simd, const EYE: bool>(
         &self,
         simd: S,
-        scene: &Prepared<E>,
+        triangle: impl Fn(usize) -> Option<&'t Triangle<E>>,
         queue: &RayBatch<E>,
         hits: &mut Hits<E>,
     ) {
@@ -94,10 +95,10 @@ impl<E: Real> ShadedFaces<E> {
                 let mut gathered = Gathered::new();
                 for packet in 0..hits.packets.len() {
                     let (at, _) = hits.packets[packet];
-                    self.gather(scene, hits, at..at + Lanes::<S, E>::LEN, &mut gathered);
+                    self.gather(&triangle, hits, at..at + Lanes::<S, E>::LEN, &mut gathered);
                     let weights = gathered.mix(simd, queue, hits, at);
                     if gathered.more_count > 0 {
-                        self.add_more::<S, EYE>(scene, queue, hits, (at, &gathered, weights));
+                        self.add_more::<S, EYE>(queue, hits, (at, &gathered, weights));
                     }
                 }
             },
@@ -115,7 +116,15 @@ impl<E: Real> ShadedFaces<E> {
     }
 
     #[inline(always)]
-    fn gather(&self, scene: &Prepared<E>, hits: &Hits<E>, lanes: Range<usize>, into: &mut Gathered<E>) {
+    fn gather<'t>(
+        &self,
+        triangle: impl Fn(usize) -> Option<&'t Triangle<E>>,
+        hits: &Hits<E>,
+        lanes: Range<usize>,
+        into: &mut Gathered<E>,
+    ) where
+        E: 't,
+    {
         into.more_count = 0;
         into.is_face = [E::narrow(0.0); 16];
         into.ior = [E::narrow(0.0); 16];
@@ -126,22 +135,19 @@ impl<E: Real> ShadedFaces<E> {
             let order = hits.order.0[at].to_index();
             let Some(run) = self.run_of(order) else { continue };
             let ShadedRun { orders, normals, is_shared, is_colored, ior, is_filled, .. } = &self.runs[run];
-            let entry = &scene.entries[order];
-            if *is_colored || entry.is_body && !is_shared {
-                into.more[into.more_count] = (lane, run);
+            let triangle = if *is_shared { None } else { triangle(order) };
+            let has_holes = triangle.is_none() && !is_shared;
+            if *is_colored || has_holes {
+                into.more[into.more_count] = (lane, run, has_holes);
                 into.more_count += 1;
             }
             if *is_shared {
                 self.gather_shared(run, hits.order.0[at], into, lane);
-                continue;
             }
-            if entry.is_body || entry.kind != Kind::Triangle {
-                continue;
-            }
+            let Some(triangle) = triangle else { continue };
             (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
             let normals = normals.get(order - orders.start).copied().unwrap_or([[E::narrow(0.0); 3]; 3]);
-            let edges = &scene.shapes.triangle(entry.index as usize).edges;
-            for (corner, (edge, normal)) in edges.iter().zip(normals).enumerate() {
+            for (corner, (edge, normal)) in triangle.edges.iter().zip(normals).enumerate() {
                 into.put(lane, corner, [edge.direction, edge.moment, normal]);
             }
         }
@@ -168,19 +174,18 @@ impl<E: Real> ShadedFaces<E> {
     #[inline(never)]
     fn add_more<S: Simd, const EYE: bool>(
         &self,
-        scene: &Prepared<E>,
         queue: &RayBatch<E>,
         hits: &mut Hits<E>,
         (at, gathered, weights): (usize, &Gathered<E>, [Lanes<S, E>; 3]),
     ) {
-        for &(of_packet, run) in &gathered.more[..gathered.more_count] {
+        for &(of_packet, run, has_holes) in &gathered.more[..gathered.more_count] {
             let lane = at + of_packet;
             let face_order = hits.order.0[lane].widen();
             let order = face_order as usize;
             let material = self.scene.objects[order].material();
             let (direction, face) = (read(&queue.direction, lane), read(&hits.face, lane));
             let ShadedRun { orders, index, is_shared, .. } = &self.runs[run];
-            let [color, glow] = if scene.entries[order].is_body && !is_shared {
+            let [color, glow] = if has_holes {
                 let (start, offset) = (read(&hits.start, lane), hits.sides[0].0[lane].widen());
                 let point = start - offset * face;
                 let hit = FaceHit { point, center: self.center, scale: self.scale, direction, face };
@@ -239,7 +244,7 @@ impl<E: Real> Gathered<E> {
             is_face: [E::narrow(0.0); 16],
             ior: [E::narrow(0.0); 16],
             is_filled: [E::narrow(0.0); 16],
-            more: [(0, 0); 16],
+            more: [(0, 0, false); 16],
             more_count: 0,
         }
     }
