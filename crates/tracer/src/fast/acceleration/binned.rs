@@ -16,6 +16,9 @@ const SLICES: usize = 16;
 const FEW: usize = 32;
 const FEW_SLICES: usize = 8;
 
+/// The level from which boxes are parted in equal halves, so that no tree is deep.
+const DEEP: usize = 40;
+
 /// The number of boxes up to which one thread makes a subtree.
 const ALONE: usize = 8192;
 
@@ -215,7 +218,7 @@ impl Grown {
         };
         let middles = items.par_chunks(CHUNK).map(|items| items.iter().fold(Span::EMPTY, middle));
         let middles = middles.reduce(|| Span::EMPTY, join);
-        let subtree = grow(&mut items, 0, middles, most);
+        let subtree = grow((&mut items, 0), middles, most, 0);
         let mut nodes = Vec::with_capacity(boxes.len());
         nodes.push(Twig::default());
         subtree.flatten(0, &mut nodes);
@@ -246,46 +249,69 @@ impl Subtree {
     }
 }
 
-/// Makes the subtree of items whose middles are within `middles`. `from` is the place of the first item.
-fn grow(items: &mut [Item], from: usize, middles: Span, most: usize) -> Subtree {
+/// Makes the subtree, at a level, of items whose middles are within `middles`. `from` is the place of the first item.
+fn grow((items, from): (&mut [Item], usize), middles: Span, most: usize, level: usize) -> Subtree {
     if items.len() <= ALONE.max(most) {
         let mut nodes = Vec::with_capacity(items.len());
         nodes.push(Twig::default());
-        grow_alone(&mut nodes, 0, (items, from), middles, most);
+        grow_alone((&mut nodes, 0), (items, from), middles, most, level);
         return Subtree::Nodes(nodes);
     }
-    let (middle, [one, other]) = part(items, middles);
+    let (middle, [one, other]) = part(items, middles, level);
     let (first, second) = items.split_at_mut(middle);
-    let (first, second) =
-        rayon::join(|| grow(first, from, one, most), || grow(second, from + middle, other, most));
+    let (first, second) = rayon::join(
+        || grow((first, from), one, most, level + 1),
+        || grow((second, from + middle), other, most, level + 1),
+    );
     Subtree::Pair(Box::new([first, second]))
 }
 
 fn grow_alone(
-    nodes: &mut Vec<Twig>,
-    at: usize,
+    (nodes, at): (&mut Vec<Twig>, usize),
     (items, from): (&mut [Item], usize),
     middles: Span,
     most: usize,
+    level: usize,
 ) {
     if items.len() <= most {
         nodes[at] = Twig { first: from as u32, count: items.len() as u32 };
         return;
     }
-    let (middle, [one, other]) = part(items, middles);
+    let (middle, [one, other]) = part(items, middles, level);
     let children = nodes.len();
     nodes[at] = Twig { first: children as u32, count: 0 };
     nodes.extend([Twig::default(); 2]);
     let (first, second) = items.split_at_mut(middle);
-    grow_alone(nodes, children, (first, from), one, most);
-    grow_alone(nodes, children + 1, (second, from + middle), other, most);
+    grow_alone((nodes, children), (first, from), one, most, level + 1);
+    grow_alone((nodes, children + 1), (second, from + middle), other, most, level + 1);
 }
 
 /// Parts items in two. Returns the number of the first ones, and the middles of both.
-fn part(items: &mut [Item], middles: Span) -> (usize, [Span; 2]) {
+fn part(items: &mut [Item], middles: Span, level: usize) -> (usize, [Span; 2]) {
+    if level >= DEEP {
+        return halve(items, middles);
+    }
     let parted = if items.len() < FEW { part_few(items, middles) } else { part_many(items, middles) };
     // All are in one place.
     parted.unwrap_or((items.len() / 2, [middles; 2]))
+}
+
+/// Parts items in halves across the axis along which their middles are farthest apart.
+fn halve(items: &mut [Item], middles: Span) -> (usize, [Span; 2]) {
+    let axis = (middles.high - middles.low).xyz().max_position();
+    let half = items.len() / 2;
+    let place = |item: &Item| (item.middle()[axis], item.index());
+    items.select_nth_unstable_by(half, |a, b| {
+        let (a, b) = (place(a), place(b));
+        a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+    });
+    let span = |items: &[Item]| {
+        items.iter().fold(Span::EMPTY, |mut span, item| {
+            span.add(item.middle());
+            span
+        })
+    };
+    (half, [span(&items[..half]), span(&items[half..])])
 }
 
 // Out of line, so that the slices are not on the stack of each level.
