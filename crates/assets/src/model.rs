@@ -274,10 +274,18 @@ impl Model {
         })
     }
 
-    /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is made at the first call,
-    /// and dropped with the model. If the model holds data of another type, it is made anew and not kept.
+    /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is kept, and dropped with
+    /// the model. Calls before the first has ended make it too, and the first to end counts. If the model holds data of
+    /// another type, it is made anew and not kept.
     pub fn derived<T: Any + Send + Sync>(&self, make: impl Fn() -> T) -> Arc<T> {
-        let kept = self.derived.0.get_or_init(|| Arc::new(make())).clone();
+        let kept = match self.derived.0.get() {
+            Some(kept) => kept.clone(),
+            None => {
+                // Nothing is locked meanwhile: a thread that waits for others in `make` may take up work that calls this.
+                let made: Arc<dyn Any + Send + Sync> = Arc::new(make());
+                self.derived.0.get_or_init(|| made).clone()
+            }
+        };
         kept.downcast().unwrap_or_else(|_| Arc::new(make()))
     }
 

@@ -133,7 +133,7 @@ impl Run {
         f64::from(whole) / f64::from(self.pictures.max(1))
     }
 
-    /// Returns the least and the median size of the pictures, as shares of the width or the height, whichever is less.
+    /// Returns the least and the median size of the pictures, as shares of the width or of the height: the lesser of the two.
     fn shares(&self) -> (f64, f64) {
         let share = |size: &String| {
             let (width, height) = size.split_once('x')?;
@@ -235,7 +235,7 @@ fn report(runs: &[Run], quietest: &[&Run]) -> String {
          - *Pointer to canvas* is the time from the pointer's event to the end of `putImageData` of the first picture \
          that was requested with it or after it; it excludes the browser's time to show its canvas.\n\
          - *Least size* and *median size* are those of the pictures while the object moves, as shares of the width or of \
-         the height, whichever is less. A smaller picture is stretched. Where even the smallest takes too long, its rays follow \
+         the height, the lesser of the two. A smaller picture is stretched. Where even the smallest takes too long, its rays follow \
          fewer mirrors and glass. In `clockwork` and `glass` nearly all surfaces mirror or are glass, so a change can reach \
          every pixel, and all of a picture is drawn.\n\
          - *Final after a rest* is the time from the last move to the final picture, which is the one of `rayfold \

@@ -1,7 +1,7 @@
 //! Models of many triangles, each drawn from one tree in the coordinates of the model.
 //!
 //! The tree stays with the model: it is made once, however often the model is drawn, and in how many frames. A ray is moved
-//! to where it enters the model's bounding sphere, so that no number there is greater than about 1. The triangles of one
+//! to just before it enters the model's bounding sphere, so that no number there is greater than about 2. The triangles of one
 //! model are tested with the same numbers for a ray, so that no ray passes between them, and with the bounds on errors of all
 //! triangles ([`Robust`]). The moved origin has an error of a few roundoffs of the model's position and size, and so has the
 //! distance: within the bound of bodies.
@@ -33,6 +33,9 @@ use crate::scale::below_inverse;
 
 /// The number of triangles that one thread makes at a time.
 const ALONE: usize = 4096;
+
+/// The distance from the middle at which rays begin, in radii of the bounding sphere: what touches the sphere is ahead of them.
+const FAR_ENOUGH: f64 = 1.125;
 
 /// The triangles of a model, in coordinates in which it is in a cube from -1 to 1.
 #[derive(Debug)]
@@ -140,6 +143,7 @@ impl Form for ModelForm {
 #[derive(Debug)]
 pub(super) struct SharedModel<E> {
     tree: Arc<ModelTree<E>>,
+    /// The radius of a sphere around it, at which rays begin.
     radius: E,
     /// The length in the scene of 1 in the coordinates of the tree, and its inverse.
     size: E,
@@ -157,13 +161,13 @@ impl<E: Real> SharedModel<E> {
     pub(super) fn new(form: ModelForm, model: &Model) -> Self {
         Self {
             tree: ModelTree::of(model),
-            radius: E::narrow(form.radius),
+            radius: E::narrow(FAR_ENOUGH * form.radius),
             size: E::narrow(form.size),
             inverse: E::narrow(1.0 / form.size),
         }
     }
 
-    /// Moves rays to where they enter the bounding sphere.
+    /// Moves rays to before they enter the bounding sphere.
     #[inline(always)]
     fn entering<S: Simd>(&self, simd: S, Local { origin, direction }: Local<S, E>) -> Entering<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
