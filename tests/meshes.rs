@@ -635,3 +635,23 @@ fn models_with_trees_of_their_own_are_exact_at_every_scale() {
         }
     }
 }
+
+/// Each of several pictures that begin together may make the tree of a model. The threads that make it share the work, and
+/// take up further pictures while they wait.
+#[test]
+fn pictures_that_begin_together_share_a_model() {
+    let library = Library::new(MemoryFiles::from([("fine.obj", obj(&ball(80), true, false))]));
+    let text = format!("{STAGE}Mesh \"fine.obj\" red\nTrace");
+    let parsed = parse_with_files("a.txt", text.as_bytes(), &Limits::default(), &library);
+    let scene = parsed.script.unwrap().frame(0).unwrap();
+    let options = RenderOptions { models: Some(true), ..RenderOptions::default() };
+    let (sender, receiver) = std::sync::mpsc::channel();
+    for _ in 0..8 {
+        let (scene, sender) = (scene.clone(), sender.clone());
+        rayon::spawn(move || sender.send(render(&scene, &options).unwrap()).unwrap());
+    }
+    let next =
+        || receiver.recv_timeout(std::time::Duration::from_secs(120)).expect("no thread waits for ever");
+    let first = next();
+    assert!((1..8).all(|_| next() == first));
+}

@@ -1,10 +1,14 @@
 //! The traversal of a tree by a packet of rays.
 
 use fearless_simd::Simd;
+use fearless_simd::prelude::*;
 
 use crate::fast::acceleration::tree::{Content, Node, Tree};
-use crate::fast::arithmetic::real::{Real, Vec3};
+use crate::fast::arithmetic::real::{Real, Vec3, constant};
+use crate::fast::arithmetic::rounding::distance_error;
+use crate::fast::rays::bounds::Crossing;
 use crate::fast::rays::kind::Kind;
+use crate::fast::rays::packet::{Nearest, Ray};
 
 /// The number of nodes on the stack: enough for a tree of 2³⁰ objects, with room for an unbalanced one.
 const WAITING: usize = 128;
@@ -67,4 +71,36 @@ pub(crate) fn descend<E: Real>(
 pub(crate) fn backwards<S: Simd, E: Real>(direction: Vec3<S, E>) -> [bool; 3] {
     let zero = E::narrow(0.0);
     [direction.x[0] < zero, direction.y[0] < zero, direction.z[0] < zero]
+}
+
+/// Visits the leaves that rays can hit no farther than their nearest hits so far, and returns the nearest hits. `visit` offers
+/// the hits with the objects of a leaf.
+#[inline(always)]
+pub(crate) fn nearest_in<S: Simd, E: Real>(
+    simd: S,
+    tree: &Tree<E>,
+    ray: Ray<S, E>,
+    nearest: Nearest<S, E>,
+    mut visit: impl FnMut(Kind, core::ops::Range<usize>, &mut Nearest<S, E>),
+) -> Nearest<S, E> {
+    let found = core::cell::Cell::new(nearest);
+    // A computed distance is below that of the box around its object by no more than this error.
+    let slack = constant::<S, E>(simd, distance_error::<E>());
+    let limit = core::cell::Cell::new(nearest.distance.mul_add(slack, nearest.distance + slack));
+    let crossing = Crossing::new(simd, ray);
+    descend(
+        tree,
+        backwards(ray.direction),
+        #[inline(always)]
+        |node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
+        #[inline(always)]
+        |kind, items| {
+            let mut nearest = found.get();
+            visit(kind, items, &mut nearest);
+            found.set(nearest);
+            limit.set(nearest.distance.mul_add(slack, nearest.distance + slack));
+            true
+        },
+    );
+    found.get()
 }

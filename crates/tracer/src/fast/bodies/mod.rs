@@ -45,10 +45,9 @@ pub(super) use self::solid::{Solid, body, reach};
 use self::torus::{Torus, TorusForm};
 use super::shapes::Shape as PlacedShape;
 use super::shapes::instance::{Turned, turned};
-use crate::fast::acceleration::descent::{backwards, descend};
+use crate::fast::acceleration::descent::nearest_in;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
-use crate::fast::rays::bounds::Crossing;
 use crate::fast::rays::packet::{Nearest, Ray, Surface};
 use crate::meshes::mesh;
 use crate::parts::BUILT;
@@ -497,30 +496,18 @@ impl<E: Real> Bodies<E> {
 
     #[inline(always)]
     fn meet_in_tree<S: Simd>(&self, simd: S, tree: &Tree<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
-        // A computed distance is below that of the box around its body by no more than this error.
-        let slack = constant::<S, E>(simd, crate::fast::arithmetic::rounding::distance_error::<E>());
-        let crossing = Crossing::new(simd, ray);
-        let found = core::cell::Cell::new(*nearest);
-        descend(
+        *nearest = nearest_in(
+            simd,
             tree,
-            backwards(ray.direction),
+            ray,
+            *nearest,
             #[inline(always)]
-            |node| {
-                let distance = found.get().distance;
-                let limit = distance.mul_add(slack, distance + slack);
-                crossing.intersects(simd, node.low, node.high, limit).any_true()
-            },
-            #[inline(always)]
-            |_, items| {
-                let mut nearest = found.get();
+            |_, items, nearest| {
                 for body in &self.bodies[items] {
-                    body.intersect(simd, ray, &mut nearest);
+                    body.intersect(simd, ray, nearest);
                 }
-                found.set(nearest);
-                true
             },
         );
-        *nearest = found.get();
     }
 
     /// Offers the hits of the rays with the planes. A plane needs only one axis.

@@ -17,11 +17,10 @@ use rayon::prelude::*;
 
 use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
-use crate::fast::acceleration::descent::{backwards, descend};
+use crate::fast::acceleration::descent::nearest_in;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
 use crate::fast::arithmetic::real::{Lanes, Real, constant, splat};
-use crate::fast::arithmetic::rounding::distance_error;
-use crate::fast::rays::bounds::{Bounds, Crossing};
+use crate::fast::rays::bounds::Bounds;
 use crate::fast::rays::kind::{ByKind, Kind};
 use crate::fast::rays::packet::{Nearest, Ray, no_lane};
 use crate::fast::shapes::shape::Robust;
@@ -193,34 +192,18 @@ impl<E: Real> SharedModel<E> {
                 let far = constant::<S, E>(simd, E::FAR);
                 let Entering { ray, start } = self.entering(simd, local);
                 let distance = (nearest.distance - start) * splat::<S, E>(simd, self.inverse);
-                // A computed distance is below that of the box around its triangle by no more than this error.
-                let slack = constant::<S, E>(simd, distance_error::<E>());
-                let found = core::cell::Cell::new(Nearest { distance, order: far });
-                let limit = core::cell::Cell::new(distance.mul_add(slack, distance + slack));
-                let crossing = Crossing::new(simd, ray);
                 let aimed = RayPrecalculations::new(simd, ray);
-                descend(
+                let Nearest { distance, order: face } = nearest_in(
+                    simd,
                     tree,
-                    backwards(ray.direction),
+                    ray,
+                    Nearest { distance, order: far },
                     #[inline(always)]
-                    |node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
-                    #[inline(always)]
-                    |_, items| {
-                        let mut nearest = found.get();
+                    |_, items, nearest| {
                         let leaf = (Kind::Triangle, items);
-                        self.tree.shapes.intersect::<S, Robust, false>(
-                            simd,
-                            leaf,
-                            ray,
-                            Some(aimed),
-                            &mut nearest,
-                        );
-                        found.set(nearest);
-                        limit.set(nearest.distance.mul_add(slack, nearest.distance + slack));
-                        true
+                        self.tree.shapes.intersect::<S, Robust, false>(simd, leaf, ray, Some(aimed), nearest);
                     },
                 );
-                let Nearest { distance, order: face } = found.get();
                 let hit = face.simd_lt(far);
                 if !hit.any_true() {
                     return;

@@ -6,10 +6,9 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use crate::fast::acceleration::candidates::{CandidateSet, Candidates};
-use crate::fast::acceleration::descent::{backwards, descend};
+use crate::fast::acceleration::descent::{backwards, descend, nearest_in};
 use crate::fast::acceleration::tree::Tree;
 use crate::fast::arithmetic::real::{Mask, Real, Vec3, constant, splat};
-use crate::fast::arithmetic::rounding::distance_error;
 use crate::fast::build::features::Features;
 use crate::fast::build::prepare::{Prepared, Sunlight};
 use crate::fast::rays::bounds::Crossing;
@@ -106,28 +105,18 @@ fn nearest_in_tree<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     tree: &Tree<E>,
     ray: Ray<S, E>,
 ) -> Nearest<S, E> {
-    let found = core::cell::Cell::new(Nearest::none(simd));
-    // A computed distance is below that of the box around its object by no more than this error.
-    let slack = constant::<S, E>(simd, distance_error::<E>());
-    let limit = core::cell::Cell::new(found.get().distance);
-    let crossing = Crossing::new(simd, ray);
     let aimed = RayPrecalculations::new(simd, ray);
-    descend(
+    nearest_in(
+        simd,
         tree,
-        backwards(ray.direction),
+        ray,
+        Nearest::none(simd),
         #[inline(always)]
-        |node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
-        #[inline(always)]
-        |kind, items| {
-            let mut nearest = found.get();
+        |kind, items, nearest| {
             let leaf = (F::one_of_these(kind), items);
-            scene.shapes.intersect::<S, F::By, EYE>(simd, leaf, ray, Some(aimed), &mut nearest);
-            found.set(nearest);
-            limit.set(nearest.distance.mul_add(slack, nearest.distance + slack));
-            true
+            scene.shapes.intersect::<S, F::By, EYE>(simd, leaf, ray, Some(aimed), nearest);
         },
-    );
-    found.get()
+    )
 }
 
 #[inline(always)]
