@@ -559,11 +559,25 @@ impl<E: Real> Bodies<E> {
         far: Lanes<S, E>,
         lit: Mask<S, E>,
     ) -> Mask<S, E> {
-        let mut nearest = Nearest::none(simd);
-        // Lanes in the dark get a negative distance, so that nothing is searched for them.
-        nearest.distance = lit.select(far, constant::<S, E>(simd, -1.0));
-        let limit = nearest.distance;
-        self.intersect(simd, bits, ray, &mut nearest);
+        // Apart, so that scenes without planes keep the search of the tree in registers.
+        let lit = if self.has_planes() { self.unoccluded_by_planes(simd, ray, far, lit) } else { lit };
+        let Some(tree) = self.tree() else { return lit };
+        let (mut nearest, limit) = shadow_limit(simd, far, lit);
+        self.meet_bounded(simd, (tree, bits), ray, &mut nearest);
+        lit & !nearest.distance.simd_lt(limit)
+    }
+
+    /// Returns the rays of `lit` that hit no plane nearer than `far`.
+    #[inline(never)]
+    fn unoccluded_by_planes<S: Simd>(
+        &self,
+        simd: S,
+        ray: Ray<S, E>,
+        far: Lanes<S, E>,
+        lit: Mask<S, E>,
+    ) -> Mask<S, E> {
+        let (mut nearest, limit) = shadow_limit(simd, far, lit);
+        self.meet_planes_out_of_line(simd, ray, &mut nearest);
         lit & !nearest.distance.simd_lt(limit)
     }
 
@@ -578,4 +592,16 @@ impl<E: Real> Bodies<E> {
     ) -> Surface<S, E> {
         self.bodies[at].surface(simd, order, ray, distance)
     }
+}
+
+/// Returns what shadow rays start a search with, and the distances at which they are still lit. Lanes in the dark get a
+/// negative distance, so that nothing is searched for them.
+#[inline(always)]
+fn shadow_limit<S: Simd, E: Real>(
+    simd: S,
+    far: Lanes<S, E>,
+    lit: Mask<S, E>,
+) -> (Nearest<S, E>, Lanes<S, E>) {
+    let distance = lit.select(far, constant::<S, E>(simd, -1.0));
+    (Nearest { distance, ..Nearest::none(simd) }, distance)
 }
