@@ -146,7 +146,7 @@ fn the_page_gives_what_the_program_says() {
         .skip(1)
         .map(|rest| rest.split("```").next().unwrap().split_once('\n').unwrap())
         .collect();
-    assert_eq!(examples.len(), 3, "50 x 512 x 512, 1,000 x 1080p, 10,000 x 720p");
+    assert_eq!(examples.len(), 4, "50 x 512 x 512, 1,000 x 1080p, 10,000 x 720p, and these on Arm");
     for (command, expected) in examples {
         assert_eq!(out(&folder, command), expected, "$ rayfold {command}");
     }

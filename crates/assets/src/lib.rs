@@ -17,6 +17,8 @@
 //! # Ok::<(), rayfold_assets::AssetError>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod closure;
 mod decode;
 mod error;

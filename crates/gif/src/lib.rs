@@ -38,6 +38,8 @@
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod alone;
 mod block;
 mod bound;

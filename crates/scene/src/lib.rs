@@ -14,6 +14,8 @@
 //! assert_eq!(parsed.diagnostics[0].help.as_deref(), Some("did you mean `Sphere`?"));
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod command;
 mod container;
 mod curve;

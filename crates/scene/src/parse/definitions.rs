@@ -94,7 +94,7 @@ impl Reach {
     pub(super) fn placed(self, row: &Row) -> (f64, f64) {
         let [x, y, z] = [0, 1, 2].map(|i| row.largest(i).unwrap_or(0.0));
         let scale = row.largest(6).unwrap_or(1.0);
-        (x.hypot(y).hypot(z) + scale * self.distance, scale * self.scale)
+        (libm::hypot(libm::hypot(x, y), z) + scale * self.distance, scale * self.scale)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Single rays through the kernels that pictures are made with.
+//! Single rays through the kernels that pictures are made with, and fingerprints of pictures.
 //!
 //! Hard cases are about rays that no camera sends; here they can be sent one by one, to any kernel.
 
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd};
 use glam::DVec3;
-use rayfold_scene::Scene;
+use rayfold_scene::{Scene, Script};
 
 use super::bodies::ANY;
 use super::has_kernels;
@@ -26,7 +26,30 @@ use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::search::nearest;
 use crate::fast::transport::surfaces::surface;
 use crate::meshes::{Faces, Shared};
-use crate::{Precision, RenderError, RenderOptions};
+use crate::{Precision, RenderError, RenderOptions, picture_of_frame};
+
+/// The number that a fingerprint begins with, and the factor of each step.
+///
+/// Source: Fowler, Noll and Vo, FNV-1a with 64 bits.
+const FNV: (u64, u64) = (0xcbf2_9ce4_8422_2325, 0x0100_0000_01b3);
+
+/// Returns a number for the pictures of the first and of the middle frame of a script. It is the same on every machine,
+/// as the pictures are.
+///
+/// # Errors
+/// The errors of [`crate::render`].
+pub fn fingerprint(script: &Script, options: &RenderOptions) -> Result<u64, RenderError> {
+    let pictures = [0, script.frame_count() / 2]
+        .into_iter()
+        .filter_map(|frame| picture_of_frame(script, frame, options))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(hash(pictures.iter().flat_map(|picture| picture.as_bytes().iter().copied())))
+}
+
+/// Returns a number for some bytes, the same on every machine.
+pub fn hash(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(FNV.0, |number, byte| (number ^ u64::from(byte)).wrapping_mul(FNV.1))
+}
 
 /// What a ray meets first.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use crate::fast::acceleration::tree::{Content, Node, Tree};
-use crate::fast::arithmetic::real::{Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Real, Vec3, constant};
 use crate::fast::arithmetic::rounding::distance_error;
 use crate::fast::rays::bounds::Crossing;
 use crate::fast::rays::kind::Kind;
@@ -86,7 +86,7 @@ pub(crate) fn nearest_in<S: Simd, E: Real>(
     let found = core::cell::Cell::new(nearest);
     // A computed distance is below that of the box around its object by no more than this error.
     let slack = constant::<S, E>(simd, distance_error::<E>());
-    let limit = core::cell::Cell::new(nearest.distance.mul_add(slack, nearest.distance + slack));
+    let limit = core::cell::Cell::new(nearest.distance.fused_mul_add(slack, nearest.distance + slack));
     let crossing = Crossing::new(simd, ray);
     descend(
         tree,
@@ -98,7 +98,7 @@ pub(crate) fn nearest_in<S: Simd, E: Real>(
             let mut nearest = found.get();
             visit(kind, items, &mut nearest);
             found.set(nearest);
-            limit.set(nearest.distance.mul_add(slack, nearest.distance + slack));
+            limit.set(nearest.distance.fused_mul_add(slack, nearest.distance + slack));
             true
         },
     );

@@ -1,7 +1,7 @@
 //! The two number types that the kernels are written for, and packets of them.
 //!
 //! A kernel is generic over the number (`f32`, `f64`) and over the instruction set. Every lane of a packet goes through
-//! the same operations, fused multiply-add included, at any width. So pictures are equal bit for bit between widths: a
+//! the same operations at any width; products are added by [`Fused`]. So pictures are equal bit for bit between widths: a
 //! kernel reduces across lanes only to decide which work can be skipped.
 
 use fearless_simd::prelude::*;
@@ -103,6 +103,38 @@ impl Real for f64 {
     }
 }
 
+/// Products that are added and rounded once, on every machine.
+pub(crate) trait Fused<S: Simd>: SimdFloat<S> {
+    /// Returns `self · factor + other`.
+    #[inline(always)]
+    fn fused_mul_add(self, factor: Self, other: Self) -> Self {
+        if has_fused::<S, Self>() { self.mul_add(factor, other) } else { emulated(self, factor, other) }
+    }
+
+    /// Returns `self · factor - other`.
+    #[inline(always)]
+    fn fused_mul_sub(self, factor: Self, other: Self) -> Self {
+        if has_fused::<S, Self>() { self.mul_sub(factor, other) } else { emulated(self, factor, -other) }
+    }
+}
+
+impl<S: Simd, T: SimdFloat<S>> Fused<S> for T {}
+
+/// Returns whether the instruction set has a fused multiply-add. With packets of 128 bits that of Arm alone has one.
+#[inline(always)]
+fn has_fused<S: Simd, T: SimdFloat<S>>() -> bool {
+    cfg!(target_arch = "aarch64") || size_of::<T>() > 16
+}
+
+// Out of line: it takes some forty instructions.
+#[inline(never)]
+fn emulated<S: Simd, T: SimdFloat<S>>(x: T, factor: T, other: T) -> T {
+    x.token().vectorize(
+        #[inline(always)]
+        || x.mul_add_precise(factor, other),
+    )
+}
+
 /// Returns a packet with the same number in every lane.
 #[inline(always)]
 pub(crate) fn splat<S: Simd, E: Real>(simd: S, x: E) -> Lanes<S, E> {
@@ -178,9 +210,9 @@ impl<S: Simd, E: Real> Vec3<S, E> {
     #[inline(always)]
     pub(crate) fn scale_add(self, factor: Lanes<S, E>, other: Self) -> Self {
         Self {
-            x: self.x.mul_add(factor, other.x),
-            y: self.y.mul_add(factor, other.y),
-            z: self.z.mul_add(factor, other.z),
+            x: self.x.fused_mul_add(factor, other.x),
+            y: self.y.fused_mul_add(factor, other.y),
+            z: self.z.fused_mul_add(factor, other.z),
         }
     }
 
@@ -188,29 +220,29 @@ impl<S: Simd, E: Real> Vec3<S, E> {
     #[inline(always)]
     pub(crate) fn scale_sub(self, factor: Lanes<S, E>, other: Self) -> Self {
         Self {
-            x: self.x.mul_sub(factor, other.x),
-            y: self.y.mul_sub(factor, other.y),
-            z: self.z.mul_sub(factor, other.z),
+            x: self.x.fused_mul_sub(factor, other.x),
+            y: self.y.fused_mul_sub(factor, other.y),
+            z: self.z.fused_mul_sub(factor, other.z),
         }
     }
 
     #[inline(always)]
     pub(crate) fn dot(self, other: Self) -> Lanes<S, E> {
-        self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
+        self.x.fused_mul_add(other.x, self.y.fused_mul_add(other.y, self.z * other.z))
     }
 
     /// Returns `self · other + start`.
     #[inline(always)]
     pub(crate) fn dot_add(self, other: Self, start: Lanes<S, E>) -> Lanes<S, E> {
-        self.x.mul_add(other.x, self.y.mul_add(other.y, self.z.mul_add(other.z, start)))
+        self.x.fused_mul_add(other.x, self.y.fused_mul_add(other.y, self.z.fused_mul_add(other.z, start)))
     }
 
     #[inline(always)]
     pub(crate) fn cross(self, other: Self) -> Self {
         Self {
-            x: self.y.mul_sub(other.z, self.z * other.y),
-            y: self.z.mul_sub(other.x, self.x * other.z),
-            z: self.x.mul_sub(other.y, self.y * other.x),
+            x: self.y.fused_mul_sub(other.z, self.z * other.y),
+            y: self.z.fused_mul_sub(other.x, self.x * other.z),
+            z: self.x.fused_mul_sub(other.y, self.y * other.x),
         }
     }
 

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Side, Surface};
 
@@ -63,11 +63,11 @@ impl<E: Real> Capsule<E> {
         let enter_b = hits_b.select(higher - half_b, far);
         let leave_b = hits_b.select(higher + half_b, back);
         // The cylinder, cut off at both ends.
-        let a = direction.x.mul_add(direction.x, direction.y * direction.y);
-        let b = place.x.mul_add(direction.x, place.y * direction.y);
-        let c = place.x.mul_add(place.x, place.y * place.y) - square;
-        let x = place.x.mul_sub(direction.y, place.y * direction.x);
-        let discriminant = square.mul_sub(a, x * x);
+        let a = direction.x.fused_mul_add(direction.x, direction.y * direction.y);
+        let b = place.x.fused_mul_add(direction.x, place.y * direction.y);
+        let c = place.x.fused_mul_add(place.x, place.y * place.y) - square;
+        let x = place.x.fused_mul_sub(direction.y, place.y * direction.x);
+        let discriminant = square.fused_mul_sub(a, x * x);
         let is_along = a.simd_eq(zero);
         let root = discriminant.max(zero).sqrt();
         let inverse = one / a;
@@ -104,7 +104,8 @@ impl<E: Real> Capsule<E> {
         let z = place.z.max(zero).min(splat::<S, E>(simd, self.height));
         let normal = Vec3::<S, E>::new(place.x, place.y, place.z - z).normalize(simd);
         let radius = splat::<S, E>(simd, self.radius);
-        let point = Vec3::<S, E>::new(normal.x * radius, normal.y * radius, normal.z.mul_add(radius, z));
+        let point =
+            Vec3::<S, E>::new(normal.x * radius, normal.y * radius, normal.z.fused_mul_add(radius, z));
         BodyHit { point, normal: normal.scale(within.select(zero - one, one)), within }
     }
 }
@@ -145,7 +146,7 @@ impl Form for CapsuleForm {
 
     fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
         let over = place.z - place.z.clamp(0.0, self.height);
-        (place.x.hypot(place.y).hypot(over) - self.radius).abs() <= near
+        (libm::hypot(libm::hypot(place.x, place.y), over) - self.radius).abs() <= near
     }
 
     fn ball(&self, frame: &Frame) -> (DVec3, f64) {

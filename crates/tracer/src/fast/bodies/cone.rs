@@ -17,7 +17,7 @@ use rayfold_scene::model::unit;
 
 use super::solid::{Form, Frame, Place, flat};
 use super::{BodyHit, Local};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Plain, Side, Surface};
 
@@ -65,15 +65,15 @@ impl<E: Real> Cone<E> {
         let nearest = zero - origin.dot(direction);
         let place = direction.scale_add(nearest, origin);
         let slope = splat::<S, E>(simd, self.slope);
-        let radius = slope.mul_add(place.z, splat::<S, E>(simd, self.radii[0]));
+        let radius = slope.fused_mul_add(place.z, splat::<S, E>(simd, self.radii[0]));
         let growth = slope * direction.z;
-        let a = direction.x.mul_add(direction.x, direction.y * direction.y) - growth * growth;
-        let b = place.x.mul_add(direction.x, place.y * direction.y) - radius * growth;
-        let c = place.x.mul_add(place.x, place.y * place.y) - radius * radius;
-        let nx = radius.mul_sub(direction.x, growth * place.x);
-        let ny = radius.mul_sub(direction.y, growth * place.y);
-        let x = place.x.mul_sub(direction.y, place.y * direction.x);
-        let discriminant = nx.mul_add(nx, ny * ny) - x * x;
+        let a = direction.x.fused_mul_add(direction.x, direction.y * direction.y) - growth * growth;
+        let b = place.x.fused_mul_add(direction.x, place.y * direction.y) - radius * growth;
+        let c = place.x.fused_mul_add(place.x, place.y * place.y) - radius * radius;
+        let nx = radius.fused_mul_sub(direction.x, growth * place.x);
+        let ny = radius.fused_mul_sub(direction.y, growth * place.y);
+        let x = place.x.fused_mul_sub(direction.y, place.y * direction.x);
+        let discriminant = nx.fused_mul_add(nx, ny * ny) - x * x;
         let widens = a.simd_gt(zero);
         let misses = widens & discriminant.simd_lt(zero);
         // Neither root subtracts numbers of the same sign.
@@ -142,9 +142,9 @@ impl<E: Real> Cone<E> {
         let cap = is_b.select(height, zero);
         let z = is_side.select(place.z.max(zero).min(height), cap);
 
-        let apart = place.x.mul_add(place.x, place.y * place.y).sqrt();
+        let apart = place.x.fused_mul_add(place.x, place.y * place.y).sqrt();
         let is_tip = apart.simd_eq(zero);
-        let spread = ray.direction.x.mul_add(ray.direction.x, ray.direction.y * ray.direction.y).sqrt();
+        let spread = ray.direction.x.fused_mul_add(ray.direction.x, ray.direction.y * ray.direction.y).sqrt();
         let length = is_tip.select(spread, apart);
         let inverse = length.simd_gt(zero).select(one / length, zero);
         let x = is_tip.select(zero - ray.direction.x, place.x) * inverse;
@@ -153,7 +153,7 @@ impl<E: Real> Cone<E> {
         let [at_a, at_b] = self.radii;
         let (at_a, at_b) = (splat::<S, E>(simd, at_a), splat::<S, E>(simd, at_b));
         let rim = is_b.select(at_b, at_a);
-        let radius = is_side.select(slope.mul_add(z, at_a), apart.min(rim));
+        let radius = is_side.select(slope.fused_mul_add(z, at_a), apart.min(rim));
         let up = is_b.select(one, zero - one);
         let normal = Vec3::<S, E>::new(
             is_side.select(x, zero),
@@ -202,7 +202,7 @@ impl Form for ConeForm {
 
     fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
         let &Self { radii: [a, b], height, .. } = self;
-        let (z, aside) = (place.z, place.x.hypot(place.y));
+        let (z, aside) = (place.z, libm::hypot(place.x, place.y));
         let radius = a + (b - a) * (z / height).clamp(0.0, 1.0);
         let ends = z.abs().min((z - height).abs());
         let within = z >= -near && z <= height + near;
@@ -211,7 +211,7 @@ impl Form for ConeForm {
     }
 
     fn ball(&self, frame: &Frame) -> (DVec3, f64) {
-        let radius = self.radii[0].max(self.radii[1]).hypot(0.5 * self.height);
+        let radius = libm::hypot(self.radii[0].max(self.radii[1]), 0.5 * self.height);
         (0.5 * (frame.center + self.end), radius)
     }
 

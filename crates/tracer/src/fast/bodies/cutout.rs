@@ -152,7 +152,7 @@ impl Form for CutoutForm {
     }
 
     fn is_near(&self, place: DVec3, near: f64, is_slanted: bool) -> bool {
-        is_slanted && place.z.abs() <= near && place.x.hypot(place.y) <= self.radius + near
+        is_slanted && place.z.abs() <= near && libm::hypot(place.x, place.y) <= self.radius + near
     }
 
     fn ball(&self, frame: &Frame) -> (DVec3, f64) {

@@ -7,7 +7,7 @@ use rayfold_scene::model::unit;
 
 use super::Local;
 use super::solid::{Form, Frame, Place, flat};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, constant, splat};
 use crate::fast::bodies::plane;
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Plain, Surface};
@@ -33,7 +33,7 @@ impl<E: Real> Disc<E> {
         let (hit, distance) = plane::along(simd, ray);
         let distance = hit.select(distance, constant::<S, E>(simd, 0.0));
         let place = ray.direction.scale_add(distance, ray.origin);
-        let apart = place.x.mul_add(place.x, place.y * place.y);
+        let apart = place.x.fused_mul_add(place.x, place.y * place.y);
         (hit & apart.simd_le(splat::<S, E>(simd, self.square)), distance)
     }
 }
@@ -61,7 +61,7 @@ impl Form for DiscForm {
     }
 
     fn is_near(&self, place: DVec3, near: f64, is_slanted: bool) -> bool {
-        is_slanted && place.z.abs() <= near && place.x.hypot(place.y) <= self.radius + near
+        is_slanted && place.z.abs() <= near && libm::hypot(place.x, place.y) <= self.radius + near
     }
 
     fn ball(&self, frame: &Frame) -> (DVec3, f64) {

@@ -47,7 +47,7 @@ use super::shapes::Shape as PlacedShape;
 use super::shapes::instance::{Turned, turned};
 use crate::fast::acceleration::descent::nearest_in;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::{Nearest, Ray, Surface};
 use crate::meshes::mesh;
 use crate::parts::BUILT;
@@ -361,8 +361,10 @@ impl<E: Real> Body<E> {
                 };
                 let BodyHit { point, normal, within } = met;
                 let size = point.x.abs() + point.y.abs() + point.z.abs();
-                let offset = size
-                    .mul_add(constant::<S, E>(simd, OFFSET * E::ROUNDOFF), splat::<S, E>(simd, self.offset));
+                let offset = size.fused_mul_add(
+                    constant::<S, E>(simd, OFFSET * E::ROUNDOFF),
+                    splat::<S, E>(simd, self.offset),
+                );
                 Surface { start: normal.scale_add(offset, point), normal, offset, within }
             },
         )

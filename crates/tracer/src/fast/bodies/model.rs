@@ -19,7 +19,7 @@ use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
 use crate::fast::acceleration::descent::nearest_in;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
-use crate::fast::arithmetic::real::{Lanes, Real, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::rays::kind::{ByKind, Kind};
 use crate::fast::rays::packet::{Nearest, Ray, no_lane};
@@ -208,8 +208,9 @@ impl<E: Real> SharedModel<E> {
                 if !hit.any_true() {
                     return;
                 }
-                let distance = distance.mul_add(splat::<S, E>(simd, self.size), start);
-                let mut orders = face.mul_add(constant::<S, E>(simd, ONE_FACE), splat::<S, E>(simd, order));
+                let distance = distance.fused_mul_add(splat::<S, E>(simd, self.size), start);
+                let mut orders =
+                    face.fused_mul_add(constant::<S, E>(simd, ONE_FACE), splat::<S, E>(simd, order));
                 if !self.tree.looks.is_empty() {
                     orders = self.with_looks(simd, hit.to_bitmask(), face, orders);
                 }

@@ -25,7 +25,7 @@ use glam::{DMat3, DVec3};
 
 use super::solid::{Form, Frame, Place, flat};
 use super::{BodyHit, Local};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Plain, Side, Surface};
 
@@ -102,7 +102,7 @@ impl<S: Simd, E: Real> Slab<S, E> {
     /// Returns the place of rays beyond it at a parameter.
     #[inline(always)]
     fn beyond(&self, simd: S, at: Lanes<S, E>) -> Lanes<S, E> {
-        let place = at.mul_add(self.direction, self.place);
+        let place = at.fused_mul_add(self.direction, self.place);
         place - place.max(constant::<S, E>(simd, 0.0) - self.half).min(self.half)
     }
 
@@ -189,7 +189,7 @@ impl<S: Simd, E: Real> Slabs<S, E> {
         let inverse = constant::<S, E>(simd, 1.0) / a;
         // As a cross product, because the squares of the vectors cancel.
         let across = from.cross(along);
-        let discriminant = square.mul_sub(a, across.dot(across));
+        let discriminant = square.fused_mul_sub(a, across.dot(across));
         let at = (zero - from.dot(along) - discriminant.max(zero).sqrt()) * inverse;
         let enters = discriminant.simd_ge(zero) & a.simd_gt(zero);
         Entry { at, from_core: along.scale_add(at, from), enters }
@@ -214,8 +214,8 @@ fn later<S: Simd, E: Real>(
     square: Lanes<S, E>,
 ) -> Lanes<S, E> {
     let (u, v) = (one.beyond(simd, at), other.beyond(simd, at));
-    let is_outside = u.mul_add(u, v * v).simd_gt(square);
-    let slope = u.mul_add(one.direction, v * other.direction);
+    let is_outside = u.fused_mul_add(u, v * v).simd_gt(square);
+    let slope = u.fused_mul_add(one.direction, v * other.direction);
     let goes_down = slope.simd_lt(constant::<S, E>(simd, 0.0));
     (is_outside & goes_down).select(begin.max(at), begin)
 }
@@ -268,9 +268,9 @@ impl<E: Real> Roundbox<E> {
         let moment = origin.cross(direction);
         let Vec3 { x: dx, y: dy, z: dz } = direction;
         let (dx, dy, dz) = (dx.abs(), dy.abs(), dz.abs());
-        moment.x.abs().simd_le(y.mul_add(dz, z.mul_add(dy, slack)))
-            & moment.y.abs().simd_le(z.mul_add(dx, x.mul_add(dz, slack)))
-            & moment.z.abs().simd_le(x.mul_add(dy, y.mul_add(dx, slack)))
+        moment.x.abs().simd_le(y.fused_mul_add(dz, z.fused_mul_add(dy, slack)))
+            & moment.y.abs().simd_le(z.fused_mul_add(dx, x.fused_mul_add(dz, slack)))
+            & moment.z.abs().simd_le(x.fused_mul_add(dy, y.fused_mul_add(dx, slack)))
     }
 
     /// Returns the hits of the rays and their distances, at least all that are no farther than `before`.
@@ -320,7 +320,7 @@ impl<E: Real> Roundbox<E> {
             // The length of the normal is 1 but for rounding errors, of which a step of Newton's method leaves none.
             let normal = place.sub(in_core).scale(splat::<S, E>(simd, self.inverse));
             let half = constant::<S, E>(simd, -0.5);
-            let normal = normal.scale(normal.dot(normal).mul_add(half, constant::<S, E>(simd, 1.5)));
+            let normal = normal.scale(normal.dot(normal).fused_mul_add(half, constant::<S, E>(simd, 1.5)));
             (normal, start.dot(start).simd_lt(self.square(simd)))
         };
         let point = normal.scale_add(splat::<S, E>(simd, self.radius), in_core);

@@ -15,7 +15,7 @@ use rayfold_scene::model::unit;
 
 use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Ring, Surface};
 
@@ -58,19 +58,19 @@ impl<S: Simd, E: Real> Chord<S, E> {
     #[inline(always)]
     fn outside(&self, t: Lanes<S, E>) -> Lanes<S, E> {
         let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
-        let over = x.mul_add(x, y * y).sqrt() - self.ring;
-        over.mul_add(over, z * z) - self.square
+        let over = x.fused_mul_add(x, y * y).sqrt() - self.ring;
+        over.fused_mul_add(over, z * z) - self.square
     }
 
     /// Returns s and its derivative along the ray, which may be NaN on the axis.
     #[inline(always)]
     fn outside_and_slope(&self, t: Lanes<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
         let Vec3 { x, y, z } = self.direction.scale_add(t, self.place);
-        let apart = x.mul_add(x, y * y).sqrt();
+        let apart = x.fused_mul_add(x, y * y).sqrt();
         let over = apart - self.ring;
-        let outwards = x.mul_add(self.direction.x, y * self.direction.y) / apart;
-        let half_slope = over.mul_add(outwards, z * self.direction.z);
-        (over.mul_add(over, z * z) - self.square, half_slope + half_slope)
+        let outwards = x.fused_mul_add(self.direction.x, y * self.direction.y) / apart;
+        let half_slope = over.fused_mul_add(outwards, z * self.direction.z);
+        (over.fused_mul_add(over, z * z) - self.square, half_slope + half_slope)
     }
 }
 
@@ -93,7 +93,7 @@ impl<E: Real> Torus<E> {
         let place = direction.scale_add(middle, origin);
         let outer = (ring + tube) * constant::<S, E>(simd, 1.0 + 8.0 * E::ROUNDOFF);
         let near = place.dot(place);
-        let half_chord = outer.mul_sub(outer, near).max(zero).sqrt();
+        let half_chord = outer.fused_mul_sub(outer, near).max(zero).sqrt();
         // The interval in which the ray is between the planes that touch the torus from above and below.
         let inverse = constant::<S, E>(simd, 1.0) / direction.z;
         let wide = tube * constant::<S, E>(simd, 1.0 + 8.0 * E::ROUNDOFF);
@@ -118,7 +118,7 @@ impl<E: Real> Torus<E> {
         // A quarter of the quartic's derivative: t³ + p·t + v.
         let near_turn = outer * constant::<S, E>(simd, NEAR_TURN);
         let twice = (ring + ring) * ring * direction.z;
-        let p = twice.mul_add(direction.z, near - ring.mul_add(ring, tube * tube));
+        let p = twice.fused_mul_add(direction.z, near - ring.fused_mul_add(ring, tube * tube));
         let v = twice * place.z;
         let cubic = Cubic::<S, E> { p, v };
         let turn = (zero - p * constant::<S, E>(simd, 1.0 / 3.0)).max(zero).sqrt();
@@ -181,7 +181,7 @@ impl<E: Real> Torus<E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
         let (ring, tube) = (splat::<S, E>(simd, self.ring), splat::<S, E>(simd, self.tube));
         let place = ray.direction.scale_add(distance, ray.origin);
-        let apart = place.x.mul_add(place.x, place.y * place.y).sqrt();
+        let apart = place.x.fused_mul_add(place.x, place.y * place.y).sqrt();
         let part = ring / apart;
         let circle = Vec3::<S, E>::new(place.x * part, place.y * part, zero);
         let outward = place.sub(circle).normalize(simd);
@@ -205,7 +205,7 @@ struct Cubic<S: Simd, E: Real> {
 impl<S: Simd, E: Real> Cubic<S, E> {
     #[inline(always)]
     fn at(&self, t: Lanes<S, E>) -> Lanes<S, E> {
-        t.mul_add(t, self.p).mul_add(t, self.v)
+        t.fused_mul_add(t, self.p).fused_mul_add(t, self.v)
     }
 }
 
@@ -228,7 +228,7 @@ fn cubic_root<S: Simd, E: Real>(
             break;
         }
         let here = cubic.at(root);
-        let step = here / (three * root).mul_add(root, cubic.p);
+        let step = here / (three * root).fused_mul_add(root, cubic.p);
         let next = (root - step).max(from).min(to);
         let moves = here.simd_ne(zero) & (next - root).abs().simd_gt(near);
         root = (open & here.simd_ne(zero)).select(next, root);
@@ -252,7 +252,7 @@ fn bracketed<S: Simd, E: Real>(
     value: impl Fn(Lanes<S, E>) -> (Lanes<S, E>, Lanes<S, E>),
 ) -> Lanes<S, E> {
     let (zero, half) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 0.5));
-    let middle = half.mul_add(low, half * high);
+    let middle = half.fused_mul_add(low, half * high);
     let secant = low + (high - low) * (at_low / (at_low - at_high));
     let mut place = (secant.simd_gt(low) & secant.simd_lt(high)).select(secant, middle);
     let (mut root, mut open) = (place, wanted);
@@ -265,7 +265,7 @@ fn bracketed<S: Simd, E: Real>(
         let is_before = here.simd_gt(zero);
         low = (open & is_before).select(place, low);
         high = (open & !is_before).select(place, high);
-        let middle = half.mul_add(low, half * high);
+        let middle = half.fused_mul_add(low, half * high);
         let tangent = place - here / slope;
         let is_between = tangent.simd_gt(low) & tangent.simd_lt(high);
         let stays = (tangent - place).abs().simd_le(error);
@@ -305,8 +305,8 @@ impl Form for TorusForm {
     }
 
     fn is_near(&self, place: DVec3, near: f64, _: bool) -> bool {
-        let aside = place.x.hypot(place.y);
-        ((aside - self.radius).hypot(place.z) - self.thickness).abs() <= near
+        let aside = libm::hypot(place.x, place.y);
+        (libm::hypot(aside - self.radius, place.z) - self.thickness).abs() <= near
     }
 
     fn ball(&self, frame: &Frame) -> (DVec3, f64) {

@@ -75,7 +75,7 @@ struct Range {
     /// products.
     most: f64,
     /// The upper limit for positions in the script, which are stored as whole numbers.
-    count: usize,
+    count: u64,
 }
 
 const SINGLE: Range = Range { least: 1e-15, most: 1e15, count: 1 << f32::MANTISSA_DIGITS };
@@ -142,7 +142,7 @@ impl Range {
         // Written so that a NaN is rejected.
         widest < self.most
             && colors.largest < self.most
-            && scene.objects.len() < self.count
+            && (scene.objects.len() as u64) < self.count
             && all(&geometry.solids, is_held)
     }
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayfold_scene::Tone;
 
 use crate::cover::{Lit, NOTHING};
-use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, Vec3, constant};
 use crate::fast::film::tone::{encoded, levels};
 use crate::fast::rays::bounce::{Column, Columns, packet_shape};
 use crate::parallel::CHANNELS;
@@ -193,5 +193,5 @@ fn write(pixels: &[u32], bytes: &mut [u8]) {
 fn level<S: Simd, E: Real>(simd: S, channel: Lanes<S, E>) -> Lanes<S, E> {
     let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));
     let known = channel.simd_eq(channel).select(channel, zero);
-    known.max(zero).min(one).mul_add(constant::<S, E>(simd, 255.0), constant::<S, E>(simd, 0.5))
+    known.max(zero).min(one).fused_mul_add(constant::<S, E>(simd, 255.0), constant::<S, E>(simd, 0.5))
 }

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::Background;
 
-use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, Vec3, constant};
 use crate::fast::rays::bounce::{Column, Hits, RayBatch};
 use crate::pictures::Panorama;
 
@@ -71,7 +71,7 @@ pub(crate) fn show_sky<S: Simd, E: Real, const EYE: bool>(
             let far = constant::<S, E>(simd, E::FAR);
             let mut packets = hits.packets.iter().map(|&(at, _)| at).peekable();
             for at in (0..count).step_by(Lanes::<S, E>::LEN) {
-                let height = Vec3::<S, E>::load(simd, &queue.direction, at).y.mul_add(half, half);
+                let height = Vec3::<S, E>::load(simd, &queue.direction, at).y.fused_mul_add(half, half);
                 let seen = Vec3::splat(simd, sky.rise).scale_add(height, Vec3::splat(simd, sky.low));
                 let seen = if EYE { seen } else { seen.mul(Vec3::load(simd, &queue.weight, at)) };
                 let color = if packets.next_if_eq(&at).is_some() {

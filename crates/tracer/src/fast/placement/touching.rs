@@ -18,7 +18,7 @@ pub(crate) fn ring_on_sphere(radius: f64, r: f64, apart: f64, slack: f64) -> f64
     let angle = |q: f64| {
         let near = radius - apart;
         let square = (q - near) * (q + near) / (4.0 * radius * apart).max(f64::MIN_POSITIVE);
-        2.0 * square.clamp(0.0, 1.0).sqrt().asin()
+        2.0 * libm::asin(square.clamp(0.0, 1.0).sqrt())
     };
     radius * (angle(r + slack) - angle((r - slack).max(0.0)))
 }

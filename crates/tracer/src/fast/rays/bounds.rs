@@ -7,7 +7,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant};
 use crate::fast::arithmetic::rounding::{BOX, LATE_IN_TREE};
 use crate::fast::rays::packet::{Ray, Slopes};
 
@@ -57,9 +57,9 @@ impl<S: Simd, E: Real> Crossing<S, E> {
     pub(crate) fn span(&self, simd: S, low: [E; 3], high: [E; 3]) -> (Lanes<S, E>, Lanes<S, E>) {
         let (low, high) = (Vec3::splat(simd, low), Vec3::splat(simd, high));
         let (inverse, shift) = (self.inverse, self.shift);
-        let (ax, bx) = (low.x.mul_add(inverse.x, shift.x), high.x.mul_add(inverse.x, shift.x));
-        let (ay, by) = (low.y.mul_add(inverse.y, shift.y), high.y.mul_add(inverse.y, shift.y));
-        let (az, bz) = (low.z.mul_add(inverse.z, shift.z), high.z.mul_add(inverse.z, shift.z));
+        let (ax, bx) = (low.x.fused_mul_add(inverse.x, shift.x), high.x.fused_mul_add(inverse.x, shift.x));
+        let (ay, by) = (low.y.fused_mul_add(inverse.y, shift.y), high.y.fused_mul_add(inverse.y, shift.y));
+        let (az, bz) = (low.z.fused_mul_add(inverse.z, shift.z), high.z.fused_mul_add(inverse.z, shift.z));
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz)).max(constant::<S, E>(simd, 0.0));
         let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz));
         (enter, leave * constant::<S, E>(simd, 1.0 + LATE_IN_TREE * E::ROUNDOFF))

@@ -4,12 +4,11 @@
 //! fractions.
 
 use fearless_simd::Simd;
-use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 
 use crate::camera::Axis;
-use crate::fast::arithmetic::real::{Lanes, Real, Vec3, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, Vec3, splat};
 use crate::fast::rays::view::View;
 
 /// The rays of a view.
@@ -122,8 +121,8 @@ impl<E: Real> Steps<E> {
     /// Returns the coordinates of samples, whose indices count from the anchor.
     #[inline(always)]
     fn at<S: Simd>(&self, simd: S, index: Lanes<S, E>) -> Lanes<S, E> {
-        let rest = index.mul_add(splat::<S, E>(simd, self.rest), splat::<S, E>(simd, self.at_anchor));
-        index.mul_add(splat::<S, E>(simd, self.step), rest)
+        let rest = index.fused_mul_add(splat::<S, E>(simd, self.rest), splat::<S, E>(simd, self.at_anchor));
+        index.fused_mul_add(splat::<S, E>(simd, self.step), rest)
     }
 }
 
@@ -156,6 +155,6 @@ impl<E: Real> AlongAxis<E> {
     pub(crate) fn origin<S: Simd>(&self, simd: S, i: Lanes<S, E>, j: Lanes<S, E>) -> Vec3<S, E> {
         let pixel = splat::<S, E>(simd, self.pixel);
         let corner = Vec3::<S, E>::splat(simd, self.corner);
-        Vec3::<S, E>::new(i.mul_add(pixel, corner.x), j.mul_add(pixel, corner.y), corner.z)
+        Vec3::<S, E>::new(i.fused_mul_add(pixel, corner.x), j.fused_mul_add(pixel, corner.y), corner.z)
     }
 }

@@ -6,7 +6,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::{Nearest, Ray, Slopes, Surface, no_lane};
 use crate::fast::rays::predicate::Place;
 use crate::fast::shapes::cuboid::Cuboid;
@@ -32,12 +32,13 @@ impl<E: Real> Tests<Sphere<E>, E> for Naive {
     ) {
         if EYE {
             let middle = Vec3::splat(simd, sphere.center).dot(ray.direction);
-            let rest = middle.mul_sub(middle, splat::<S, E>(simd, sphere.power));
+            let rest = middle.fused_mul_sub(middle, splat::<S, E>(simd, sphere.power));
             return roots(simd, middle, rest, sphere.order, nearest);
         }
         let from_center = ray.origin.sub(Vec3::splat(simd, sphere.center));
         let half = from_center.dot(ray.direction);
-        let rest = half.mul_sub(half, from_center.dot(from_center) - splat::<S, E>(simd, sphere.square));
+        let rest =
+            half.fused_mul_sub(half, from_center.dot(from_center) - splat::<S, E>(simd, sphere.square));
         let middle = constant::<S, E>(simd, 0.0) - half;
         roots(simd, middle, rest, sphere.order, nearest);
     }

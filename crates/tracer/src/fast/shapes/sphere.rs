@@ -6,7 +6,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::arithmetic::rounding::OFFSET;
 use crate::fast::lights::sun::Sun;
 use crate::fast::rays::bounds::Bounds;
@@ -55,9 +55,9 @@ impl placed::RenderSpaceShape for RenderSpaceSphere {
         let (x, depth) = (self.center.dot(axis), -self.center.dot(back));
         let radius = self.radius + 2.0 * slack;
         (depth > radius).then(|| {
-            let (angle, half) = (x.atan2(depth), (radius / x.hypot(depth)).asin());
+            let (angle, half) = (libm::atan2(x, depth), libm::asin(radius / libm::hypot(x, depth)));
             // A generous bound for the rounding errors of the three functions.
-            ((angle - half).tan() * (1.0 + 1e-12) - 1e-12, (angle + half).tan() * (1.0 + 1e-12) + 1e-12)
+            (libm::tan(angle - half) * (1.0 + 1e-12) - 1e-12, libm::tan(angle + half) * (1.0 + 1e-12) + 1e-12)
         })
     }
 
@@ -79,7 +79,7 @@ impl placed::RenderSpaceShape for RenderSpaceSphere {
     }
 
     fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64 {
-        (self.center.dot(x).hypot(self.center.dot(y)) - self.radius).abs()
+        (libm::hypot(self.center.dot(x), self.center.dot(y)) - self.radius).abs()
     }
 
     /// Returns whether errors are invisible. An outline has the errors of a point on it. A shadow on the sphere or a
@@ -170,7 +170,7 @@ impl<E: Real> Sphere<E> {
             }
         } else {
             // A sum without cancellation: every ray from within hits the sphere, also a grazing ray from its surface.
-            let half_chord = middle.mul_add(middle, -power).sqrt();
+            let half_chord = middle.fused_mul_add(middle, -power).sqrt();
             let far = ahead.select(middle + half_chord, middle - half_chord);
             let distance = ahead.select(far, power / far);
             nearest.offer(simd, distance.simd_gt(zero), distance, self.order);
@@ -266,8 +266,8 @@ impl<E: Real> Circle<E> {
     #[inline(always)]
     fn occludes<S: Simd>(&self, simd: S, point: Vec3<S, E>) -> Mask<S, E> {
         let Vec3 { x, y, z } = Vec3::splat(simd, self.center).sub(point);
-        let rest = splat::<S, E>(simd, self.square) - x.mul_add(x, y * y);
-        let ahead = z.mul_add(z.abs(), rest);
+        let rest = splat::<S, E>(simd, self.square) - x.fused_mul_add(x, y * y);
+        let ahead = z.fused_mul_add(z.abs(), rest);
         let zero = constant::<S, E>(simd, 0.0);
         rest.simd_ge(zero) & ahead.simd_gt(zero)
     }

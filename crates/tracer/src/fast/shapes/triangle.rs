@@ -6,7 +6,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
 
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::arithmetic::rounding::{
     CONSTANT, EDGE_ON, GRAZING, OFFSET, SIDE_OF_PIXEL, VOLUME, distance_error, side_of_going_on,
 };
@@ -120,7 +120,7 @@ impl<E: Real> Edge<E> {
         let side = Vec3::splat(simd, self.moment).dot(ray.direction);
         let side = Vec3::splat(simd, self.direction).dot_add(moment.moment, side);
         let slack =
-            moment.reach.mul_add(splat::<S, E>(simd, self.slack.1), splat::<S, E>(simd, self.slack.0));
+            moment.reach.fused_mul_add(splat::<S, E>(simd, self.slack.1), splat::<S, E>(simd, self.slack.0));
         (side + slack, side - slack)
     }
 }

@@ -90,7 +90,7 @@ impl Surface {
             Self::Ball { center, radius } => (*center, *radius),
             Self::Side(side) => {
                 let half = 0.5 * side.height;
-                (side.end + half * side.axis, half.hypot(side.radii[0].max(side.radii[1])))
+                (side.end + half * side.axis, libm::hypot(half, side.radii[0].max(side.radii[1])))
             }
             Self::Ring(ring) => (ring.center, ring.radius + ring.thickness),
         }

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use crate::fast::acceleration::candidates::{CandidateSet, Candidates, Masks, Picked};
 use crate::fast::acceleration::light_buffer::{LightBuffer, Seen};
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant};
 use crate::fast::bodies::ANY;
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{BUILT, Features};
@@ -128,9 +128,9 @@ pub(crate) fn add_sun_light<S: Simd, E: Real, F: Features<E>, const SHADOWS: boo
                 let diffuse = Vec3::load(simd, &hits.diffuse, at);
                 let color = Vec3::load(simd, &hits.color, at);
                 let lit = Vec3::<S, E>::new(
-                    diffuse.x.mul_add(sum.x, color.x),
-                    diffuse.y.mul_add(sum.y, color.y),
-                    diffuse.z.mul_add(sum.z, color.z),
+                    diffuse.x.fused_mul_add(sum.x, color.x),
+                    diffuse.y.fused_mul_add(sum.y, color.y),
+                    diffuse.z.fused_mul_add(sum.z, color.z),
                 );
                 lit.store(&mut hits.color, at);
             }
@@ -288,9 +288,9 @@ pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
     let diffuse = Vec3::load(simd, diffuse, at);
     let color = Vec3::load(simd, colors, at);
     let lit = Vec3::<S, E>::new(
-        diffuse.x.mul_add(sum.x, color.x),
-        diffuse.y.mul_add(sum.y, color.y),
-        diffuse.z.mul_add(sum.z, color.z),
+        diffuse.x.fused_mul_add(sum.x, color.x),
+        diffuse.y.fused_mul_add(sum.y, color.y),
+        diffuse.z.fused_mul_add(sum.z, color.z),
     );
     let lit = match gloss {
         Some(gloss) if gloss.is_seen => {

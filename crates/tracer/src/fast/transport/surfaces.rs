@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::Features;
 use crate::fast::build::prepare::{Entry, Prepared};
@@ -251,7 +251,8 @@ pub(crate) fn mirrored<S: Simd, E: Real>(simd: S, incoming: Vec3<S, E>, normal: 
     let towards = incoming.dot(normal).min(constant::<S, E>(simd, 0.0));
     let direction = normal.scale_add(towards * constant::<S, E>(simd, -2.0), incoming);
     // A step of Newton's method keeps the length at 1.
-    let stretch = direction.dot(direction).mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
+    let stretch =
+        direction.dot(direction).fused_mul_add(constant::<S, E>(simd, -0.5), constant::<S, E>(simd, 1.5));
     direction.scale(stretch)
 }
 

@@ -109,7 +109,7 @@ fn intersect(torus: &Torus, ray: Ray) -> Option<(f64, bool)> {
         let place = near + u * ray.direction;
         let z = height + u * rise;
         let aside = (place - place.dot(axis) * axis).length();
-        (aside - ring).hypot(z) - tube
+        libm::hypot(aside - ring, z) - tube
     };
     // A quarter of the derivative of q: u³ + p·u + v.
     let p = near.length_squared() - ring * ring - tube * tube + 2.0 * ring * ring * rise * rise;

@@ -10,6 +10,12 @@
 //! rayfold-bench fingerprints scenes --random 10000 > after.txt
 //! cmp before.txt after.txt
 //! ```
+//!
+//! With `--check` it compares other pictures with a table that is kept: those that every kind of machine must draw
+//! alike ([`machines`]).
+
+mod machines;
+mod scripts;
 
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hasher};
@@ -25,6 +31,7 @@ use rayfold_scene::{
 use rayfold_tracer::{Precision, RenderOptions, probe, reference, render, render_naive};
 use rayon::prelude::*;
 
+use self::machines::Machine;
 use crate::backends::levels;
 
 /// The options of the subcommand.
@@ -38,13 +45,37 @@ pub struct Args {
     /// Seed of the first random scene; the others have the seeds that follow
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Draw the examples and this many `--random` scripts of all versions of the language, and compare them with the table
+    /// of fingerprints: this machine, with each of its instruction sets, draws the same pictures as every other
+    #[arg(long, conflicts_with_all = ["folders", "seed"])]
+    check: bool,
+    /// With `--check`: draw them on another kind of machine, too, which is emulated
+    #[arg(long, value_enum, requires = "check", value_name = "MACHINE")]
+    on: Vec<Machine>,
+    /// Write that table anew
+    #[arg(long, conflicts_with_all = ["folders", "seed", "check"])]
+    write: bool,
 }
 
 /// Draws all pictures and prints a line for each.
 ///
 /// # Errors
-/// Fails if a folder cannot be read, a script is wrong or a scene cannot be rendered.
+/// Fails if a folder cannot be read, a script is wrong or a scene cannot be rendered, or if a picture is not that of
+/// the table.
 pub fn run(args: &Args) -> Result<()> {
+    if args.check || args.write {
+        ensure!(
+            args.random % machines::IN_A_LINE == 0,
+            "--random must be a multiple of {}",
+            machines::IN_A_LINE
+        );
+    }
+    if args.write {
+        return machines::write(args.random);
+    }
+    if args.check {
+        return machines::check(args.random, &args.on);
+    }
     let mut scripts = Vec::new();
     for folder in &args.folders {
         find(folder, &mut scripts)?;
