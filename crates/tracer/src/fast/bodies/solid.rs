@@ -144,6 +144,24 @@ impl Solid {
         (center, radius + WIDER * self.extent())
     }
 
+    /// Returns the axis of two parallel planes around it, half of their distance, as computed, if its bounding sphere is centred
+    /// between them. `None` for shapes that are not flat.
+    pub(super) fn slab(&self) -> Option<(DVec3, f64)> {
+        let axes = self.frame.axes;
+        let shortest = |half: DVec3| {
+            let number = half.to_array().iter().position(|&length| length == half.min_element())?;
+            Some((axes[number], half[number]))
+        };
+        match &self.form {
+            AnyForm::Disc(_) => Some((axes[2], 0.0)),
+            AnyForm::Cone(form) => Some((axes[2], 0.5 * form.height)),
+            AnyForm::Torus(form) => Some((axes[2], form.thickness)),
+            AnyForm::Cuboid(form) => shortest(form.half),
+            AnyForm::Roundbox(form) => shortest(form.half),
+            AnyForm::Plane(_) | AnyForm::Capsule(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => None,
+        }
+    }
+
     /// Returns its bounding box; `None` for a plane.
     pub(in crate::fast) fn bounds(&self) -> Option<Bounds> {
         let (low, high) = self.form.form().bounds(&self.frame)?;

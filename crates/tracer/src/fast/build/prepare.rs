@@ -20,6 +20,7 @@ use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{BUILT, Needs};
 use crate::fast::lights::sun::{Direction, Outline, Outlines, Sun};
 use crate::fast::materials::fog::Fog;
+use crate::fast::materials::glass::GlassBits;
 use crate::fast::materials::sky::Sky;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::placement::tile_lists::TileLists;
@@ -111,6 +112,8 @@ pub(crate) struct Prepared<E> {
     /// The bounding spheres of the objects of the row and of the bodies with bounding boxes, for scenes with glass and
     /// few objects.
     balls: Option<[BoundingSpheres; 2]>,
+    /// The objects of glass, if shadow rays ask for them apart.
+    glass_bits: Option<GlassBits>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -152,7 +155,7 @@ impl<E: Real> Prepared<E> {
         let surroundings = scene.surroundings();
         let sky = Sky::new(surroundings);
         let panorama = Panorama::of(scene);
-        let beyond = Extensions::new(scene, geometry);
+        let mut beyond = Extensions::new(scene, geometry);
         let shared = geometry.shared.clone().filter(|_| BUILT.beyond);
         needs.beyond = beyond.is_some() || sky.is_some() || panorama.is_some() || shared.is_some();
         needs.glass = beyond.as_ref().is_some_and(Extensions::has_glass);
@@ -170,6 +173,8 @@ impl<E: Real> Prepared<E> {
         let sights = (search == Search::Lists)
             .then(|| TileLists::new(&geometry.view, standing.shapes(), row, grid, E::ROUNDOFF))
             .flatten();
+        let glass_bits = beyond.as_mut().filter(|_| needs.glass && search == Search::Masks);
+        let glass_bits = glass_bits.and_then(|beyond| beyond.part_glass(standing.orders()));
         let boxes = beyond.as_ref().and_then(Extensions::bodies).and_then(Bodies::boxes);
         let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search, boxes)).collect();
         let balls = (needs.glass && search == Search::Masks).then(|| {
@@ -214,6 +219,7 @@ impl<E: Real> Prepared<E> {
             beyond,
             shared,
             balls,
+            glass_bits,
         })
     }
 
@@ -286,6 +292,22 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn has_glass(&self) -> bool {
         BUILT.glass && self.needs.glass
+    }
+
+    /// Returns the objects of glass, if shadow rays ask for opaque objects first, and for those after them.
+    #[inline(always)]
+    pub(crate) fn glass_apart(&self) -> Option<GlassBits> {
+        if BUILT.glass { self.glass_bits } else { None }
+    }
+
+    /// Returns the objects that shadow rays ask for first, as bits: of the row of all objects, and of the bodies. They are all,
+    /// or the opaque ones.
+    #[inline(always)]
+    pub(crate) fn asked_first(&self) -> [u64; 2] {
+        match self.glass_apart() {
+            Some(GlassBits { shapes, bodies }) => [!shapes, !bodies],
+            None => [u64::MAX, ANY],
+        }
     }
 
     /// Returns all objects: by masks, or the whole tree.
@@ -362,11 +384,21 @@ struct Standing<'a> {
 }
 
 impl Standing<'_> {
-    /// Returns the shapes in the order of the row.
-    fn shapes(&self) -> impl Iterator<Item = &Shape> {
+    /// Returns the solids in the order of the row.
+    fn in_row(&self) -> impl Iterator<Item = &Solid> {
         let mut places = vec![];
         Kind::each(|kind| places.push(&self.sorted.of(kind)[..]));
-        places.into_iter().flatten().map(|&place| &self.solids[place as usize].shape)
+        places.into_iter().flatten().map(|&place| &self.solids[place as usize])
+    }
+
+    /// Returns the shapes in the order of the row.
+    fn shapes(&self) -> impl Iterator<Item = &Shape> {
+        self.in_row().map(|solid| &solid.shape)
+    }
+
+    /// Returns the positions in the script in the order of the row.
+    fn orders(&self) -> impl Iterator<Item = u32> {
+        self.in_row().map(|solid| solid.order)
     }
 
     /// Returns a sun and its occluders. `boxes` are those of the bodies, if there are few.

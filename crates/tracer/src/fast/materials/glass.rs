@@ -23,6 +23,15 @@ pub(crate) struct Glass<E> {
     faint: f64,
 }
 
+/// The objects of glass, as bits, in scenes whose shadow rays ask for opaque objects first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlassBits {
+    /// Those of the row of all objects.
+    pub(crate) shapes: u64,
+    /// Those of the bodies that have bounding boxes.
+    pub(crate) bodies: u64,
+}
+
 /// The transmission of an object of glass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pane<E> {

@@ -68,10 +68,20 @@ impl<E: Real> Line<E> {
     /// Adds some lanes of a packet.
     #[inline(always)]
     fn push<S: Simd>(&mut self, numbers: [Lanes<S, E>; NUMBERS], lanes: Mask<S, E>) {
+        if !lanes.any_true() {
+            return;
+        }
         if self.end + Lanes::<S, E>::LEN > self.columns[0].len() {
             self.move_up(Lanes::<S, E>::LEN);
         }
         let room = self.end..self.end + Lanes::<S, E>::LEN;
+        if lanes.all_true() {
+            for (column, numbers) in self.columns.iter_mut().zip(numbers) {
+                numbers.store_slice(&mut column[room.clone()]);
+            }
+            self.end = room.end;
+            return;
+        }
         for (column, numbers) in self.columns.iter_mut().zip(numbers) {
             numbers.compress(lanes).store_slice(&mut column[room.clone()]);
         }
@@ -243,13 +253,18 @@ impl<'a, E: Real> RayQueues<'a, E> {
 
     /// Adds the colours of the rays in the batch to the sums.
     pub(crate) fn add(&mut self, queue: &RayBatch<E>, hits: &Hits<E>) {
-        for (ray, pixel) in queue.pixel.0[..queue.count].iter().enumerate() {
-            let pixel = pixel.to_index();
-            for (sums, color) in self.sums.iter_mut().zip(&hits.color) {
-                let color = color.0[ray].widen();
+        let zero = E::narrow(0.0);
+        for (sums, color) in self.sums.iter_mut().zip(&hits.color) {
+            let sums = &mut sums[..ROOM];
+            for (pixel, color) in queue.pixel.0[..queue.count].iter().zip(&color.0) {
+                // Most hits are on glass, and have no colour of their own.
+                if *color == zero {
+                    continue;
+                }
+                let color = color.widen();
                 #[cfg(feature = "accuracy")]
                 crate::nans::add(color.is_nan().into());
-                sums[pixel] += i128::from((color * ONE) as i64);
+                sums[pixel.to_index()] += i128::from((color * ONE) as i64);
             }
         }
     }
@@ -258,9 +273,19 @@ impl<'a, E: Real> RayQueues<'a, E> {
     pub(crate) fn sum_up(&self, pixels: &mut Columns<E>) {
         for (pixels, sums) in pixels.iter_mut().zip(&self.sums) {
             for (pixel, sum) in pixels.0.iter_mut().zip(sums) {
-                *pixel += E::narrow(*sum as f64 / ONE);
+                *pixel += E::narrow(real(*sum) / ONE);
             }
         }
+    }
+}
+
+/// Returns the number nearest to a sum.
+#[inline(always)]
+fn real(sum: i128) -> f64 {
+    // Nearly all sums are short, and rounded much faster.
+    match i64::try_from(sum) {
+        Ok(short) => short as f64,
+        Err(_) => sum as f64,
     }
 }
 
