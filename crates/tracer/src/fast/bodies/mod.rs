@@ -489,7 +489,9 @@ impl<E: Real> Bodies<E> {
         nearest: &mut Nearest<S, E>,
     ) {
         match &self.few {
-            Some(few) if bits != ANY => self.meet_few(simd, (few, bits), ray, nearest),
+            Some(few) if bits != ANY || few.is_short => {
+                self.meet_few(simd, (few, bits & few.all), ray, nearest)
+            }
             Some(_) | None => self.meet_in_tree(simd, tree, ray, nearest),
         }
     }
@@ -649,9 +651,9 @@ impl<E: Real> Bodies<E> {
         let lit = if has_planes { self.unoccluded_by_planes(simd, ray, far, lit) } else { lit };
         let Some(tree) = self.tree() else { return lit };
         if let Some(few) = &self.few
-            && bits != ANY
+            && (bits != ANY || few.is_short)
         {
-            return self.unoccluded_by_few(simd, (few, bits), ray, far, lit);
+            return self.unoccluded_by_few(simd, (few, bits & few.all), ray, far, lit);
         }
         let (mut nearest, limit) = shadow_limit(simd, far, lit);
         self.meet_in_tree(simd, tree, ray, &mut nearest);

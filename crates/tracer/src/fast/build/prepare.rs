@@ -16,6 +16,7 @@ use crate::fast::acceleration::lists::LISTED;
 use crate::fast::acceleration::tree::{Tree, stump};
 use crate::fast::arithmetic::real::Real;
 use crate::fast::bodies::{ANY, Bodies};
+use crate::fast::build::enclosures::{Enclosure, enclosures};
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{BUILT, Needs};
 use crate::fast::lights::sun::{Direction, Outline, Outlines, Sun};
@@ -114,6 +115,8 @@ pub(crate) struct Prepared<E> {
     balls: Option<[BoundingSpheres; 2]>,
     /// The objects of glass, if shadow rays ask for them apart.
     glass_bits: Option<GlassBits>,
+    /// The objects of glass within which rays meet little else, by their orders, in scenes of few objects.
+    enclosures: Vec<Option<Enclosure>>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -175,6 +178,12 @@ impl<E: Real> Prepared<E> {
             .flatten();
         let glass_bits = beyond.as_mut().filter(|_| needs.glass && search == Search::Masks);
         let glass_bits = glass_bits.and_then(|beyond| beyond.part_glass(standing.orders()));
+        let glass = beyond.as_ref().and_then(Extensions::glass).filter(|_| search == Search::Masks);
+        let enclosures = glass.map(|glass| {
+            let in_row: Vec<&Solid> = standing.in_row().collect();
+            let has_inside = |order| glass.has_inside(E::narrow(f64::from(order)));
+            enclosures(&in_row, (row, counts), has_inside)
+        });
         let boxes = beyond.as_ref().and_then(Extensions::bodies).and_then(Bodies::boxes);
         let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search, boxes)).collect();
         let balls = (needs.glass && search == Search::Masks).then(|| {
@@ -220,6 +229,7 @@ impl<E: Real> Prepared<E> {
             shared,
             balls,
             glass_bits,
+            enclosures: enclosures.unwrap_or_default(),
         })
     }
 
@@ -292,6 +302,18 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn has_glass(&self) -> bool {
         BUILT.glass && self.needs.glass
+    }
+
+    /// Returns whether rays can be within objects of glass whose surroundings are known.
+    #[inline(always)]
+    pub(crate) fn has_enclosures(&self) -> bool {
+        BUILT.glass && !self.enclosures.is_empty()
+    }
+
+    /// Returns what rays meet within the object of this order, if it is known.
+    #[inline(always)]
+    pub(crate) fn enclosure(&self, order: usize) -> Option<&Enclosure> {
+        self.enclosures.get(order)?.as_ref()
     }
 
     /// Returns the objects of glass, if shadow rays ask for opaque objects first, and for those after them.

@@ -86,7 +86,17 @@ impl Finishes {
             vec![]
         };
         let scene = scene.clone();
-        Some(Self { scene, center, scale, has_patterns, has_highlights, glows, least_cosines, mirrors, shines })
+        Some(Self {
+            scene,
+            center,
+            scale,
+            has_patterns,
+            has_highlights,
+            glows,
+            least_cosines,
+            mirrors,
+            shines,
+        })
     }
 
     /// Whether any object glows.

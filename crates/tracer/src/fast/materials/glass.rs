@@ -76,6 +76,11 @@ impl<E: Real> Glass<E> {
         self.panes[order.to_index()].as_ref()
     }
 
+    /// Returns whether the object with this order is of glass and has an inside.
+    pub(crate) fn has_inside(&self, order: E) -> bool {
+        self.of(order).is_some_and(|pane| !pane.is_flat)
+    }
+
     /// Returns the lanes whose rays, of this weight, are followed.
     #[inline(always)]
     pub(crate) fn followed<S: Simd>(

@@ -307,6 +307,22 @@ pub(crate) fn shows<S: Simd, E: Real>(
     (scatters(simd, hits, at), shines)
 }
 
+/// Returns whether any hit scatters light.
+#[inline(never)]
+pub(crate) fn show_light<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for &(at, _) in &hits.packets {
+                if scatters(simd, hits, at).any_true() {
+                    return true;
+                }
+            }
+            false
+        },
+    )
+}
+
 /// Returns the hits of a packet that scatter light.
 #[inline(always)]
 fn scatters<S: Simd, E: Real>(simd: S, hits: &Hits<E>, at: usize) -> Mask<S, E> {
@@ -347,7 +363,7 @@ pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
     lit.store(colors, at);
 }
 
-/// How far the starts of shadow rays may move on their way through glass, in roundoffs of 1 and of their coordinates: at each
+/// The distance by which shadow rays may move aside on their way through glass, in roundoffs of 1 and of their coordinates: at each
 /// surface twice the offset of a start, which is at most 256 roundoffs of them; there are at most 512 surfaces.
 const MOVED: f64 = 16_777_216.0;
 
