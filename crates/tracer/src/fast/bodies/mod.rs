@@ -380,6 +380,9 @@ pub(super) struct Bodies<E> {
     /// The planes first, then the other bodies in the order of the tree's leaves.
     bodies: Vec<Body<E>>,
     planes: usize,
+    /// The planes that shadow rays ask for first: all, or the first ones, which are opaque, if those of glass are asked for
+    /// apart.
+    first_planes: usize,
     way: Way<E>,
     /// The bounding volumes of the bodies of the tree, if a mask has enough bits.
     few: Option<BodyCuller<E>>,
@@ -413,7 +416,27 @@ impl<E: Real> Bodies<E> {
             None => Way::Planes,
         };
         let bodies = planes.iter().map(|solid| Body::new(solid, objects, holes)).collect();
-        Self { bodies, planes: count, way, few }
+        Self { bodies, planes: count, first_planes: count, way, few }
+    }
+
+    /// Lets shadow rays ask for glass apart from opaque bodies. Returns the bodies of glass as bits, or `None` if there are too
+    /// many bodies for a mask, or if some are glass in part.
+    pub(super) fn part_glass(&mut self, is_glass: impl Fn(E) -> bool) -> Option<u64> {
+        if self.few.is_none() && self.bodies.len() > self.planes {
+            return None;
+        }
+        if self.bodies.iter().any(|body| {
+            let first = body.order.to_index();
+            let mut looks = (first..first + body.looks).map(|order| E::narrow(order as f64));
+            body.looks > 1 && looks.any(&is_glass)
+        }) {
+            return None;
+        }
+        // Glass comes last.
+        let (planes, bounded) = self.bodies.split_at(self.planes);
+        self.first_planes = planes.partition_point(|plane| !is_glass(plane.order));
+        let bits = bounded.iter().enumerate().map(|(bit, body)| u64::from(is_glass(body.order)) << bit);
+        Some(bits.sum())
     }
 
     /// Returns, for each object that is a body, its order in the script and the body's index here.
@@ -468,7 +491,9 @@ impl<E: Real> Bodies<E> {
         nearest: &mut Nearest<S, E>,
     ) {
         match &self.few {
-            Some(few) if bits != ANY => self.meet_few(simd, (few, bits), ray, nearest),
+            Some(few) if bits != ANY || few.is_short => {
+                self.meet_few(simd, (few, bits & few.all), ray, nearest)
+            }
             Some(_) | None => self.meet_in_tree(simd, tree, ray, nearest),
         }
     }
@@ -496,6 +521,35 @@ impl<E: Real> Bodies<E> {
         *nearest = with;
     }
 
+    /// Returns the rays of `lit` that hit none of the bodies of the mask `bits` nearer than `far`. A ray that has hit one asks
+    /// for no more.
+    #[inline(always)]
+    fn unoccluded_by_few<S: Simd>(
+        &self,
+        simd: S,
+        (few, mut bits): (&BodyCuller<E>, u64),
+        ray: Ray<S, E>,
+        far: Lanes<S, E>,
+        mut lit: Mask<S, E>,
+    ) -> Mask<S, E> {
+        if bits == 0 {
+            return lit;
+        }
+        while bits != 0 {
+            let bit = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            if (lit & few.are_near(simd, bit, ray, far)).any_true() {
+                let (mut nearest, limit) = shadow_limit(simd, far, lit);
+                self.bodies[self.planes + bit].intersect(simd, ray, &mut nearest);
+                lit &= !nearest.distance.simd_lt(limit);
+                if !lit.any_true() {
+                    break;
+                }
+            }
+        }
+        lit
+    }
+
     #[inline(always)]
     fn meet_in_tree<S: Simd>(&self, simd: S, tree: &Tree<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         *nearest = nearest_in(
@@ -518,13 +572,19 @@ impl<E: Real> Bodies<E> {
         // A callee that is not inlined needs its argument in memory. This copy is there, so that `nearest` can stay in
         // registers.
         let mut with = *nearest;
-        self.meet_planes_out_of_line(simd, ray, &mut with);
+        self.meet_planes_out_of_line(simd, &self.bodies[..self.planes], ray, &mut with);
         *nearest = with;
     }
 
     // Out of line, so that scenes without planes set up nothing for them.
     #[inline(never)]
-    fn meet_planes_out_of_line<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+    fn meet_planes_out_of_line<S: Simd>(
+        &self,
+        simd: S,
+        planes: &[Body<E>],
+        ray: Ray<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
         if !BUILT.planes {
             return;
         }
@@ -533,7 +593,7 @@ impl<E: Real> Bodies<E> {
             || {
                 let zero = constant::<S, E>(simd, 0.0);
                 let open = nearest.distance.simd_gt(zero);
-                for plane in &self.bodies[..self.planes] {
+                for plane in planes {
                     plane.meet_plane(simd, ray, open, nearest);
                 }
             },
@@ -551,7 +611,34 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Returns the rays of `lit` that hit no plane and no body of the mask `bits` nearer than `far`.
+    /// Offers the hits of shadow rays with the planes of glass and with the bodies of the mask `bits`, where glass is asked for
+    /// apart.
+    #[inline(always)]
+    pub(super) fn meet_glass<S: Simd>(
+        &self,
+        simd: S,
+        bits: u64,
+        ray: Ray<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        if self.has_planes_of_glass() {
+            let planes = &self.bodies[self.first_planes..self.planes];
+            self.meet_planes_out_of_line(simd, planes, ray, nearest);
+        }
+        if let Some(few) = &self.few
+            && bits != 0
+        {
+            self.meet_few(simd, (few, bits), ray, nearest);
+        }
+    }
+
+    /// Returns whether shadow rays ask for planes of glass apart.
+    pub(super) fn has_planes_of_glass(&self) -> bool {
+        BUILT.planes && self.first_planes < self.planes
+    }
+
+    /// Returns the rays of `lit` that hit no plane and no body of the mask `bits` nearer than `far`; where glass is asked for
+    /// apart, no opaque plane.
     #[inline(always)]
     pub(super) fn unoccluded<S: Simd>(
         &self,
@@ -562,10 +649,16 @@ impl<E: Real> Bodies<E> {
         lit: Mask<S, E>,
     ) -> Mask<S, E> {
         // Apart, so that scenes without planes keep the search of the tree in registers.
-        let lit = if self.has_planes() { self.unoccluded_by_planes(simd, ray, far, lit) } else { lit };
+        let has_planes = BUILT.planes && self.first_planes > 0;
+        let lit = if has_planes { self.unoccluded_by_planes(simd, ray, far, lit) } else { lit };
         let Some(tree) = self.tree() else { return lit };
+        if let Some(few) = &self.few
+            && (bits != ANY || few.is_short)
+        {
+            return self.unoccluded_by_few(simd, (few, bits & few.all), ray, far, lit);
+        }
         let (mut nearest, limit) = shadow_limit(simd, far, lit);
-        self.meet_bounded(simd, (tree, bits), ray, &mut nearest);
+        self.meet_in_tree(simd, tree, ray, &mut nearest);
         lit & !nearest.distance.simd_lt(limit)
     }
 
@@ -579,7 +672,7 @@ impl<E: Real> Bodies<E> {
         lit: Mask<S, E>,
     ) -> Mask<S, E> {
         let (mut nearest, limit) = shadow_limit(simd, far, lit);
-        self.meet_planes_out_of_line(simd, ray, &mut nearest);
+        self.meet_planes_out_of_line(simd, &self.bodies[..self.first_planes], ray, &mut nearest);
         lit & !nearest.distance.simd_lt(limit)
     }
 

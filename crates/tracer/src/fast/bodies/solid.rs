@@ -31,6 +31,16 @@ pub(super) struct Frame {
     pub(super) center: DVec3,
 }
 
+/// The space between two parallel planes around a body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    pub(super) axis: DVec3,
+    /// Half of the distance of the planes.
+    pub(super) half: f64,
+    /// The radius of a hole in the middle, along the axis; 0 without.
+    pub(super) hole: f64,
+}
+
 /// A map from the scene to the kernels' coordinates: `center` becomes the origin, then all is scaled.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
@@ -142,6 +152,25 @@ impl Solid {
     pub(super) fn ball(&self) -> (DVec3, f64) {
         let (center, radius) = self.form.form().ball(&self.frame);
         (center, radius + WIDER * self.extent())
+    }
+
+    /// Returns the two planes around it, as computed; `None` for shapes that are not flat. Its bounding sphere is centred between
+    /// them.
+    pub(super) fn slab(&self) -> Option<Span> {
+        let axes = self.frame.axes;
+        let shortest = |half: DVec3| {
+            let number = half.to_array().iter().position(|&length| length == half.min_element())?;
+            Some(Span { axis: axes[number], half: half[number], hole: 0.0 })
+        };
+        let across = |half: f64, hole: f64| Some(Span { axis: axes[2], half, hole });
+        match &self.form {
+            AnyForm::Disc(_) => across(0.0, 0.0),
+            AnyForm::Cone(form) => across(0.5 * form.height, 0.0),
+            AnyForm::Torus(form) => across(form.thickness, (form.radius - form.thickness).max(0.0)),
+            AnyForm::Cuboid(form) => shortest(form.half),
+            AnyForm::Roundbox(form) => shortest(form.half),
+            AnyForm::Plane(_) | AnyForm::Capsule(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => None,
+        }
     }
 
     /// Returns its bounding box; `None` for a plane.

@@ -34,6 +34,9 @@ const TURN_STEPS: u32 = f64::MANTISSA_DIGITS;
 /// cube at a double root.
 const NEAR_TURN: f64 = 1e-6;
 
+/// The margin within which rays through the hole are not taken to miss, relative to the torus and to its square.
+const HOLE: f64 = 1e-9;
+
 /// A torus centred at the origin, perpendicular to z. Lengths are in units of the torus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Torus<E> {
@@ -109,7 +112,17 @@ impl<E: Real> Torus<E> {
         // root's last bits would depend on it. The rounding error of the sum is far less than this slack.
         let slack = (outer + middle.abs() + limit.abs()) * constant::<S, E>(simd, 8.0 * E::ROUNDOFF);
         let limit = limit - middle + slack;
-        let mut open = begin.simd_lt(end) & begin.simd_le(limit) & near.simd_lt(outer * outer);
+        // Between two points whose distances from the axis are less than that of the tube, all are less: the ray goes
+        // through the hole. The margin is far more than the rounding errors of s.
+        let inner = (ring - tube) * constant::<S, E>(simd, 1.0 - HOLE);
+        let hole = inner * inner - outer * outer * constant::<S, E>(simd, HOLE);
+        let apart = |t: Lanes<S, E>| {
+            let (x, y) = (direction.x.mul_add(t, place.x), direction.y.mul_add(t, place.y));
+            x.mul_add(x, y * y)
+        };
+        let goes_through = inner.simd_gt(zero) & apart(begin).max(apart(end)).simd_lt(hole);
+        let mut open =
+            begin.simd_lt(end) & begin.simd_le(limit) & near.simd_lt(outer * outer) & !goes_through;
         let none = open & !open;
         if !open.any_true() {
             return (none, zero);

@@ -10,7 +10,7 @@ use crate::fast::lights::lamp::Lamp;
 use crate::fast::materials::faces::ShadedFaces;
 use crate::fast::materials::finish::Finishes;
 use crate::fast::materials::fog::Fog;
-use crate::fast::materials::glass::Glass;
+use crate::fast::materials::glass::{Glass, GlassBits};
 use crate::fast::materials::paths::Paths;
 use crate::fast::placement::geometry::Geometry;
 use crate::parts;
@@ -52,6 +52,22 @@ impl<E: Real> Extensions<E> {
     #[inline(always)]
     pub(crate) fn glass(&self) -> Option<&Glass<E>> {
         if BUILT.glass { self.glass.as_ref() } else { None }
+    }
+
+    /// Lets shadow rays ask for glass apart from opaque objects. `orders` are those of the row of all objects. Returns the
+    /// objects of glass, or `None` if the bodies cannot be parted.
+    pub(crate) fn part_glass(&mut self, orders: impl Iterator<Item = u32>) -> Option<GlassBits> {
+        let glass = self.glass.as_ref()?;
+        let is_glass = |order: E| glass.of(order).is_some();
+        let bits = orders
+            .enumerate()
+            .map(|(bit, order)| u64::from(is_glass(E::narrow(f64::from(order)))) << bit)
+            .sum();
+        let bodies = match &mut self.bodies {
+            Some(bodies) => bodies.part_glass(is_glass)?,
+            None => 0,
+        };
+        Some(GlassBits { shapes: bits, bodies })
     }
 
     /// Returns the fog, if there is any.

@@ -2,6 +2,7 @@
 //!
 //! In: a scene as [`super::placement`] gives it. Out: a `Prepared` scene. Read [`prepare`] first.
 
+pub(crate) mod enclosures;
 pub(crate) mod extensions;
 pub(crate) mod features;
 pub(crate) mod precision;

@@ -16,10 +16,12 @@ use crate::fast::acceleration::lists::LISTED;
 use crate::fast::acceleration::tree::{Tree, stump};
 use crate::fast::arithmetic::real::Real;
 use crate::fast::bodies::{ANY, Bodies};
+use crate::fast::build::enclosures::{Enclosure, enclosures};
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::{BUILT, Needs};
 use crate::fast::lights::sun::{Direction, Outline, Outlines, Sun};
 use crate::fast::materials::fog::Fog;
+use crate::fast::materials::glass::GlassBits;
 use crate::fast::materials::sky::Sky;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::placement::tile_lists::TileLists;
@@ -111,6 +113,10 @@ pub(crate) struct Prepared<E> {
     /// The bounding spheres of the objects of the row and of the bodies with bounding boxes, for scenes with glass and
     /// few objects.
     balls: Option<[BoundingSpheres; 2]>,
+    /// The objects of glass, if shadow rays ask for them apart.
+    glass_bits: Option<GlassBits>,
+    /// The objects of glass within which rays meet little else, by their orders, in scenes of few objects.
+    enclosures: Vec<Option<Enclosure>>,
 }
 
 impl<E: Real> Prepared<E> {
@@ -152,7 +158,7 @@ impl<E: Real> Prepared<E> {
         let surroundings = scene.surroundings();
         let sky = Sky::new(surroundings);
         let panorama = Panorama::of(scene);
-        let beyond = Extensions::new(scene, geometry);
+        let mut beyond = Extensions::new(scene, geometry);
         let shared = geometry.shared.clone().filter(|_| BUILT.beyond);
         needs.beyond = beyond.is_some() || sky.is_some() || panorama.is_some() || shared.is_some();
         needs.glass = beyond.as_ref().is_some_and(Extensions::has_glass);
@@ -170,6 +176,14 @@ impl<E: Real> Prepared<E> {
         let sights = (search == Search::Lists)
             .then(|| TileLists::new(&geometry.view, standing.shapes(), row, grid, E::ROUNDOFF))
             .flatten();
+        let glass_bits = beyond.as_mut().filter(|_| needs.glass && search == Search::Masks);
+        let glass_bits = glass_bits.and_then(|beyond| beyond.part_glass(standing.orders()));
+        let glass = beyond.as_ref().and_then(Extensions::glass).filter(|_| search == Search::Masks);
+        let enclosures = glass.map(|glass| {
+            let in_row: Vec<&Solid> = standing.in_row().collect();
+            let has_inside = |order| glass.has_inside(E::narrow(f64::from(order)));
+            enclosures(&in_row, (row, counts), has_inside)
+        });
         let boxes = beyond.as_ref().and_then(Extensions::bodies).and_then(Bodies::boxes);
         let suns = geometry.suns.iter().map(|sun| standing.lit_by(sun, search, boxes)).collect();
         let balls = (needs.glass && search == Search::Masks).then(|| {
@@ -214,6 +228,8 @@ impl<E: Real> Prepared<E> {
             beyond,
             shared,
             balls,
+            glass_bits,
+            enclosures: enclosures.unwrap_or_default(),
         })
     }
 
@@ -286,6 +302,34 @@ impl<E: Real> Prepared<E> {
     #[inline(always)]
     pub(crate) fn has_glass(&self) -> bool {
         BUILT.glass && self.needs.glass
+    }
+
+    /// Returns whether rays can be within objects of glass whose surroundings are known.
+    #[inline(always)]
+    pub(crate) fn has_enclosures(&self) -> bool {
+        BUILT.glass && !self.enclosures.is_empty()
+    }
+
+    /// Returns what rays meet within the object of this order, if it is known.
+    #[inline(always)]
+    pub(crate) fn enclosure(&self, order: usize) -> Option<&Enclosure> {
+        self.enclosures.get(order)?.as_ref()
+    }
+
+    /// Returns the objects of glass, if shadow rays ask for opaque objects first, and for those after them.
+    #[inline(always)]
+    pub(crate) fn glass_apart(&self) -> Option<GlassBits> {
+        if BUILT.glass { self.glass_bits } else { None }
+    }
+
+    /// Returns the objects that shadow rays ask for first, as bits: of the row of all objects, and of the bodies. They are all,
+    /// or the opaque ones.
+    #[inline(always)]
+    pub(crate) fn asked_first(&self) -> [u64; 2] {
+        match self.glass_apart() {
+            Some(GlassBits { shapes, bodies }) => [!shapes, !bodies],
+            None => [u64::MAX, ANY],
+        }
     }
 
     /// Returns all objects: by masks, or the whole tree.
@@ -362,11 +406,21 @@ struct Standing<'a> {
 }
 
 impl Standing<'_> {
-    /// Returns the shapes in the order of the row.
-    fn shapes(&self) -> impl Iterator<Item = &Shape> {
+    /// Returns the solids in the order of the row.
+    fn in_row(&self) -> impl Iterator<Item = &Solid> {
         let mut places = vec![];
         Kind::each(|kind| places.push(&self.sorted.of(kind)[..]));
-        places.into_iter().flatten().map(|&place| &self.solids[place as usize].shape)
+        places.into_iter().flatten().map(|&place| &self.solids[place as usize])
+    }
+
+    /// Returns the shapes in the order of the row.
+    fn shapes(&self) -> impl Iterator<Item = &Shape> {
+        self.in_row().map(|solid| &solid.shape)
+    }
+
+    /// Returns the positions in the script in the order of the row.
+    fn orders(&self) -> impl Iterator<Item = u32> {
+        self.in_row().map(|solid| solid.order)
     }
 
     /// Returns a sun and its occluders. `boxes` are those of the bodies, if there are few.

@@ -22,12 +22,14 @@ use crate::fast::build::features::{Anything, BUILT, Kernel, Variant, fitted};
 use crate::fast::build::prepare::Prepared;
 use crate::fast::film::band::{Band, Tile, fill, rays_of, write_encoded, write_lit, write_pixels};
 use crate::fast::film::cover::{cover_hits, let_through};
-use crate::fast::film::trace::{aim_along_axis, trace_bodies, trace_primary, trace_queue};
+use crate::fast::film::trace::{
+    aim_along_axis, trace_bodies, trace_primary, trace_queue, trace_queue_of_glass,
+};
 use crate::fast::materials::sky::{show_panorama, show_sky};
 use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns};
 use crate::fast::rays::kind::{ByKind, Kind};
 use crate::fast::rays::pixels::Rays;
-use crate::fast::transport::light::{Occluders, add_all_lights, add_sun_light};
+use crate::fast::transport::light::{Occluders, add_all_lights, add_sun_light, show_light};
 use crate::fast::transport::paths::{PathNumbers, spawn_paths};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::fast::transport::scatter::spawn_rays;
@@ -256,9 +258,15 @@ fn follow_queued<S: Simd, E: Real, N: Kernel<E>>(
         queue.fill_up(Lanes::<S, E>::LEN);
         let (near, bodies) = met_by::<S, E>(simd, scene, queue);
         let (kinds, background, count) = (near.kinds, scene.background, queue.count);
-        fitted!(N, kinds, tree, C T D => {
-            trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
-        });
+        if scene.has_enclosures() && paths.is_none() {
+            fitted!(N, kinds, C T => {
+                trace_queue_of_glass::<S, E, Variant<N::By, C, T, false>>(simd, scene, near, background, queue, hits)
+            });
+        } else {
+            fitted!(N, kinds, tree, C T D => {
+                trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, near, background, queue, hits)
+            });
+        }
         let met = HitBatch {
             kinds,
             bodies,
@@ -386,14 +394,18 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     let is_painted = paint::<S, E, EYE>(beyond, queue, hits);
     shade_faces::<S, E, EYE>(simd, scene, Some(beyond), queue, hits);
     glow::<S, E, EYE>(Some(beyond), queue, hits);
-    occluders.find(simd, scene, hits);
-    if beyond.bodies().is_some() {
-        occluders.find_bodies(simd, scene, hits);
+    // Bare glass shows no light.
+    let is_lit = beyond.glass().is_none() || beyond.glossy().is_some() || show_light::<S, E>(simd, hits);
+    if is_lit {
+        occluders.find(simd, scene, hits);
+        if beyond.bodies().is_some() {
+            occluders.find_bodies(simd, scene, hits);
+        }
     }
-    if beyond.glass().is_some() {
-        add_all_lights::<S, E, Anything<N::By>, EYE, true>(simd, scene, beyond, queue, hits, occluders);
-    } else {
+    if beyond.glass().is_none() {
         add_all_lights::<S, E, Anything<N::By>, EYE, false>(simd, scene, beyond, queue, hits, occluders);
+    } else if is_lit {
+        add_all_lights::<S, E, Anything<N::By>, EYE, true>(simd, scene, beyond, queue, hits, occluders);
     }
     let is_painted = dim::<S, E, EYE>(scene, is_painted, queue, hits);
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);

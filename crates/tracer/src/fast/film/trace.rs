@@ -12,7 +12,7 @@ use crate::fast::film::band::{Band, Tile};
 use crate::fast::rays::bounce::{Hits, RayBatch, count_from, lanes_modulo, packet_shape, weigh};
 use crate::fast::rays::packet::{Nearest, Ray};
 use crate::fast::rays::pixels::{AlongAxis, FromEye};
-use crate::fast::transport::search::nearest;
+use crate::fast::transport::search::{nearest, nearest_from_inside};
 
 /// Calls `each` with the column and the row numbers of the tile's pixels, packet by packet. They count from an
 /// `anchor`, from the left and from the bottom, and are whole numbers or halves.
@@ -134,6 +134,37 @@ pub(crate) fn trace_queue<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
                     found,
                     #[inline(always)]
                     || weigh::<S, E, EYE>(simd, background, queue, at),
+                );
+            }
+        },
+    );
+}
+
+/// Traces the rays of a queue of a scene with glass and few objects, in which it is known what rays can meet within objects
+/// of glass.
+#[inline(never)]
+pub(crate) fn trace_queue_of_glass<S: Simd, E: Real, F: Features<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    candidates: Candidates,
+    background: [E; 3],
+    queue: &RayBatch<E>,
+    hits: &mut Hits<E>,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for at in (0..queue.count).step_by(Lanes::<S, E>::LEN) {
+                let origin = Vec3::load(simd, &queue.origin, at);
+                let ray = Ray { origin, direction: Vec3::load(simd, &queue.direction, at) };
+                let inside = Lanes::<S, E>::from_slice(simd, &queue.inside.0[at..at + Lanes::<S, E>::LEN]);
+                let found = nearest_from_inside::<S, E, F>(simd, scene, ray, inside, candidates);
+                hits.add(
+                    simd,
+                    at,
+                    found,
+                    #[inline(always)]
+                    || weigh::<S, E, false>(simd, background, queue, at),
                 );
             }
         },

@@ -7,7 +7,7 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
-use rayfold_scene::model::Finish;
+use rayfold_scene::model::{Finish, Shine};
 use rayfold_scene::{Coefficients, ImageMap, Object, Scene, Tone};
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
@@ -31,6 +31,11 @@ pub(crate) struct Finishes {
     /// The square of the cosine from which the highlights of each object can be seen: [`NEVER`] without, and negative if they
     /// can be seen from anywhere.
     least_cosines: Vec<f32>,
+    /// The mirror coefficients of each object, and whether its coefficients depend on the place of a hit; empty if they are not
+    /// asked for: without patterns and rough mirrors.
+    mirrors: Vec<(DVec3, bool)>,
+    /// The highlights of each object; empty if none has any.
+    shines: Vec<Option<Shine>>,
 }
 
 /// More than the square of any cosine.
@@ -72,8 +77,26 @@ impl Finishes {
         } else {
             vec![]
         };
+        let shine = |object: &Object| object.material().finish().and_then(|finish| finish.shine);
+        let shines = if has_highlights { map(&scene.objects, shine) } else { vec![] };
+        let is_painted = |object: &Object| object.material().finish().is_some_and(is_painted);
+        let mirrors = if has_patterns || finishes().any(|finish| finish.rough.is_some()) {
+            map(&scene.objects, |object| (object.material().mirror(), is_painted(object)))
+        } else {
+            vec![]
+        };
         let scene = scene.clone();
-        Some(Self { scene, center, scale, has_patterns, has_highlights, glows, least_cosines })
+        Some(Self {
+            scene,
+            center,
+            scale,
+            has_patterns,
+            has_highlights,
+            glows,
+            least_cosines,
+            mirrors,
+            shines,
+        })
     }
 
     /// Whether any object glows.
@@ -131,19 +154,16 @@ impl Finishes {
                     )
                 };
                 let weight = if EYE { DVec3::ONE } else { read(&queue.weight) };
-                let material = self.scene.objects[order].material();
-                let is_painted = material.finish().is_some_and(is_painted);
-                let seen = if is_painted {
-                    let origin = if EYE { DVec3::ZERO } else { read(&queue.origin) };
-                    let ray = (origin, read(&queue.direction));
-                    self.coefficients_at(order, ray, (read(&hits.start), read(&hits.normal)))
-                } else {
-                    material.coefficients()
-                };
-                if is_painted {
-                    write(&mut hits.color, lane, seen.ambient() * weight);
-                    write(&mut hits.diffuse, lane, seen.diffuse() * weight);
+                let (mirror, is_painted) = self.mirrors[order];
+                if !is_painted {
+                    write(&mut hits.mirror, lane, mirror * weight);
+                    continue;
                 }
+                let origin = if EYE { DVec3::ZERO } else { read(&queue.origin) };
+                let ray = (origin, read(&queue.direction));
+                let seen = self.coefficients_at(order, ray, (read(&hits.start), read(&hits.normal)));
+                write(&mut hits.color, lane, seen.ambient() * weight);
+                write(&mut hits.diffuse, lane, seen.diffuse() * weight);
                 write(&mut hits.mirror, lane, seen.mirror() * weight);
             }
         }
@@ -249,10 +269,9 @@ impl Gloss<'_> {
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let material = self.finishes.scene.objects[orders[lane].to_index()].material();
-            let Some(shine) = material.finish().and_then(|finish| finish.shine) else { continue };
+            let Some(Some(shine)) = self.finishes.shines.get(orders[lane].to_index()) else { continue };
             let at = |v: Vec3<S, E>| DVec3::new(v.x[lane].widen(), v.y[lane].widen(), v.z[lane].widen());
-            let seen = highlight(&shine, at(normal), at(towards), -at(ray.direction));
+            let seen = highlight(shine, at(normal), at(towards), -at(ray.direction));
             self.sum[lane] += at(color) * shine.color() * seen;
             self.is_seen = true;
         }

@@ -23,6 +23,15 @@ pub(crate) struct Glass<E> {
     faint: f64,
 }
 
+/// The objects of glass, as bits, in scenes whose shadow rays ask for opaque objects first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlassBits {
+    /// Those of the row of all objects.
+    pub(crate) shapes: u64,
+    /// Those of the bodies that have bounding boxes.
+    pub(crate) bodies: u64,
+}
+
 /// The transmission of an object of glass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pane<E> {
@@ -65,6 +74,11 @@ impl<E: Real> Glass<E> {
     #[inline(always)]
     pub(crate) fn of(&self, order: E) -> Option<&Pane<E>> {
         self.panes[order.to_index()].as_ref()
+    }
+
+    /// Returns whether the object with this order is of glass and has an inside.
+    pub(crate) fn has_inside(&self, order: E) -> bool {
+        self.of(order).is_some_and(|pane| !pane.is_flat)
     }
 
     /// Returns the lanes whose rays, of this weight, are followed.

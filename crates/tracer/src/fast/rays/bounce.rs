@@ -50,12 +50,16 @@ pub(crate) struct RayBatch<E> {
     /// The factor of their colour in the colour of the pixel.
     pub(crate) weight: Columns<E>,
     pub(crate) pixel: Column<E>,
+    /// One more than the order of the object of glass that they are within, or 0 if it is not known. Filled only for rays
+    /// that wait in the queues of glass.
+    pub(crate) inside: Column<E>,
     pub(crate) count: usize,
 }
 
 impl<E: Real> RayBatch<E> {
     pub(crate) fn new() -> Self {
-        Self { origin: columns(), direction: columns(), weight: columns(), pixel: Column::new(), count: 0 }
+        let [pixel, inside] = [Column::new(), Column::new()];
+        Self { origin: columns(), direction: columns(), weight: columns(), pixel, inside, count: 0 }
     }
 
     /// Fills the last packet up to `lanes` lanes with copies of the last ray that belong to no pixel.
@@ -70,6 +74,8 @@ impl<E: Real> RayBatch<E> {
             }
         }
         self.pixel.0[last + 1..end].fill(E::narrow(-1.0));
+        let inside = self.inside.0[last];
+        self.inside.0[last + 1..end].fill(inside);
     }
 }
 

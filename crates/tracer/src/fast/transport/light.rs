@@ -14,9 +14,9 @@ use crate::fast::lights::lamp::Rays;
 use crate::fast::materials::finish::{Finishes, Gloss, Lit};
 use crate::fast::rays::bounce::{Columns, Hits, RayBatch};
 use crate::fast::rays::kind::ByKind;
-use crate::fast::rays::packet::Ray;
+use crate::fast::rays::packet::{Ray, no_lane};
 use crate::fast::transport::search::{nearest, unoccluded};
-use crate::fast::transport::transmittance::{IncidentLight, Shadow};
+use crate::fast::transport::transmittance::{IncidentLight, Panes, Shadow};
 
 /// The possible occluders of each sun.
 #[derive(Default)]
@@ -34,6 +34,8 @@ pub(crate) struct Obstacles {
     is_listed: bool,
     /// The bodies, as bits, if there are few.
     pub(crate) bodies: u64,
+    /// The objects of glass, as bits of the row of all objects and of the bodies, if shadow rays ask for them apart.
+    pub(crate) through: [u64; 2],
 }
 
 impl Obstacles {
@@ -69,8 +71,13 @@ impl Occluders {
                         *is_listed = light.buffer.as_ref().is_some_and(gather);
                         kinds = kinds.or(if *is_listed { list.kinds() } else { scene.needs.kinds });
                     } else {
-                        of.masks = scene.masks(light.outlines.occluders(simd, beam));
+                        let [first, _] = scene.asked_first();
+                        of.masks = scene.masks(light.outlines.occluders(simd, beam) & first);
                         kinds = kinds.or(of.masks.kinds());
+                        if scene.glass_apart().is_some() {
+                            let (low, high) = widened(low, high);
+                            of.through[0] = light.outlines.occluders(simd, light.sun.beam(low, high));
+                        }
                     }
                 }
             },
@@ -87,9 +94,18 @@ impl Occluders {
                 let (low, high) = region(simd, hits);
                 for (light, of) in scene.suns.iter().zip(&mut self.of) {
                     of.bodies = match &light.bodies {
-                        Some(outlines) => outlines.occluders(simd, light.sun.beam(low, high)),
+                        Some(outlines) => {
+                            let [_, first] = scene.asked_first();
+                            outlines.occluders(simd, light.sun.beam(low, high)) & first
+                        }
                         None => ANY,
                     };
+                    if let Some(outlines) = &light.bodies
+                        && scene.glass_apart().is_some()
+                    {
+                        let (low, high) = widened(low, high);
+                        of.through[1] = outlines.occluders(simd, light.sun.beam(low, high));
+                    }
                 }
             },
         );
@@ -158,7 +174,16 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
             let (bodies, lamps) = (beyond.bodies(), beyond.lamps());
             let (glossy, glass) = (beyond.glossy(), beyond.glass().filter(|_| GLASS));
             let rough = beyond.rough();
+            let is_apart = GLASS && scene.glass_apart().is_some();
+            // What shadow rays to lamps ask for first.
+            let (to_lamps, bodies_to_lamps) = match scene.asked_first() {
+                [shapes, bodies] if is_apart => (Candidates::masked(scene.masks(shapes)), bodies),
+                _ => (scene.all(), ANY),
+            };
             for &(at, others) in &hits.packets {
+                if GLASS && glossy.is_none() && !scatters(simd, hits, at).any_true() {
+                    continue;
+                }
                 let normal = Vec3::load(simd, &hits.normal, at);
                 let start = Vec3::load(simd, &hits.start, at);
                 let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
@@ -169,11 +194,14 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     let towards = light.sun.towards(simd);
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        let scatters;
+                        (scatters, shines) = shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
-                    if GLASS {
+                    if GLASS && !is_apart {
                         // Glass is around a ray that comes from within it.
                         lit &= !hits.are_within(simd, at);
                     }
@@ -191,14 +219,15 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     let mut color = Vec3::splat(simd, light.sun.color);
                     if let Some(glass) = glass {
                         let glass = (scene, beyond, glass);
-                        let shadow = Shadow { ray, far };
+                        let panes = Panes::new(scene, obstacles.through);
                         let arriving = IncidentLight { color, lit };
-                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let shadow = Shadow { ray, far };
+                        let through = arriving.past_glass::<F>(simd, glass, (facing, panes), shadow);
                         (color, lit) = (through.color, through.lit);
                     }
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, color };
+                        let lit = Lit { lanes: lit & shines, towards, color };
                         gloss.add(lit, (seen, normal), orders);
                         if let Some(paths) = rough {
                             gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
@@ -217,30 +246,34 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                         }
                     };
                     let mut facing = cosine.simd_gt(zero);
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        let scatters;
+                        (scatters, shines) = shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, ANY, ray, far, lit);
+                        lit = bodies.unoccluded(simd, bodies_to_lamps, ray, far, lit);
                     }
                     if lit.any_true() {
-                        let met = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
+                        let met = nearest::<S, E, F, false>(simd, scene, ray, to_lamps);
                         lit &= !met.distance.simd_lt(far);
                     }
                     let mut color = Vec3::splat(simd, lamp.color);
                     if let Some(glass) = glass {
                         let glass = (scene, beyond, glass);
-                        let shadow = Shadow { ray, far };
+                        let panes = Panes::new(scene, [u64::MAX; 2]);
                         let arriving = IncidentLight { color, lit };
-                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let shadow = Shadow { ray, far };
+                        let through = arriving.past_glass::<F>(simd, glass, (facing, panes), shadow);
                         (color, lit) = (through.color, through.lit);
                     }
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, color: color.scale(part) };
+                        let lit = Lit { lanes: lit & shines, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
                         if let Some(paths) = rough {
                             gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
@@ -254,8 +287,8 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
     );
 }
 
-/// Returns the hits of a packet that show the light that reaches them from a direction. Most glass scatters none and needs
-/// no shadow rays, except where it shows a highlight.
+/// Returns the hits of a packet that scatter light, and those that may show a highlight of what reaches them from a direction. Most
+/// glass does neither and needs no shadow rays.
 #[inline(always)]
 pub(crate) fn shows<S: Simd, E: Real>(
     simd: S,
@@ -263,17 +296,39 @@ pub(crate) fn shows<S: Simd, E: Real>(
     at: usize,
     glossy: Option<&Finishes>,
     (normal, towards, direction): (Vec3<S, E>, Vec3<S, E>, Vec3<S, E>),
-) -> Mask<S, E> {
-    let zero = constant::<S, E>(simd, 0.0);
-    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
-    let scatters = diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero);
-    match glossy {
+) -> (Mask<S, E>, Mask<S, E>) {
+    let shines = match glossy {
         Some(finishes) => {
             let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
-            scatters | finishes.shines(simd, orders, normal, (towards, direction))
+            finishes.shines(simd, orders, normal, (towards, direction))
         }
-        None => scatters,
-    }
+        None => no_lane::<S, E>(simd),
+    };
+    (scatters(simd, hits, at), shines)
+}
+
+/// Returns whether any hit scatters light.
+#[inline(never)]
+pub(crate) fn show_light<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for &(at, _) in &hits.packets {
+                if scatters(simd, hits, at).any_true() {
+                    return true;
+                }
+            }
+            false
+        },
+    )
+}
+
+/// Returns the hits of a packet that scatter light.
+#[inline(always)]
+fn scatters<S: Simd, E: Real>(simd: S, hits: &Hits<E>, at: usize) -> Mask<S, E> {
+    let zero = constant::<S, E>(simd, 0.0);
+    let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
+    diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero)
 }
 
 /// Adds the `sum` of the lights that reach a packet's hits, and their highlights, to the colours of the hits.
@@ -306,6 +361,18 @@ pub(crate) fn add_light<S: Simd, E: Real, const EYE: bool>(
         Some(_) | None => lit,
     };
     lit.store(colors, at);
+}
+
+/// The distance by which shadow rays may move aside on their way through glass, in roundoffs of 1 and of their coordinates: at each
+/// surface twice the offset of a start, which is at most 256 roundoffs of them; there are at most 512 surfaces.
+const MOVED: f64 = 16_777_216.0;
+
+/// Returns a box of starts with room for where rays start again behind glass.
+#[inline(always)]
+pub(crate) fn widened<E: Real>(low: [E; 3], high: [E; 3]) -> ([E; 3], [E; 3]) {
+    let largest = low.iter().chain(&high).fold(1.0, |largest: f64, x| largest.max(x.widen().abs()));
+    let room = MOVED * E::ROUNDOFF * largest;
+    (low.map(|x| E::narrow(x.widen() - room)), high.map(|x| E::narrow(x.widen() + room)))
 }
 
 /// Returns the bounding box of the hits that need light. There is at least one.

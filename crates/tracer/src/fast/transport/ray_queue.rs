@@ -27,9 +27,9 @@ const MOST: usize = 2 * FULL;
 /// times white.
 const ONE: f64 = (1u64 << 40) as f64;
 
-/// The number of values per queued ray: its origin, its direction, its weight in the pixel's colour, its pixel, and
-/// its mark.
-const NUMBERS: usize = 11;
+/// The number of values per queued ray: its origin, its direction, its weight in the pixel's colour, its pixel, its
+/// mark, and what it is within.
+const NUMBERS: usize = 12;
 
 /// A packet of spawned rays.
 #[derive(Clone, Copy)]
@@ -37,6 +37,8 @@ pub(crate) struct SpawnedRays<S: Simd, E: Real> {
     pub(crate) origin: Vec3<S, E>,
     pub(crate) direction: Vec3<S, E>,
     pub(crate) weight: Vec3<S, E>,
+    /// One more than the order of the object of glass that a ray is within, or 0 if it is not known.
+    pub(crate) inside: Lanes<S, E>,
     /// The lanes that hold a ray.
     pub(crate) lanes: Mask<S, E>,
 }
@@ -45,7 +47,7 @@ impl<S: Simd, E: Real> SpawnedRays<S, E> {
     #[inline(always)]
     fn numbers(self, pixel: Lanes<S, E>, mark: Lanes<S, E>) -> [Lanes<S, E>; NUMBERS] {
         let [o, d, w] = [self.origin, self.direction, self.weight];
-        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pixel, mark]
+        [o.x, o.y, o.z, d.x, d.y, d.z, w.x, w.y, w.z, pixel, mark, self.inside]
     }
 }
 
@@ -68,10 +70,20 @@ impl<E: Real> Line<E> {
     /// Adds some lanes of a packet.
     #[inline(always)]
     fn push<S: Simd>(&mut self, numbers: [Lanes<S, E>; NUMBERS], lanes: Mask<S, E>) {
+        if !lanes.any_true() {
+            return;
+        }
         if self.end + Lanes::<S, E>::LEN > self.columns[0].len() {
             self.move_up(Lanes::<S, E>::LEN);
         }
         let room = self.end..self.end + Lanes::<S, E>::LEN;
+        if lanes.all_true() {
+            for (column, numbers) in self.columns.iter_mut().zip(numbers) {
+                numbers.store_slice(&mut column[room.clone()]);
+            }
+            self.end = room.end;
+            return;
+        }
         for (column, numbers) in self.columns.iter_mut().zip(numbers) {
             numbers.compress(lanes).store_slice(&mut column[room.clone()]);
         }
@@ -109,8 +121,8 @@ pub(crate) struct RayQueues<'a, E> {
     cancel: Option<&'a AtomicBool>,
     /// The queues by bounce: reflected and refracted. The first pair holds rays that were spawned once.
     bounces: Vec<[Line<E>; 2]>,
-    /// The sum of all contributions to each pixel, per channel.
-    sums: [Vec<i128>; 3],
+    /// The sum of all contributions to each pixel, by channels.
+    sums: Vec<[i128; 3]>,
     /// The number of bounces of the rays in the current batch.
     depth: u32,
     /// The largest number of bounces.
@@ -129,7 +141,7 @@ impl<'a, E: Real> RayQueues<'a, E> {
         Self {
             cancel,
             bounces: Vec::new(),
-            sums: [vec![], vec![], vec![]],
+            sums: vec![],
             depth: 0,
             most: 0,
             marks: Column::new(),
@@ -146,10 +158,10 @@ impl<'a, E: Real> RayQueues<'a, E> {
         for line in self.bounces.as_flattened_mut() {
             (line.first, line.end) = (0, 0);
         }
-        for sums in self.sums.iter_mut().chain([&mut self.clear]) {
-            sums.clear();
-            sums.resize(ROOM, 0);
-        }
+        self.sums.clear();
+        self.sums.resize(ROOM, [0; 3]);
+        self.clear.clear();
+        self.clear.resize(ROOM, 0);
     }
 
     /// Returns whether the rays in the batch are at the last bounce.
@@ -215,7 +227,8 @@ impl<'a, E: Real> RayQueues<'a, E> {
         let [ox, oy, oz] = &mut queue.origin;
         let [dx, dy, dz] = &mut queue.direction;
         let [wx, wy, wz] = &mut queue.weight;
-        rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, &mut queue.pixel, &mut self.marks]);
+        let (pixel, inside) = (&mut queue.pixel, &mut queue.inside);
+        rays.take(queue.count, [ox, oy, oz, dx, dy, dz, wx, wy, wz, pixel, &mut self.marks, inside]);
         true
     }
 
@@ -243,25 +256,48 @@ impl<'a, E: Real> RayQueues<'a, E> {
 
     /// Adds the colours of the rays in the batch to the sums.
     pub(crate) fn add(&mut self, queue: &RayBatch<E>, hits: &Hits<E>) {
-        for (ray, pixel) in queue.pixel.0[..queue.count].iter().enumerate() {
-            let pixel = pixel.to_index();
-            for (sums, color) in self.sums.iter_mut().zip(&hits.color) {
-                let color = color.0[ray].widen();
+        let zero = E::narrow(0.0);
+        let [r, g, b] = &hits.color;
+        let colors = r.0.iter().zip(&g.0).zip(&b.0);
+        for (pixel, ((r, g), b)) in queue.pixel.0[..queue.count].iter().zip(colors) {
+            // Most hits are on glass, and have no colour of their own.
+            if *r == zero && *g == zero && *b == zero {
+                continue;
+            }
+            let sums = &mut self.sums[pixel.to_index()];
+            for (sum, color) in sums.iter_mut().zip([r, g, b]) {
+                let color = color.widen();
                 #[cfg(feature = "accuracy")]
                 crate::nans::add(color.is_nan().into());
-                sums[pixel] += i128::from((color * ONE) as i64);
+                *sum += i128::from((color * ONE) as i64);
             }
         }
     }
 
     /// Adds the sums to the pixels.
     pub(crate) fn sum_up(&self, pixels: &mut Columns<E>) {
-        for (pixels, sums) in pixels.iter_mut().zip(&self.sums) {
-            for (pixel, sum) in pixels.0.iter_mut().zip(sums) {
-                *pixel += E::narrow(*sum as f64 / ONE);
+        for (channel, pixels) in pixels.iter_mut().enumerate() {
+            for (pixel, sums) in pixels.0.iter_mut().zip(&self.sums) {
+                *pixel += E::narrow(real(sums[channel]) / ONE);
             }
         }
     }
+}
+
+/// Returns the number nearest to a sum.
+#[inline(always)]
+fn real(sum: i128) -> f64 {
+    match i64::try_from(sum) {
+        Ok(short) => short as f64,
+        Err(_) => long(sum),
+    }
+}
+
+// Out of line, so that the compiler does not round short sums in this way too, which takes many times as long.
+#[cold]
+#[inline(never)]
+fn long(sum: i128) -> f64 {
+    sum as f64
 }
 
 impl<E: Real> RayQueues<'_, E> {
@@ -295,7 +331,7 @@ mod tests {
             // In one lane, a different one each time.
             let lane = pixel % Lanes::<S, f64>::LEN;
             let lanes = Mask::<S, f64>::from_bitmask(simd, u64::from(is_sent) << lane);
-            SpawnedRays { origin: one, direction: one, weight: one, lanes }
+            SpawnedRays { origin: one, direction: one, weight: one, inside: one.x, lanes }
         });
         let pixel = constant::<S, f64>(simd, pixel as f64);
         waiting.push(pixel, [constant::<S, f64>(simd, 1.0); 2], rays);

@@ -91,16 +91,20 @@ pub(crate) fn spawn_rays<S: Simd, E: Real, const EYE: bool, const PAINTED: bool>
                     pixel
                 };
                 let have_met_glass = of_glass | waiting.have_met_glass(simd, at);
+                let own = met.found.order + one;
+                let (inwards, outwards) = (of_glass & surface.within, of_glass & !surface.within);
                 let mirrored = SpawnedRays {
                     origin: start,
                     direction: mirrored(simd, ray.direction, normal),
                     weight: mirror,
+                    inside: inwards.select(own, zero.x),
                     lanes: sent & glass.followed(simd, mirror, have_met_glass),
                 };
                 let refracted = SpawnedRays {
                     origin: face.beyond(simd),
                     direction: bent,
                     weight: through,
+                    inside: outwards.select(own, zero.x),
                     lanes: sent & of_glass & glass.followed(simd, through, have_met_glass),
                 };
                 let met = have_met_glass.select(one, zero.x);

@@ -8,7 +8,8 @@ use fearless_simd::prelude::*;
 use crate::fast::acceleration::candidates::{CandidateSet, Candidates};
 use crate::fast::acceleration::descent::{backwards, descend, nearest_in};
 use crate::fast::acceleration::tree::Tree;
-use crate::fast::arithmetic::real::{Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::build::enclosures::Enclosure;
 use crate::fast::build::features::Features;
 use crate::fast::build::prepare::{Prepared, Sunlight};
 use crate::fast::rays::bounds::Crossing;
@@ -36,6 +37,32 @@ pub(crate) fn nearest<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     nearest_of::<S, E, F, EYE>(simd, scene, ray, candidates.masks)
 }
 
+/// Returns the nearest hits. `inside` is what the rays are within ([`RayBatch::inside`]).
+#[inline(always)]
+pub(crate) fn nearest_from_inside<S: Simd, E: Real, F: Features<E>>(
+    simd: S,
+    scene: &Prepared<E>,
+    ray: Ray<S, E>,
+    inside: Lanes<S, E>,
+    candidates: Candidates,
+) -> Nearest<S, E> {
+    let own = inside[0];
+    if own > E::narrow(0.0)
+        && inside.simd_eq(splat::<S, E>(simd, own)).all_true()
+        && let Some(&Enclosure { kind, index, others }) = scene.enclosure(own.to_index() - 1)
+        && *F::KINDS.of(kind)
+    {
+        let mut nearest = Nearest::none(simd);
+        let only = (F::one_of_these(kind), index as usize..index as usize + 1);
+        scene.shapes.intersect::<S, F::By, false>(simd, only, ray, None, &mut nearest);
+        if nearest.hit(simd).all_true() {
+            offer_of::<S, E, F, false>(simd, scene, ray, others, &mut nearest);
+            return nearest;
+        }
+    }
+    nearest_of::<S, E, F, false>(simd, scene, ray, candidates.masks)
+}
+
 #[inline(always)]
 fn nearest_of<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd: S,
@@ -44,16 +71,28 @@ fn nearest_of<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     found: impl CandidateSet,
 ) -> Nearest<S, E> {
     let mut nearest = Nearest::none(simd);
+    offer_of::<S, E, F, EYE>(simd, scene, ray, found, &mut nearest);
+    nearest
+}
+
+/// Offers the hits of the rays with some objects.
+#[inline(always)]
+fn offer_of<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
+    simd: S,
+    scene: &Prepared<E>,
+    ray: Ray<S, E>,
+    found: impl CandidateSet,
+    nearest: &mut Nearest<S, E>,
+) {
     Kind::each(
         #[inline(always)]
         |kind| {
             let items = found.of(kind);
             if *F::KINDS.of(kind) && !items.is_empty() {
-                scene.shapes.intersect::<S, F::By, EYE>(simd, (kind, items), ray, None, &mut nearest);
+                scene.shapes.intersect::<S, F::By, EYE>(simd, (kind, items), ray, None, nearest);
             }
         },
     );
-    nearest
 }
 
 /// Returns the points of `lit` that a sun's light reaches.

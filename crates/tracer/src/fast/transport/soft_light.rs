@@ -17,9 +17,9 @@ use crate::fast::rays::bounce::{Column, Columns, Hits, RayBatch, columns};
 use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::Shape;
 use crate::fast::transport::hulls::{Cone, Hulls, Region};
-use crate::fast::transport::light::{Occluders, add_light, region, shows};
+use crate::fast::transport::light::{Occluders, add_light, region, shows, widened};
 use crate::fast::transport::search::{nearest, unoccluded};
-use crate::fast::transport::transmittance::{IncidentLight, Shadow};
+use crate::fast::transport::transmittance::{IncidentLight, Panes, Shadow};
 use crate::sampling::places::{in_ball, in_cone};
 use crate::sampling::{Dimensions, Points};
 
@@ -57,6 +57,13 @@ struct Ball {
 pub(crate) struct SoftLight<'a, E> {
     pub(crate) extents: &'a Extents,
     pub(crate) points: &'a LightPoints<E>,
+}
+
+/// The objects of the row and the bodies that shadow rays to a light ask for, as bits: at first, and for glass.
+#[derive(Clone, Copy)]
+struct Asked {
+    first: [u64; 2],
+    through: [u64; 2],
 }
 
 /// The points of a tile's camera rays: for a sun the unit vector towards it, for a lamp a place.
@@ -187,35 +194,56 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
             let finishes = beyond.and_then(Extensions::glossy);
             let rough = beyond.and_then(Extensions::rough);
             let glass = beyond.and_then(|beyond| Some((scene, beyond, beyond.glass()?)));
+            // Glass is asked for from where rays start again behind other glass.
+            let again = {
+                let (low, high) = widened(low, high);
+                Region::new(low, high)
+            };
+            let is_apart = scene.glass_apart().is_some();
             let all = |mask: u64| match &extents.hulls {
                 Some(_) => Candidates::masked(scene.masks(mask)),
+                None if is_apart => Candidates::masked(scene.masks(mask)),
                 None => scene.all(),
             };
-            let towards_sun = |hulls: &Option<Hulls>, sun: &SoftSun| match hulls {
-                Some(hulls) => hulls.towards(&from, &sun.cone),
+            let towards_sun = |hulls: &Option<Hulls>, from: &Region, sun: &SoftSun| match hulls {
+                Some(hulls) => hulls.towards(from, &sun.cone),
                 None => u64::MAX,
             };
-            let to_lamp = |hulls: &Option<Hulls>, ball: &Ball| match hulls {
-                Some(hulls) => hulls.between(&from, ball.middle, ball.radius),
+            let to_lamp = |hulls: &Option<Hulls>, from: &Region, ball: &Ball| match hulls {
+                Some(hulls) => hulls.between(from, ball.middle, ball.radius),
                 None => u64::MAX,
             };
             // Of objects and of bodies.
             let all_hulls = [&extents.hulls, &extents.bodies];
-            let sun_masks: Vec<[u64; 2]> = extents
+            let asked_first = scene.asked_first();
+            let first = |[shapes, bodies]: [u64; 2]| [shapes & asked_first[0], bodies & asked_first[1]];
+            let sun_masks: Vec<Asked> = extents
                 .suns
                 .iter()
                 .zip(&obstacles.of)
                 .map(|(sun, occluders)| match sun {
-                    Some((_, sun)) => all_hulls.map(|hulls| towards_sun(hulls, sun)),
-                    None => [0, occluders.bodies],
+                    Some((_, sun)) => Asked {
+                        first: first(all_hulls.map(|hulls| towards_sun(hulls, &from, sun))),
+                        through: match is_apart {
+                            true => all_hulls.map(|hulls| towards_sun(hulls, &again, sun)),
+                            false => [u64::MAX; 2],
+                        },
+                    },
+                    None => Asked { first: [0, occluders.bodies], through: occluders.through },
                 })
                 .collect();
-            let lamp_masks: Vec<[u64; 2]> = extents
+            let lamp_masks: Vec<Asked> = extents
                 .lamps
                 .iter()
                 .map(|lamp| match lamp {
-                    Some((_, ball)) => all_hulls.map(|hulls| to_lamp(hulls, ball)),
-                    None => [u64::MAX; 2],
+                    Some((_, ball)) => Asked {
+                        first: first(all_hulls.map(|hulls| to_lamp(hulls, &from, ball))),
+                        through: match is_apart {
+                            true => all_hulls.map(|hulls| to_lamp(hulls, &again, ball)),
+                            false => [u64::MAX; 2],
+                        },
+                    },
+                    None => Asked { first: asked_first, through: [u64::MAX; 2] },
                 })
                 .collect();
             for &(at, others) in &hits.packets {
@@ -235,13 +263,17 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     let ray = Ray { origin: start, direction: towards };
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        let scatters;
+                        (scatters, shines) =
+                            shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if lit.any_true() {
                         lit = if own.is_some() {
-                            let mut candidates = all(sun_masks[index][0]);
+                            let mut candidates = all(sun_masks[index].first[0]);
                             candidates.masks = candidates.masks.and_spheres(others);
                             unmet::<S, E, F>(simd, scene, ray, far, lit, candidates)
                         } else {
@@ -252,18 +284,19 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, sun_masks[index][1], ray, far, lit);
+                        lit = bodies.unoccluded(simd, sun_masks[index].first[1], ray, far, lit);
                     }
                     let mut color = Vec3::splat(simd, light.sun.color);
                     if let Some(glass) = glass {
-                        let shadow = Shadow { ray, far };
+                        let panes = Panes::new(scene, sun_masks[index].through);
                         let arriving = IncidentLight { color, lit };
-                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let shadow = Shadow { ray, far };
+                        let through = arriving.past_glass::<F>(simd, glass, (facing, panes), shadow);
                         (color, lit) = (through.color, through.lit);
                     }
                     sum = color.scale_add(lit.select(cosine, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, color };
+                        let lit = Lit { lanes: lit & shines, towards, color };
                         gloss.add(lit, (seen, normal), orders);
                         if let Some(paths) = rough {
                             gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));
@@ -288,28 +321,33 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         }
                     };
                     let mut facing = cosine.simd_gt(zero);
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        let scatters;
+                        (scatters, shines) =
+                            shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies
                         && lit.any_true()
                     {
-                        lit = bodies.unoccluded(simd, lamp_masks[index][1], ray, far, lit);
+                        lit = bodies.unoccluded(simd, lamp_masks[index].first[1], ray, far, lit);
                     }
-                    let mut candidates = all(lamp_masks[index][0]);
+                    let mut candidates = all(lamp_masks[index].first[0]);
                     candidates.masks = candidates.masks.and_spheres(others);
                     lit = unmet::<S, E, F>(simd, scene, ray, far, lit, candidates);
                     let mut color = Vec3::splat(simd, lamp.color);
                     if let Some(glass) = glass {
-                        let shadow = Shadow { ray, far };
+                        let panes = Panes::new(scene, lamp_masks[index].through);
                         let arriving = IncidentLight { color, lit };
-                        let through = arriving.through_glass::<F>(simd, glass, facing & !lit, shadow);
+                        let shadow = Shadow { ray, far };
+                        let through = arriving.past_glass::<F>(simd, glass, (facing, panes), shadow);
                         (color, lit) = (through.color, through.lit);
                     }
                     sum = color.scale_add(lit.select(cosine * part, zero), sum);
                     if let Some(gloss) = &mut gloss {
-                        let lit = Lit { lanes: lit, towards, color: color.scale(part) };
+                        let lit = Lit { lanes: lit & shines, towards, color: color.scale(part) };
                         gloss.add(lit, (seen, normal), orders);
                         if let Some(paths) = rough {
                             gloss.add_rough(paths, lit, (seen, normal), (orders, &hits.mirror, at));

@@ -7,8 +7,9 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
+use crate::fast::acceleration::candidates::Candidates;
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
-use crate::fast::bodies::ANY;
+use crate::fast::bodies::{ANY, Bodies};
 use crate::fast::build::extensions::Extensions;
 use crate::fast::build::features::Features;
 use crate::fast::build::prepare::Prepared;
@@ -31,15 +32,66 @@ pub(crate) struct IncidentLight<S: Simd, E: Real> {
     pub(crate) lit: Mask<S, E>,
 }
 
+/// The objects that shadow rays ask for glass.
+#[derive(Clone, Copy)]
+pub(crate) struct Panes {
+    candidates: Candidates<'static>,
+    bodies: u64,
+    /// Whether they are those of glass alone: the rays have been asked for all others before.
+    are_apart: bool,
+}
+
+impl Panes {
+    /// Returns those among objects of the row and bodies, which are given as bits, if glass is asked for apart; else all objects.
+    #[inline(always)]
+    pub(crate) fn new<E: Real>(scene: &Prepared<E>, [shapes, bodies]: [u64; 2]) -> Self {
+        match scene.glass_apart() {
+            Some(glass) => Self {
+                candidates: Candidates::masked(scene.masks(shapes & glass.shapes)),
+                bodies: bodies & glass.bodies,
+                are_apart: true,
+            },
+            None => Self { candidates: scene.all(), bodies: ANY, are_apart: false },
+        }
+    }
+
+    #[inline(always)]
+    fn is_empty<E: Real>(&self, bodies: Option<&Bodies<E>>) -> bool {
+        self.are_apart
+            && !self.candidates.kinds.any()
+            && self.bodies == 0
+            && !bodies.is_some_and(Bodies::has_planes_of_glass)
+    }
+}
+
 impl<S: Simd, E: Real> IncidentLight<S, E> {
-    /// Adds the light that passes through glass, for the `hidden` lanes, whose colour is still that of the light.
+    /// Follows the light of the `facing` lanes through glass. It has reached the `lit` ones past the objects that were asked for
+    /// first, and its colour is still that of the light.
+    #[inline(always)]
+    pub(crate) fn past_glass<F: Features<E>>(
+        self,
+        simd: S,
+        glass: (&Prepared<E>, &Extensions<E>, &Glass<E>),
+        (facing, panes): (Mask<S, E>, Panes),
+        shadow: Shadow<S, E>,
+    ) -> Self {
+        let Self { color, lit } = self;
+        let hidden = if panes.are_apart { lit } else { facing & !lit };
+        if !hidden.any_true() || panes.is_empty(glass.1.bodies()) {
+            return self;
+        }
+        let lit = lit & !hidden;
+        Self { color, lit }.through_glass::<F>(simd, glass, (hidden, panes), shadow)
+    }
+
+    /// Adds the light that passes through the glass of `panes`, for the `hidden` lanes, whose colour is still that of the light.
     // Out of line, so that it does not use registers of the lighting code for scenes without glass.
     #[inline(never)]
-    pub(crate) fn through_glass<F: Features<E>>(
+    fn through_glass<F: Features<E>>(
         self,
         simd: S,
         (scene, beyond, glass): (&Prepared<E>, &Extensions<E>, &Glass<E>),
-        hidden: Mask<S, E>,
+        (hidden, panes): (Mask<S, E>, Panes),
         shadow: Shadow<S, E>,
     ) -> Self {
         simd.vectorize(
@@ -59,9 +111,13 @@ impl<S: Simd, E: Real> IncidentLight<S, E> {
                     let of = |v: Vec3<S, E>| Vec3::splat(simd, [v.x[lane], v.y[lane], v.z[lane]]);
                     ray.origin = Vec3::select(open, ray.origin, of(ray.origin));
                     ray.direction = Vec3::select(open, ray.direction, of(ray.direction));
-                    let mut found = nearest::<S, E, F, false>(simd, scene, ray, scene.all());
-                    if let Some(bodies) = beyond.bodies() {
-                        bodies.intersect(simd, ANY, ray, &mut found);
+                    let mut found = nearest::<S, E, F, false>(simd, scene, ray, panes.candidates);
+                    match beyond.bodies() {
+                        Some(bodies) if panes.are_apart => {
+                            bodies.meet_glass(simd, panes.bodies, ray, &mut found);
+                        }
+                        Some(bodies) => bodies.intersect(simd, ANY, ray, &mut found),
+                        None => {}
                     }
                     if let Some(shared) = &scene.shared {
                         shared.settle::<S, E, F, false>(simd, scene, ray, &mut found);
