@@ -104,6 +104,7 @@ impl Real for f64 {
 }
 
 /// Products that are added and rounded once, on every machine.
+#[allow(clippy::disallowed_methods, reason = "where they round once")]
 pub(crate) trait Fused<S: Simd>: SimdFloat<S> {
     /// Returns `self · factor + other`.
     #[inline(always)]

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::solid::{Solid, Span};
 use crate::fast::acceleration::candidates::MASKED;
-use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
+use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::Shape;
 
@@ -96,18 +96,18 @@ impl<E: Real> BodyCuller<E> {
         // The square of the distance from the centre, at a place along the ray.
         let from_center = |t: Lanes<S, E>| {
             let aside = t - along;
-            aside.mul_add(aside, apart)
+            aside.fused_mul_add(aside, apart)
         };
         let nearest = along.max(enter).min(leave);
         let mut passes = leave.simd_lt(zero)
             | enter.simd_gt(
-                before.mul_add(constant::<S, E>(simd, LATER), constant::<S, E>(simd, LATER)) + before,
+                before.fused_mul_add(constant::<S, E>(simd, LATER), constant::<S, E>(simd, LATER)) + before,
             )
             | from_center(nearest).simd_gt(square);
         if hole > E::narrow(0.0) {
             // From the axis the distance is largest at one of the ends.
             let from_axis = |t: Lanes<S, E>| {
-                let height = slope.mul_add(t, start);
+                let height = slope.fused_mul_add(t, start);
                 from_center(t) - height * height
             };
             passes |= from_axis(enter).max(from_axis(leave)).simd_lt(splat::<S, E>(simd, hole) - slack);

@@ -117,8 +117,8 @@ impl<E: Real> Torus<E> {
         let inner = (ring - tube) * constant::<S, E>(simd, 1.0 - HOLE);
         let hole = inner * inner - outer * outer * constant::<S, E>(simd, HOLE);
         let apart = |t: Lanes<S, E>| {
-            let (x, y) = (direction.x.mul_add(t, place.x), direction.y.mul_add(t, place.y));
-            x.mul_add(x, y * y)
+            let (x, y) = (direction.x.fused_mul_add(t, place.x), direction.y.fused_mul_add(t, place.y));
+            x.fused_mul_add(x, y * y)
         };
         let goes_through = inner.simd_gt(zero) & apart(begin).max(apart(end)).simd_lt(hole);
         let mut open =
