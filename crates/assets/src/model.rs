@@ -308,8 +308,10 @@ impl Model {
     ///
     /// # Panics
     /// Panics if there is no such triangle.
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
-        self.triangles[triangle].map(|i| self.positions[i as usize])
+        let [a, b, c] = self.triangles[triangle];
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]]
     }
 
     /// Returns the positions, some of which may belong to no triangle.
@@ -333,6 +335,16 @@ impl Model {
         }
         // Of single precision, so that they are made unit again.
         Some(indices.map(|i| self.normals[i as usize].as_dvec3().normalize_or_zero()))
+    }
+
+    /// Returns the [normals](Self::normals) at the corners of a triangle as they are kept, of unit length but for the rounding
+    /// to single precision.
+    ///
+    /// # Panics
+    /// Panics if there is no such triangle.
+    pub fn rounded_normals(&self, triangle: usize) -> Option<[Vec3; 3]> {
+        let indices = self.normal_of.get(triangle)?;
+        (!indices.contains(&NONE)).then(|| indices.map(|i| self.normals[i as usize]))
     }
 
     /// Returns whether any triangle has normals of its own.

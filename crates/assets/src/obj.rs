@@ -178,8 +178,6 @@ const OPTIONS: [&[u8]; 13] = [
 #[derive(Default)]
 struct Reader {
     parts: Parts,
-    /// The colour of each position, and whether any has one.
-    has_colors: bool,
     names: HashMap<Vec<u8>, u32>,
     /// The pictures of looks.
     pictures: HashMap<u32, Map>,
@@ -187,9 +185,6 @@ struct Reader {
     defined: HashSet<u32>,
     lacks_library: bool,
     look: u32,
-    has_looks: bool,
-    has_normals: bool,
-    has_uvs: bool,
     lacks_uvs: bool,
     left_out: Vec<&'static str>,
 }
@@ -203,23 +198,13 @@ pub(crate) fn read(bytes: &[u8], refer: &mut Referred<'_>) -> Result<Parts, Faul
         reader.line(number, &line, refer)?;
     }
     reader.paint(refer)?;
-    let Reader { mut parts, has_colors, has_normals, has_uvs, lacks_uvs, has_looks, left_out, .. } = reader;
-    if !has_colors {
-        parts.colors = Vec::new();
-    }
-    if !has_normals {
-        parts.normal_of = Vec::new();
-    }
-    if !has_uvs {
-        parts.uv_of = Vec::new();
+    let Reader { mut parts, lacks_uvs, left_out, .. } = reader;
+    if parts.uv_of.is_empty() {
         if parts.looks.iter().any(|look| look.texture.is_some()) {
             parts.warnings.push("its pictures are seen at (0, 0): it has no texture coordinates".into());
         }
     } else if lacks_uvs {
         parts.warnings.push("corners without texture coordinates have (0, 0)".into());
-    }
-    if !has_looks {
-        parts.look_of = Vec::new();
     }
     if !left_out.is_empty() {
         parts.warnings.push(format!("{} are left out", left_out.join(", ")));
@@ -235,9 +220,8 @@ impl Reader {
             Some(b"v") => {
                 let ([x, y, z, r, g, b], count) = numbers::<6>(line, words, 3)?;
                 parts.positions.push(DVec3::new(x, y, z));
-                self.has_colors |= count == 6;
                 let color = if count == 6 { DVec3::new(r, g, b).as_vec3() } else { Vec3::ONE };
-                parts.colors.push(color);
+                push_late(&mut parts.colors, parts.positions.len(), color, (Vec3::ONE, count < 6));
                 bounded(line, parts.positions.len(), "positions")?;
             }
             Some(b"vn") => {
@@ -260,7 +244,6 @@ impl Reader {
                     self.parts.looks.push(Look::PLAIN);
                     bounded_looks(line, self.parts.looks.len())?;
                 }
-                self.has_looks = true;
             }
             Some(b"mtllib") => self.materials(line, text, refer)?,
             Some(b"p") => self.leave_out("points"),
@@ -291,17 +274,16 @@ impl Reader {
             };
             let uv = optional(of_uv, parts.uvs.len(), "texture coordinate")?;
             let normal = optional(rest, parts.normals.len(), "normal")?;
-            self.has_normals |= normal != NONE;
-            self.has_uvs |= uv != NONE;
             self.lacks_uvs |= uv == NONE;
             let corner = [position, uv, normal];
             count += 1;
             if let (Some(first), Some(last)) = (first, last) {
                 let of = |k: usize| [first, last, corner].map(|c: [u32; 3]| c[k]);
                 parts.triangles.push(of(0));
-                parts.uv_of.push(of(1));
-                parts.normal_of.push(of(2));
-                parts.look_of.push(self.look);
+                let count = parts.triangles.len();
+                push_late(&mut parts.uv_of, count, of(1), ([NONE; 3], of(1) == [NONE; 3]));
+                push_late(&mut parts.normal_of, count, of(2), ([NONE; 3], of(2) == [NONE; 3]));
+                push_late(&mut parts.look_of, count, self.look, (0, self.look == 0));
                 if parts.triangles.len() > limits::TRIANGLES {
                     return Err(too_many_triangles());
                 }
@@ -437,6 +419,18 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+/// Adds the last of `count` values. As long as all are missing there are none; later a missing one is the `usual` one.
+#[inline]
+fn push_late<T: Copy>(all: &mut Vec<T>, count: usize, value: T, (usual, is_missing): (T, bool)) {
+    if all.is_empty() {
+        if is_missing {
+            return;
+        }
+        all.resize(count - 1, usual);
+    }
+    all.push(value);
 }
 
 /// Returns a fault of a library of materials.

@@ -306,3 +306,15 @@ fn triangles_of_a_binary_ply_may_be_among_other_faces() {
 fn corners_of(face: &[u32]) -> [DVec3; 3] {
     [0, 1, 2].map(|k| DVec3::from(CORNERS[face[k] as usize].map(f64::from)))
 }
+
+#[test]
+fn what_only_some_lines_of_an_obj_have_is_that_of_these_lines() {
+    let text = "v 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\nvn 0 0 1\nvt 0 1\nf 1 2 3\nf 1//1 2//1 3//1\nusemtl a\nf 1/1 2/1 3/1\n";
+    let model = model("a.obj", text.into());
+    assert_eq!([0, 1, 2].map(|k| model.look(k)), [0, 0, 1]);
+    assert_eq!([0, 1, 2].map(|k| model.normals(k).is_some()), [false, true, false]);
+    assert_eq!(model.rounded_normals(1).unwrap()[2].to_array(), [0.0, 0.0, 1.0]);
+    assert_eq!(model.rounded_normals(2), None);
+    assert_eq!(model.vertex_colors(0).unwrap(), [DVec3::ONE; 3], "white of its own, not what has no colour");
+    assert_eq!([0, 2].map(|k| model.uvs(k).unwrap()[0].y), [0.0, 1.0]);
+}

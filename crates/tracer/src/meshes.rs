@@ -472,9 +472,10 @@ impl Run {
         self.is_filled
     }
 
-    /// Returns whether the tree of its model is shared. Then its looks stand for its faces among all objects.
-    pub(crate) fn is_shared(&self) -> bool {
-        self.is_shared
+    /// Returns its model and its placement, if the tree of the model is shared. Then its looks stand for its faces among all
+    /// objects.
+    pub(crate) fn shared_model(&self) -> Option<(&Model, Option<&Placement>)> {
+        self.is_shared.then(|| (&*self.model, self.placement.as_deref()))
     }
 
     /// Returns the positions of its faces among all objects.

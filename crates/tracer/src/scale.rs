@@ -10,7 +10,8 @@ pub(crate) fn below_inverse(x: f64) -> f64 {
     }
     // From the exponent bits, not by a logarithm: the result must double exactly when x halves.
     let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
-    2f64.powi(-exponent.clamp(-1000, 1000))
+    let inverse = 1023 - exponent.clamp(-1000, 1000);
+    f64::from_bits((inverse as u64) << 52)
 }
 
 #[cfg(test)]

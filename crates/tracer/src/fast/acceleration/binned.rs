@@ -46,12 +46,17 @@ const MARK: u32 = 0x4000_0000;
 
 /// A box. The last lane of `low` holds the bits of its index.
 #[derive(Clone, Copy)]
-struct Item {
+pub(crate) struct Item {
     low: Vec4,
     high: Vec4,
 }
 
 impl Item {
+    /// Returns the box with an index, from its smallest to its largest corner.
+    pub(crate) fn new(index: u32, low: Vec3A, high: Vec3A) -> Self {
+        Self { low: low.extend(f32::from_bits(index | MARK)), high: high.extend(0.0) }
+    }
+
     /// Returns twice its centre.
     fn middle(&self) -> Vec4 {
         self.low + self.high
@@ -122,8 +127,12 @@ struct Ruler<const N: usize> {
     scale: Vec4,
 }
 
+/// The number that rounds another of ordinary size to a whole one when it is added, and leaves it in the last bits.
+const WHOLE: f32 = 12_582_912.0;
+
 impl<const N: usize> Ruler<N> {
     fn new(middles: Span) -> Self {
+        const { assert!(N.is_power_of_two()) };
         let size = middles.high - middles.low;
         // Along an axis without an extent all are in the first slice.
         let scale = |size: f32| {
@@ -135,14 +144,14 @@ impl<const N: usize> Ruler<N> {
 
     /// Returns the numbers of the slices of a middle, along each axis.
     fn of(&self, middle: Vec4) -> [usize; 3] {
-        let place = (middle - self.from) * self.scale;
-        [place.x, place.y, place.z].map(|x| (x as i32 as usize).min(N - 1))
+        let place = (middle - self.from) * self.scale - 0.5 + WHOLE;
+        [place.x, place.y, place.z].map(|x| x.to_bits() as usize % N)
     }
 
     /// Returns the number of the slice of a middle along one axis.
     fn along(&self, axis: usize, middle: Vec4) -> usize {
-        let place = (middle[axis] - self.from[axis]) * self.scale[axis];
-        (place as i32 as usize).min(N - 1)
+        let place = (middle[axis] - self.from[axis]) * self.scale[axis] - 0.5 + WHOLE;
+        place.to_bits() as usize % N
     }
 
     fn count(&self, items: &[Item]) -> Slices<N> {
@@ -203,11 +212,12 @@ enum Subtree {
 impl Grown {
     /// Makes a tree of boxes, of which there is at least one. A leaf has at most `most`.
     pub(super) fn new(boxes: &[Aabb], most: usize) -> Self {
-        let item = |(index, of): (usize, &Aabb)| {
-            let low = Vec3A::extend(of.min, f32::from_bits(index as u32 | MARK));
-            Item { low, high: of.max.extend(0.0) }
-        };
-        let mut items: Vec<Item> = boxes.par_iter().enumerate().map(item).collect();
+        let item = |(index, of): (usize, &Aabb)| Item::new(index as u32, of.min, of.max);
+        Self::of(boxes.par_iter().enumerate().map(item).collect(), most)
+    }
+
+    /// Makes a tree of boxes as [`new`](Self::new) does.
+    pub(super) fn of(mut items: Vec<Item>, most: usize) -> Self {
         let middle = |mut span: Span, item: &Item| {
             span.add(item.middle());
             span
@@ -219,7 +229,7 @@ impl Grown {
         let middles = items.par_chunks(CHUNK).map(|items| items.iter().fold(Span::EMPTY, middle));
         let middles = middles.reduce(|| Span::EMPTY, join);
         let subtree = grow((&mut items, 0), middles, most, 0);
-        let mut nodes = Vec::with_capacity(boxes.len());
+        let mut nodes = Vec::with_capacity(items.len());
         nodes.push(Twig::default());
         subtree.flatten(0, &mut nodes);
         Self { nodes, order: items.par_iter().map(Item::index).collect() }

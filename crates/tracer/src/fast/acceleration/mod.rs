@@ -3,7 +3,7 @@
 //! In: bounds of placed shapes. Out: candidates, in an order that makes the first hit a near one. Read [`candidates`]
 //! first.
 
-mod binned;
+pub(crate) mod binned;
 pub(crate) mod candidates;
 pub(crate) mod descent;
 pub(crate) mod light_buffer;

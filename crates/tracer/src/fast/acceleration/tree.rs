@@ -1,20 +1,20 @@
 //! A bounding volume hierarchy for scenes of many objects.
 //!
 //! `obvhs` groups the objects, and their overlap [clusters](crate::fast::acceleration::overlap). Very many objects without such
-//! clusters are [parted by planes](crate::fast::acceleration::binned), which is sooner done. The bounding boxes are computed
-//! here, in the kernels' precision and wide enough for every rounding error of their tests ([`padded`]). So the tree never
+//! clusters, and the triangles of a large model, are [parted by planes](crate::fast::acceleration::binned), which is sooner
+//! done. The bounding boxes are computed here, in the kernels' precision and wide enough for every rounding error of their tests ([`padded`]). So the tree never
 //! hides an object that a test of all objects would hit.
 
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
-use crate::fast::acceleration::binned::{Grown, Twig};
+use crate::fast::acceleration::binned::{Grown, Item as Boxed, Twig};
 use crate::fast::acceleration::candidates::MASKED;
 use crate::fast::acceleration::overlap::OverlapClusters;
 use crate::fast::arithmetic::real::Real;
@@ -28,7 +28,7 @@ use crate::parallel::map;
 const LEAF: u32 = 4;
 
 /// The number of objects from which they are parted by planes.
-const VERY_MANY: usize = 4096;
+pub(crate) const VERY_MANY: usize = 4096;
 
 /// A node: its bounding box and its contents.
 #[derive(Clone, Copy, Debug)]
@@ -402,6 +402,48 @@ impl<E: Real> Tree<E> {
             Node { low, high, first, content }
         };
         Self { nodes: map(&place, node) }
+    }
+
+    /// Makes a tree of very many boxes of one kind, at least one. Returns it with the indices of the boxes in the order of its
+    /// leaves. `bounds` returns the exact bounds of a box; the boxes themselves only decide which are together.
+    pub(crate) fn of_many(
+        kind: Kind,
+        boxes: Vec<Boxed>,
+        bounds: impl Fn(u32) -> Bounds + Send + Sync,
+    ) -> (Self, Vec<u32>) {
+        let Grown { nodes, order } = Grown::of(boxes, LEAF as usize);
+        let node = |&Twig { first, count }: &Twig| {
+            let items = &order[first as usize..][..count as usize];
+            let (low, high) = padded(items.iter().map(|&at| bounds(at)).fold(NOTHING, join));
+            Node { low, high, first, content: count << Kind::BITS | kind.number() }
+        };
+        let mut nodes: Vec<Node<E>> = map(&nodes, node);
+        // Children come after their parents.
+        for at in (0..nodes.len()).rev() {
+            let Node { first, content, .. } = nodes[at];
+            if content >> Kind::BITS > 0 {
+                continue;
+            }
+            let first = first as usize;
+            let (one, other) = (nodes[first], nodes[first + 1]);
+            let middle = |of: &Node<E>| {
+                let [low, high] = [of.low, of.high].map(|corner| DVec3::from(corner.map(E::widen)));
+                low + high
+            };
+            let apart = middle(&other) - middle(&one);
+            let axis = apart.abs().max_position();
+            // The first child comes first along the axis on which their centres are farthest apart.
+            if apart[axis] < 0.0 {
+                nodes.swap(first, first + 1);
+            }
+            let node = &mut nodes[at];
+            node.content = axis as u32;
+            for k in 0..3 {
+                node.low[k] = if other.low[k] < one.low[k] { other.low[k] } else { one.low[k] };
+                node.high[k] = if other.high[k] > one.high[k] { other.high[k] } else { one.high[k] };
+            }
+        }
+        (Self { nodes }, order)
     }
 }
 

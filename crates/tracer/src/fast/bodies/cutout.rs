@@ -106,7 +106,7 @@ impl<E: Real> Cutout<E> {
                 }
                 let seen = Lanes::<S, E>::from_slice(simd, &seen[..Lanes::<S, E>::LEN]);
                 let seen = hit & seen.simd_gt(constant::<S, E>(simd, 0.0));
-                nearest.offer(simd, seen, found.distance, self.triangle.order);
+                nearest.offer(simd, seen, found.distance, self.triangle.facet.order);
             },
         );
     }

@@ -37,6 +37,7 @@ use self::cuboid::{Cuboid, CuboidForm};
 use self::cutout::{Cutout, CutoutForm};
 pub(super) use self::cutout::{Holes, cutout};
 use self::disc::{Disc, DiscForm};
+pub(super) use self::model::ModelFaces;
 use self::model::{ModelForm, SharedModel};
 use self::plane::PlaneForm;
 use self::roundbox::{Roundbox, RoundboxForm};

@@ -1,8 +1,9 @@
 //! The faces of meshes: normals at vertices, colours at vertices, and the inside of closed glass.
 //!
 //! Normals are mixed in lanes. The weights of a hit come from the edges that the tests of its triangle use, so that a
-//! hit needs nothing but its triangle and the three normals. As patterns are, colours are computed lane by lane, with the
-//! functions of the reference tracer.
+//! hit needs nothing but its triangle and the three normals. Hits on a model with a tree of its own are moved into the
+//! model's coordinates for it, and the normals back. As patterns are, colours are computed lane by lane, with the functions
+//! of the reference tracer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,9 +15,10 @@ use rayfold_scene::Scene;
 use rayon::prelude::*;
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
+use crate::fast::bodies::ModelFaces;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Hits, ROOM, RayBatch};
-use crate::fast::shapes::triangle::Triangle;
+use crate::fast::shapes::triangle::{Facet, Triangle};
 use crate::meshes::{FaceHit, Faces, Run, hit_face};
 
 /// The faces of a scene, at least one of which has more than a triangle.
@@ -25,6 +27,8 @@ pub(crate) struct ShadedFaces<E> {
     faces: Arc<Faces>,
     /// The runs of faces that have more than triangles.
     runs: Vec<ShadedRun<E>>,
+    /// Whether any are drawn from the trees of their models.
+    has_models: bool,
     /// The scene, for its materials.
     scene: Scene,
     center: DVec3,
@@ -38,8 +42,8 @@ struct ShadedRun<E> {
     orders: Range<usize>,
     /// The index among all runs of faces.
     index: usize,
-    /// Whether the faces are drawn from the tree of their model. Then their normals are looked up there.
-    is_shared: bool,
+    /// The faces in their model, if they are drawn from its tree. Then their normals are there.
+    model: Option<ModelFaces<E>>,
     /// The unit normals at the corners of each face; zeros for a flat one. Empty if all are flat.
     normals: Vec<[[E; 3]; 3]>,
     /// Whether colours vary within faces.
@@ -72,8 +76,10 @@ impl<E: Real> ShadedFaces<E> {
         let faces = geometry.faces.clone()?;
         let (scene, center, scale) = (scene.clone(), geometry.center, geometry.scale);
         let runs = faces.runs().iter().enumerate().filter(|(_, run)| run.is_shaded());
-        let runs = runs.map(|(index, run)| ShadedRun::new(index, run, &scene)).collect();
-        Some(Self { faces, runs, scene, center, scale })
+        let runs = runs.map(|(index, run)| ShadedRun::new(index, run, &scene, (center, scale)));
+        let runs: Vec<_> = runs.collect();
+        let has_models = runs.iter().any(|run| run.model.is_some());
+        Some(Self { faces, runs, has_models, scene, center, scale })
     }
 
     /// Gives hits the normals and colours of their faces. Rays that go on from them start as from triangles.
@@ -92,13 +98,28 @@ impl<E: Real> ShadedFaces<E> {
         simd.vectorize(
             #[inline(always)]
             || {
+                if self.has_models {
+                    self.fetch::<S>(hits);
+                }
                 let mut gathered = Gathered::new();
                 for packet in 0..hits.packets.len() {
                     let (at, _) = hits.packets[packet];
-                    self.gather(&triangle, hits, at..at + Lanes::<S, E>::LEN, &mut gathered);
-                    let weights = gathered.mix(simd, queue, hits, at);
-                    if gathered.more_count > 0 {
-                        self.add_more::<S, EYE>(queue, hits, (at, &gathered, weights));
+                    let lanes = at..at + Lanes::<S, E>::LEN;
+                    Vec3::<S, E>::load(simd, &hits.normal, at).store(&mut hits.face, at);
+                    Vec3::<S, E>::load(simd, &hits.start, at).store(&mut hits.place, at);
+                    Vec3::<S, E>::load(simd, &hits.normal, at).store(&mut hits.onward, at);
+                    Vec3::<S, E>::zero(simd).store(&mut hits.under, at);
+                    // The faces of one model at a time.
+                    let mut open = lanes
+                        .clone()
+                        .filter(|lane| hits.is_hit(*lane))
+                        .fold(0u32, |all, lane| all | 1 << (lane - at));
+                    while open != 0 {
+                        let model = self.gather(&triangle, hits, lanes.clone(), &mut open, &mut gathered);
+                        let weights = gathered.mix(simd, model, queue, hits, at);
+                        if gathered.more_count > 0 {
+                            self.add_more::<S, EYE>(queue, hits, (at, &gathered, weights));
+                        }
                     }
                 }
             },
@@ -115,58 +136,82 @@ impl<E: Real> ShadedFaces<E> {
         self.runs[at].orders.contains(&order).then_some(at)
     }
 
+    /// Reads from the normals of all hits on models with trees of their own, independently of each other, so that memory brings
+    /// them while others are still on their way.
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, hits: &Hits<E>) {
+        let mut sum = 0;
+        let mut last = 0;
+        for &(at, _) in &hits.packets {
+            for lane in (at..at + Lanes::<S, E>::LEN).filter(|lane| hits.is_hit(*lane)) {
+                let hit = hits.order.0[lane];
+                let order = hit.to_index();
+                if !self.runs[last].orders.contains(&order) {
+                    let Some(run) = self.run_of(order) else { continue };
+                    last = run;
+                }
+                if let Some(model) = &self.runs[last].model {
+                    sum ^= model.fetch(hit_face(hit.widen()));
+                }
+            }
+        }
+        std::hint::black_box(sum);
+    }
+
+    /// Gathers the faces of open lanes, and takes their bits: those of one model that is drawn from its tree, which is
+    /// returned, or those of all other objects.
     #[inline(always)]
     fn gather<'t>(
         &self,
         triangle: impl Fn(usize) -> Option<&'t Triangle<E>>,
         hits: &Hits<E>,
         lanes: Range<usize>,
+        open: &mut u32,
         into: &mut Gathered<E>,
-    ) where
+    ) -> Option<&ModelFaces<E>>
+    where
         E: 't,
     {
         into.more_count = 0;
         into.is_face = [E::narrow(0.0); 16];
         into.ior = [E::narrow(0.0); 16];
-        for (lane, at) in lanes.enumerate() {
-            if !hits.is_hit(at) {
+        let mut first: Option<usize> = None;
+        let (mut rest, mut left) = (*open, 0);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let hit = hits.order.0[lanes.start + lane];
+            let order = hit.to_index();
+            // Neighbours mostly hit the same model.
+            let is_same = |run: &usize| self.runs[*run].orders.contains(&order);
+            let Some(run) = first.filter(is_same).or_else(|| self.run_of(order)) else { continue };
+            let ShadedRun { orders, normals, model, is_colored, ior, is_filled, .. } = &self.runs[run];
+            if first
+                .is_some_and(|first| first != run && (model.is_some() || self.runs[first].model.is_some()))
+            {
+                left |= 1 << lane;
                 continue;
             }
-            let order = hits.order.0[at].to_index();
-            let Some(run) = self.run_of(order) else { continue };
-            let ShadedRun { orders, normals, is_shared, is_colored, ior, is_filled, .. } = &self.runs[run];
-            let triangle = if *is_shared { None } else { triangle(order) };
-            let has_holes = triangle.is_none() && !is_shared;
+            first = Some(run);
+            let triangle = if model.is_some() { None } else { triangle(order) };
+            let has_holes = triangle.is_none() && model.is_none();
             if *is_colored || has_holes {
                 into.more[into.more_count] = (lane, run, has_holes);
                 into.more_count += 1;
             }
-            if *is_shared {
-                self.gather_shared(run, hits.order.0[at], into, lane);
+            if let Some(model) = model {
+                let (facet, normals) = model.face(hit_face(hit.widen()));
+                into.put(lane, facet, normals);
+            } else if let Some(Triangle { facet, .. }) = triangle {
+                let normals = normals.get(order - orders.start).copied();
+                into.put(lane, facet, normals.unwrap_or([[E::narrow(0.0); 3]; 3]));
+            } else {
+                continue;
             }
-            let Some(triangle) = triangle else { continue };
             (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
-            let normals = normals.get(order - orders.start).copied().unwrap_or([[E::narrow(0.0); 3]; 3]);
-            for (corner, (edge, normal)) in triangle.edges.iter().zip(normals).enumerate() {
-                into.put(lane, corner, [edge.direction, edge.moment, normal]);
-            }
         }
-    }
-
-    /// Gathers the face of a hit on a model that has a tree of its own.
-    #[inline(always)]
-    fn gather_shared(&self, run: usize, order: E, into: &mut Gathered<E>, lane: usize) {
-        let ShadedRun { index, ior, is_filled, .. } = &self.runs[run];
-        let (run, k) = (&self.faces.runs()[*index], hit_face(order.widen()));
-        (into.ior[lane], into.is_filled[lane]) = (*ior, *is_filled);
-        let corners = run.corners(k, self.center, self.scale);
-        let normals = run.normals(k).unwrap_or_default();
-        for (corner, normal) in normals.into_iter().enumerate() {
-            let (next, last) = (corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
-            let edge = last - next;
-            let all = [edge, next.cross(edge), normal];
-            into.put(lane, corner, all.map(|v| v.to_array().map(E::narrow)));
-        }
+        *open = left;
+        first.and_then(|run| self.runs[run].model.as_ref())
     }
 
     /// Adds the colours of faces. A face with holes is shaded by the functions of the reference
@@ -184,7 +229,7 @@ impl<E: Real> ShadedFaces<E> {
             let order = face_order as usize;
             let material = self.scene.objects[order].material();
             let (direction, face) = (read(&queue.direction, lane), read(&hits.face, lane));
-            let ShadedRun { orders, index, is_shared, .. } = &self.runs[run];
+            let ShadedRun { orders, index, model, .. } = &self.runs[run];
             let [color, glow] = if has_holes {
                 let (start, offset) = (read(&hits.start, lane), hits.sides[0].0[lane].widen());
                 let point = start - offset * face;
@@ -202,7 +247,7 @@ impl<E: Real> ShadedFaces<E> {
                 [shading.color, shading.glow]
             } else {
                 let run = &self.faces.runs()[*index];
-                let k = if *is_shared { hit_face(face_order) } else { order - orders.start };
+                let k = if model.is_some() { hit_face(face_order) } else { order - orders.start };
                 run.colors(k, weights.map(|of| of[of_packet].widen()), material)
             };
             let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
@@ -215,14 +260,14 @@ impl<E: Real> ShadedFaces<E> {
 }
 
 impl<E: Real> ShadedRun<E> {
-    fn new(index: usize, run: &Run, scene: &Scene) -> Self {
+    fn new(index: usize, run: &Run, scene: &Scene, place: (DVec3, f64)) -> Self {
         let orders = run.orders();
         let row = |k: usize| {
             let normals = run.normals(k).unwrap_or_default();
             normals.map(|normal| normal.to_array().map(E::narrow))
         };
-        let is_shared = run.is_shared();
-        let normals = if run.has_normals() && !is_shared {
+        let model = run.shared_model().map(|(model, placement)| ModelFaces::new(model, placement, place));
+        let normals = if run.has_normals() && model.is_none() {
             (0..orders.len()).into_par_iter().with_min_len(1024).map(row).collect()
         } else {
             vec![]
@@ -230,7 +275,7 @@ impl<E: Real> ShadedRun<E> {
         let glass = scene.objects[orders.start].material().finish().and_then(|finish| finish.glass);
         let ior = E::narrow(glass.map_or(0.0, |glass| glass.ior()));
         let is_filled = E::narrow(if run.is_filled() { 1.0 } else { 0.0 });
-        Self { orders, index, is_shared, normals, is_colored: run.is_colored(), ior, is_filled }
+        Self { orders, index, model, normals, is_colored: run.is_colored(), ior, is_filled }
     }
 }
 
@@ -249,39 +294,56 @@ impl<E: Real> Gathered<E> {
         }
     }
 
-    /// Takes what a lane hits at a corner: the edge opposite to it, its moment, and the corner's normal.
+    /// Takes the face that a lane hits: its edges, and the normals at its corners.
     #[inline(always)]
-    fn put(&mut self, lane: usize, corner: usize, all: [[E; 3]; 3]) {
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "the same numbers index several arrays, and iterators are not unrolled"
+    )]
+    fn put(&mut self, lane: usize, facet: &Facet<E>, normals: [[E; 3]; 3]) {
+        let lane = lane % 16;
         self.is_face[lane] = E::narrow(1.0);
-        let columns = [&mut self.edges[corner], &mut self.moments[corner], &mut self.normals[corner]];
-        for (column, value) in columns.into_iter().flatten().zip(all.into_iter().flatten()) {
-            column[lane] = value;
+        for corner in 0..3 {
+            let edge = &facet.edges[corner];
+            for axis in 0..3 {
+                self.edges[corner][axis][lane] = edge.direction[axis];
+                self.moments[corner][axis][lane] = edge.moment[axis];
+                self.normals[corner][axis][lane] = normals[corner][axis];
+            }
         }
     }
 
-    /// Mixes the normals of a packet's hits, and lifts the starts of its shadow rays. Returns the weights of the corners.
+    /// Mixes the normals of the gathered faces, in the coordinates of their `model` if they have one, and lifts the starts of
+    /// their shadow rays. Returns the weights of the corners.
     #[inline(always)]
-    fn mix<S: Simd>(&self, simd: S, queue: &RayBatch<E>, hits: &mut Hits<E>, at: usize) -> [Lanes<S, E>; 3] {
+    fn mix<S: Simd>(
+        &self,
+        simd: S,
+        model: Option<&ModelFaces<E>>,
+        queue: &RayBatch<E>,
+        hits: &mut Hits<E>,
+        at: usize,
+    ) -> [Lanes<S, E>; 3] {
         let zero = constant::<S, E>(simd, 0.0);
         let one = constant::<S, E>(simd, 1.0);
         let minus = constant::<S, E>(simd, -1.0);
         let lanes = at..at + Lanes::<S, E>::LEN;
-        let (start, face) = (Vec3::load(simd, &hits.start, at), Vec3::load(simd, &hits.normal, at));
-        face.store(&mut hits.face, at);
-        start.store(&mut hits.place, at);
         let is_face = Lanes::<S, E>::from_slice(simd, &self.is_face[..Lanes::<S, E>::LEN]).simd_gt(zero);
         if !is_face.any_true() {
-            face.store(&mut hits.onward, at);
-            Vec3::<S, E>::zero(simd).store(&mut hits.under, at);
             return [one, zero, zero];
         }
+        let (start, face) = (Vec3::load(simd, &hits.start, at), Vec3::<S, E>::load(simd, &hits.face, at));
         let direction = Vec3::<S, E>::load(simd, &queue.direction, at);
         let offset = Lanes::<S, E>::from_slice(simd, &hits.sides[0].0[lanes.clone()]);
         let point = start.sub(face.scale(offset));
+        let (point, own_face) = match model {
+            Some(model) => model.enter(simd, (point, face)),
+            None => (point, face),
+        };
         let edges: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.edges[k], 0));
         let areas: [Lanes<S, E>; 3] = [0, 1, 2].map(|k: usize| {
             let moment = Vec3::<S, E>::load(simd, &self.moments[k], 0);
-            face.dot(edges[k].cross(point)) + face.dot(moment)
+            own_face.dot(edges[k].cross(point)) + own_face.dot(moment)
         });
         // The face may be seen from its other side.
         let side = (areas[0] + areas[1] + areas[2]).simd_lt(zero).select(minus, one);
@@ -292,14 +354,13 @@ impl<E: Real> Gathered<E> {
         let [a, b, c] = areas.map(|area| area * share);
         let weights = [is_within.select(a, one), b, c];
         let normals: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.normals[k], 0));
-        let towards = |normal: Vec3<S, E>| normal.scale(normal.dot(face).simd_lt(zero).select(minus, one));
+        let towards =
+            |normal: Vec3<S, E>| normal.scale(normal.dot(own_face).simd_lt(zero).select(minus, one));
         let mixed = normals[0].scale(weights[0]);
         let mixed = normals[2].scale_add(weights[2], normals[1].scale_add(weights[1], mixed));
         let length = mixed.dot(mixed).sqrt();
         let is_any = length.simd_gt(zero);
         let mixed = towards(mixed.scale(one / is_any.select(length, one)));
-        let is_mixed: Mask<S, E> = is_face & is_any & mixed.dot(direction).simd_lt(zero);
-        let normal = Vec3::select(is_mixed, mixed, face);
         // The ways from the hit to the corners.
         let ways = [(1, 2), (2, 0), (0, 1)].map(|(next, last): (usize, usize)| {
             edges[next].scale(weights[last]).sub(edges[last].scale(weights[next]))
@@ -310,13 +371,18 @@ impl<E: Real> Gathered<E> {
             let above = normal.dot(ways[corner]).max(zero);
             lift = normal.scale_add(above * weights[corner], lift);
         }
-        let lift = Vec3::select(is_face, lift, Vec3::zero(simd));
+        let (mixed, lift) = match model {
+            Some(model) => model.leave(simd, (mixed, lift)),
+            None => (mixed, lift),
+        };
+        let is_mixed: Mask<S, E> = is_face & is_any & mixed.dot(direction).simd_lt(zero);
+        let normal = Vec3::select(is_mixed, mixed, face);
         // A face that the start is lifted off can hide a light; a face that it starts on cannot.
         let is_low = is_face & lift.dot(face).simd_le(offset);
         let under = face.scale(offset * constant::<S, E>(simd, -2.0));
-        Vec3::select(is_low, under, Vec3::zero(simd)).store(&mut hits.under, at);
-        normal.store(&mut hits.normal, at);
-        lift.scale_add(one, start).store(&mut hits.start, at);
+        Vec3::select(is_low, under, Vec3::load(simd, &hits.under, at)).store(&mut hits.under, at);
+        Vec3::select(is_face, normal, Vec3::load(simd, &hits.normal, at)).store(&mut hits.normal, at);
+        Vec3::select(is_face, lift.scale_add(one, start), start).store(&mut hits.start, at);
         let towards = direction.dot(normal).min(zero);
         let mirrored = normal.scale_add(towards * constant::<S, E>(simd, -2.0), direction);
         let mut goes_on = mirrored.dot(face).simd_gt(zero);
@@ -325,6 +391,7 @@ impl<E: Real> Gathered<E> {
         if is_glass.any_true() {
             let is_filled =
                 Lanes::<S, E>::from_slice(simd, &self.is_filled[..Lanes::<S, E>::LEN]).simd_gt(zero);
+            // No model that is drawn from its tree is of glass.
             let outwards = normals_of_faces(simd, &edges);
             let within = is_glass & is_filled & outwards.dot(direction).simd_gt(zero);
             let is_within = Lanes::<S, E>::from_slice(simd, &hits.sides[1].0[lanes.clone()]);
@@ -342,7 +409,8 @@ impl<E: Real> Gathered<E> {
             let is_above = bent.dot(face).simd_ge(zero) & !is_total;
             goes_on &= !(is_glass & is_filled & is_above);
         }
-        Vec3::select(goes_on, normal, face).store(&mut hits.onward, at);
+        let onward = Vec3::select(goes_on, normal, face);
+        Vec3::select(is_face, onward, Vec3::load(simd, &hits.onward, at)).store(&mut hits.onward, at);
         weights
     }
 }

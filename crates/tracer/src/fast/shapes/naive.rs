@@ -108,14 +108,14 @@ impl<E: Real> Tests<Triangle<E>, E> for Naive {
             return Robust::intersect::<S, EYE>(simd, triangle, place, ray, moment, nearest);
         }
         let zero = constant::<S, E>(simd, 0.0);
-        let [a, b, c] = &triangle.edges;
+        let [a, b, c] = &triangle.facet.edges;
         let (a, b, c) = (side(simd, a, ray, moment), side(simd, b, ray, moment), side(simd, c, ray, moment));
         let inside = a.min(b).min(c).simd_ge(zero) | a.max(b).max(c).simd_le(zero);
         if inside.any_true() {
-            let normal = Vec3::splat(simd, triangle.normal);
-            let above = splat::<S, E>(simd, triangle.height) - normal.dot(ray.origin);
+            let normal = Vec3::splat(simd, triangle.facet.normal);
+            let above = splat::<S, E>(simd, triangle.facet.height) - normal.dot(ray.origin);
             let distance = above / normal.dot(ray.direction);
-            nearest.offer(simd, inside & distance.simd_gt(zero), distance, triangle.order);
+            nearest.offer(simd, inside & distance.simd_gt(zero), distance, triangle.facet.order);
         }
     }
 
@@ -127,7 +127,7 @@ impl<E: Real> Tests<Triangle<E>, E> for Naive {
         distance: Lanes<S, E>,
     ) -> Surface<S, E> {
         let point = ray.direction.scale_add(distance, ray.origin);
-        off(simd, point, facing(simd, Vec3::splat(simd, triangle.normal), ray))
+        off(simd, point, facing(simd, Vec3::splat(simd, triangle.facet.normal), ray))
     }
 }
 

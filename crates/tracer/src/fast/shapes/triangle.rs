@@ -35,7 +35,8 @@ impl RenderSpaceTriangle {
     /// Makes a triangle, moved so that `center` is the origin, and then scaled. Returns `None` if it has no area, or if
     /// rounding leaves it none: then it is too thin to be visible.
     pub(in crate::fast) fn new(corners: &[DVec3; 3], center: DVec3, scale: f64) -> Option<Self> {
-        let vertices = corners.map(|vertex| (vertex - center) * scale);
+        let place = |vertex: DVec3| (vertex - center) * scale;
+        let vertices = [place(corners[0]), place(corners[1]), place(corners[2])];
         // Its own size decides whether it has an area, independent of its position.
         let (own, width) = normal_and_width(corners);
         if own == DVec3::ZERO {
@@ -128,24 +129,48 @@ impl<E: Real> Edge<E> {
 /// A triangle as the kernels use it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::fast) struct Triangle<E> {
-    pub(in crate::fast) edges: [Edge<E>; 3],
+    pub(in crate::fast) facet: Facet<E>,
     /// The edges for rays from the eye, in units of twice a bound on the error, with signs such that visible points are
     /// not negative. Below 0 is outside; from 0 to 1 is in doubt. The last number is a half, or negative if the eye is
     /// in the plane.
     from_eye: [([E; 3], E); 3],
+}
+
+/// A triangle for rays from any origin.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::fast) struct Facet<E> {
+    pub(in crate::fast) edges: [Edge<E>; 3],
     pub(in crate::fast) normal: [E; 3],
     /// `normal · point` of its points.
     pub(in crate::fast) height: E,
     pub(in crate::fast) order: E,
 }
 
+/// An edge before it is rounded.
+struct Line {
+    direction: DVec3,
+    moment: DVec3,
+    /// A bound on the error of the moment that `f64` adds.
+    noise: f64,
+}
+
+impl Line {
+    /// Returns the edges opposite to the corners.
+    #[inline(always)]
+    fn all(ends: &Ends) -> [Self; 3] {
+        [(1, 2), (2, 0), (0, 1)].map(|(from, to)| {
+            let (direction, anchor) = (ends.vertices[to] - ends.vertices[from], ends.nearer(from, to));
+            let noise = CONSTANT * l1(anchor) * l1(direction);
+            Self { direction, moment: anchor.cross(direction), noise }
+        })
+    }
+}
+
 impl<E: Real> Triangle<E> {
     // Out of line, and below too, so that the code that runs for a million triangles is the same for every caller.
     #[inline(never)]
-    pub(in crate::fast) fn new(
-        &RenderSpaceTriangle { vertices, normal, height }: &RenderSpaceTriangle,
-        order: u32,
-    ) -> Self {
+    pub(in crate::fast) fn new(triangle: &RenderSpaceTriangle, order: u32) -> Self {
+        let vertices = triangle.vertices;
         let [a, b, c] = vertices;
         let ends = Ends::new(vertices);
         let [to_a, to_b, to_c] = ends.squares.map(f64::sqrt);
@@ -154,25 +179,70 @@ impl<E: Real> Triangle<E> {
         let coordinates = vertices.iter().fold(DVec3::ZERO, |most, v| most.max(v.abs()));
         let noise = VOLUME * lengths.min(6.0 * coordinates.element_product());
         let sign = if volume.abs() > noise { volume.signum() } else { 0.0 };
+        let lines = Line::all(&ends);
+        let facet = Facet::of(&lines, triangle, order);
+        let from_eye = lines.map(|Line { moment, noise, .. }| {
+            let scale = 0.5 * sign / (SIDE_OF_PIXEL * E::ROUNDOFF * moment.length() + noise);
+            (point(moment * scale), E::narrow(if sign == 0.0 { -1.0 } else { 0.5 }))
+        });
+        Self { facet, from_eye }
+    }
+
+    #[inline(always)]
+    fn meet_from_eye<S: Simd>(
+        &self,
+        simd: S,
+        place: Place,
+        direction: Vec3<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        let [a, b, c] = self.from_eye;
+        let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
+        let least = a.min(b).min(affine(simd, c, direction));
+        let inside = least.simd_ge(constant::<S, E>(simd, 0.0));
+        if inside.any_true() {
+            let slope = Vec3::splat(simd, self.facet.normal).dot(direction);
+            let distance = splat::<S, E>(simd, self.facet.height) * (constant::<S, E>(simd, 1.0) / slope);
+            // A hit that is clear of the edges is ahead, because of the signs of the sides.
+            let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
+            let ray = (Vec3::zero(simd), direction, Beside::Eye);
+            self.facet.offer_settled(simd, place, ray, (inside, clear), (slope, distance), nearest);
+        }
+    }
+}
+
+impl<E: Real> Facet<E> {
+    /// Returns a triangle that no ray meets, in place of one without an area.
+    pub(in crate::fast) fn nothing(order: u32) -> Self {
+        let zero = [E::narrow(0.0); 3];
+        let edge = Edge { direction: zero, moment: zero, slack: (E::narrow(-1.0), E::narrow(0.0)) };
+        Self { edges: [edge; 3], normal: zero, height: E::narrow(0.0), order: E::narrow(f64::from(order)) }
+    }
+
+    #[inline(never)]
+    pub(in crate::fast) fn new(triangle: &RenderSpaceTriangle, order: u32) -> Self {
+        Self::of(&Line::all(&Ends::new(triangle.vertices)), triangle, order)
+    }
+
+    /// Returns whether it stands in place of one without an area.
+    pub(in crate::fast) fn is_nothing(&self) -> bool {
+        self.edges[0].slack.0.widen() < 0.0
+    }
+
+    #[inline(always)]
+    fn of(lines: &[Line; 3], triangle: &RenderSpaceTriangle, order: u32) -> Self {
         // From other origins a cross product adds its errors.
         let slack =
             |size: f64, noise: f64| E::narrow(2.0 * side_of_going_on::<E>() * E::ROUNDOFF * size + noise);
-        let edge = |from: usize, to: usize| {
-            let (direction, anchor) = (vertices[to] - vertices[from], ends.nearer(from, to));
-            let moment = anchor.cross(direction);
-            let length = l1(direction);
-            let noise = CONSTANT * l1(anchor) * length;
-            let scale = 0.5 * sign / (SIDE_OF_PIXEL * E::ROUNDOFF * moment.length() + noise);
-            let from_eye = (point(moment * scale), E::narrow(if sign == 0.0 { -1.0 } else { 0.5 }));
-            let (direction, slack) = (point(direction), (slack(l1(moment), noise), slack(length, 0.0)));
-            (Edge { direction, moment: point(moment), slack }, from_eye)
-        };
-        let [a, b, c] = [edge(1, 2), edge(2, 0), edge(0, 1)];
+        let edges = lines.each_ref().map(|&Line { direction, moment, noise }| Edge {
+            direction: point(direction),
+            moment: point(moment),
+            slack: (slack(l1(moment), noise), slack(l1(direction), 0.0)),
+        });
         Self {
-            edges: [a.0, b.0, c.0],
-            from_eye: [a.1, b.1, c.1],
-            normal: point(normal),
-            height: E::narrow(height),
+            edges,
+            normal: point(triangle.normal),
+            height: E::narrow(triangle.height),
             order: E::narrow(f64::from(order)),
         }
     }
@@ -182,7 +252,7 @@ impl<E: Real> Triangle<E> {
     /// like that of a box's slab, so that a triangle in the plane of a face is hit at the face's distance. A ray within
     /// the rounding error of the plane misses.
     #[inline(always)]
-    fn meet_from_anywhere<S: Simd>(
+    pub(in crate::fast) fn meet_from_anywhere<S: Simd>(
         &self,
         simd: S,
         place: Place,
@@ -212,28 +282,6 @@ impl<E: Real> Triangle<E> {
         }
     }
 
-    #[inline(always)]
-    fn meet_from_eye<S: Simd>(
-        &self,
-        simd: S,
-        place: Place,
-        direction: Vec3<S, E>,
-        nearest: &mut Nearest<S, E>,
-    ) {
-        let [a, b, c] = self.from_eye;
-        let (a, b) = (affine(simd, a, direction), affine(simd, b, direction));
-        let least = a.min(b).min(affine(simd, c, direction));
-        let inside = least.simd_ge(constant::<S, E>(simd, 0.0));
-        if inside.any_true() {
-            let slope = Vec3::splat(simd, self.normal).dot(direction);
-            let distance = splat::<S, E>(simd, self.height) * (constant::<S, E>(simd, 1.0) / slope);
-            // A hit that is clear of the edges is ahead, because of the signs of the sides.
-            let clear = least.simd_gt(constant::<S, E>(simd, 1.0));
-            let ray = (Vec3::zero(simd), direction, Beside::Eye);
-            self.offer_settled(simd, place, ray, (inside, clear), (slope, distance), nearest);
-        }
-    }
-
     /// Offers a `hit`. If it is not `clear` of the edges, or the ray is nearly in the plane, offers the settled result.
     /// A ray within the rounding error of the plane misses.
     #[inline(always)]
@@ -259,6 +307,29 @@ impl<E: Real> Triangle<E> {
         let met = sure | (met & steep & distance.simd_gt(constant::<S, E>(simd, 0.0)));
         nearest.offer(simd, hit & met, distance, self.order);
     }
+
+    /// Returns the surface at the hits of the rays. The point is moved onto the plane by its height above it.
+    #[inline(always)]
+    pub(in crate::fast) fn surface<S: Simd>(
+        &self,
+        simd: S,
+        ray: Ray<S, E>,
+        distance: Lanes<S, E>,
+    ) -> Surface<S, E> {
+        let normal = Vec3::splat(simd, self.normal);
+        let zero = constant::<S, E>(simd, 0.0);
+        let point = ray.direction.scale_add(distance, ray.origin);
+        let height = splat::<S, E>(simd, self.height);
+        let above = normal.dot(point) - height;
+        let side = normal
+            .dot(ray.direction)
+            .simd_gt(zero)
+            .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
+        let offset =
+            offset(simd, point, OFFSET) + height.abs() * constant::<S, E>(simd, OFFSET * E::ROUNDOFF);
+        let start = normal.scale_add(side * offset - above, point);
+        Surface { start, normal: normal.scale(side), offset, within: no_lane::<S, E>(simd) }
+    }
 }
 
 /// The per-ray constants of the triangle test.
@@ -271,6 +342,15 @@ pub(in crate::fast) struct Moment<S: Simd, E: Real> {
 }
 
 impl<E: Real> Precalculations<E> for Triangle<E> {
+    type RayPrecalculations<S: Simd> = Moment<S, E>;
+
+    #[inline(always)]
+    fn aim<S: Simd>(simd: S, ray: Ray<S, E>) -> Moment<S, E> {
+        Facet::aim(simd, ray)
+    }
+}
+
+impl<E: Real> Precalculations<E> for Facet<E> {
     type RayPrecalculations<S: Simd> = Moment<S, E>;
 
     #[inline(always)]
@@ -293,11 +373,10 @@ impl<E: Real> Tests<Triangle<E>, E> for Robust {
         if EYE {
             triangle.meet_from_eye(simd, place, ray.direction, nearest);
         } else {
-            triangle.meet_from_anywhere(simd, place, ray, moment, nearest);
+            triangle.facet.meet_from_anywhere(simd, place, ray, moment, nearest);
         }
     }
 
-    /// Returns the surface. The point is moved onto the plane by its height above it.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -305,19 +384,7 @@ impl<E: Real> Tests<Triangle<E>, E> for Robust {
         ray: Ray<S, E>,
         distance: Lanes<S, E>,
     ) -> Surface<S, E> {
-        let normal = Vec3::splat(simd, triangle.normal);
-        let zero = constant::<S, E>(simd, 0.0);
-        let point = ray.direction.scale_add(distance, ray.origin);
-        let height = splat::<S, E>(simd, triangle.height);
-        let above = normal.dot(point) - height;
-        let side = normal
-            .dot(ray.direction)
-            .simd_gt(zero)
-            .select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0));
-        let offset =
-            offset(simd, point, OFFSET) + height.abs() * constant::<S, E>(simd, OFFSET * E::ROUNDOFF);
-        let start = normal.scale_add(side * offset - above, point);
-        Surface { start, normal: normal.scale(side), offset, within: no_lane::<S, E>(simd) }
+        triangle.facet.surface(simd, ray, distance)
     }
 }
 

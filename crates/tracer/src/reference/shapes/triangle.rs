@@ -101,7 +101,7 @@ pub(crate) fn triangle_normal(vertices: &[DVec3; 3]) -> DVec3 {
 pub(crate) fn normal_and_width(vertices: &[DVec3; 3]) -> (DVec3, f64) {
     let largest = vertices.iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
     let scale = below_inverse(largest);
-    let [a, b, c] = vertices.map(|v| v * scale);
+    let (a, b, c) = (vertices[0] * scale, vertices[1] * scale, vertices[2] * scale);
     let (p, q) = (b - a, c - a);
     let (p_scale, q_scale) = (below_inverse(p.abs().max_element()), below_inverse(q.abs().max_element()));
     let (p, q) = (p * p_scale, q * q_scale);
