@@ -25,9 +25,6 @@ const TABLE: &str = include_str!("../../fingerprints.txt");
 /// The random scripts in a line of the table.
 pub(super) const IN_A_LINE: u64 = 100;
 
-/// The scripts that an emulated program gets at a time.
-const AT_ONCE: usize = 50;
-
 /// The size of the examples' pictures.
 const SCREEN: &str = "Screen 96 72";
 
@@ -218,10 +215,7 @@ impl Machine {
         let program = self.build()?;
         let mut drawn = Fingerprints::new();
         for batch in batches {
-            // One process for few scripts, because Node 20 crashes at its end after some hundred.
-            for scripts in batch.scripts.chunks(AT_ONCE) {
-                drawn.extend(self.run(&program, &batch.files, scripts)?);
-            }
+            drawn.extend(self.run(&program, &batch.files, &batch.scripts)?);
         }
         Ok(drawn)
     }
@@ -262,17 +256,19 @@ impl Machine {
         let mut stdin = child.stdin.take().context("standard input")?;
         let writer = std::thread::spawn(move || stdin.write_all(&input));
         let output = child.wait_with_output()?;
-        ensure!(output.status.success(), "{}: {}", self.name(), output.status);
-        writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        // Writing fails if the program has ended before it has read everything, as the count below shows.
+        let _ = writer.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         let text = String::from_utf8(output.stdout)?;
         let lines = text.lines().filter_map(|line| line.rsplit_once(' '));
         let drawn: Vec<_> = lines.map(|(name, number)| (name.to_owned(), number.to_owned())).collect();
+        // The status does not count: after some scenes Node 20 crashes when everything has been printed.
         ensure!(
             drawn.len() == scripts.len(),
-            "{}: {} of {} scripts",
+            "{}: {} of {} scripts are drawn, {}",
             self.name(),
             drawn.len(),
-            scripts.len()
+            scripts.len(),
+            output.status
         );
         Ok(drawn)
     }
