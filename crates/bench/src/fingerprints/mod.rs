@@ -12,7 +12,7 @@
 //! ```
 //!
 //! With `--check` it compares other pictures with a table that is kept: those that every kind of machine must draw
-//! alike ([`machines`]).
+//! alike (`machines`).
 
 mod machines;
 mod scripts;

@@ -60,7 +60,6 @@ pub(crate) fn spawn_paths<E: Real>(
             }
             let turns = waiting.paths.turns(lane);
             let from = Origin { slot: pixel.to_index(), pixel, turns, numbers };
-            let direction = read(&queue.direction, lane);
             let normal = read(&hits.normal, lane);
             let (start, face) = match has_faces {
                 true => (read_of(&hits.place, lane), read_of(&hits.face, lane)),
@@ -80,53 +79,77 @@ pub(crate) fn spawn_paths<E: Real>(
             if !entry.mirrors || u32::from(turns.bounced) >= numbers.bounces {
                 continue;
             }
-            let mut weight = read(&queue.weight, lane);
-            let mut mirror = if is_painted {
-                read_of(&hits.mirror, lane)
-            } else {
-                DVec3::from_array(entry.mirror.map(E::widen)) * weight
-            };
-            if is_foggy {
-                weight *= hits.clearness[lane].widen();
-            }
-            let clear = waiting.clear_share(lane, turns.hits());
-            let glass = paths.glass(order);
-            let [offset, within] = hits.sides.each_ref().map(|side| side.0[lane].widen());
-            let mean = |glass: Glass| (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
-            if let Some(facets) = paths.microfacets(order) {
-                let cosine = -direction.dot(normal);
-                let facet = facets.normal(-direction, normal, from.numbers());
-                let towards = reflected(direction, facet);
-                let shown = if towards.dot(face) > 0.0 { facets.masking(towards.dot(normal)) } else { 0.0 };
-                mirror /= facets.energy(cosine);
-                if let Some((glass, is_flat)) = glass {
-                    let Refraction { mirrored, direction: bent } =
-                        refract(glass, direction, facet, within != 0.0, is_flat);
-                    mirror += mirrored * weight;
-                    let bent = if is_flat { towards - 2.0 * towards.dot(normal) * normal } else { bent };
-                    let left = if bent.dot(face) < 0.0 { facets.masking(-bent.dot(normal)) } else { 0.0 };
-                    let left = left * (1.0 - mirrored);
-                    let clear = if clear > 0.0 { clear * left * mean(glass) } else { -1.0 };
-                    let weight = weight * glass.color() * left;
-                    from.send(waiting, Way::Refracted, weight, clear, |_| {
-                        (start - 2.0 * offset * face, bent)
-                    });
-                }
-                from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| (start, towards));
-                continue;
-            }
-            let normal = if has_faces { read_of(&hits.onward, lane) } else { normal };
-            if let Some((glass, is_flat)) = glass {
-                let Refraction { mirrored, direction: bent } =
-                    refract(glass, direction, normal, within != 0.0, is_flat);
-                mirror += mirrored * weight;
-                let clear = if clear > 0.0 { clear * (1.0 - mirrored) * mean(glass) } else { -1.0 };
-                let weight = weight * glass.color() * (1.0 - mirrored);
-                from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
-            }
-            from.send(waiting, Way::Mirrored, mirror, -1.0, |_| (start, reflected(direction, normal)));
+            send_onward(
+                (scene, paths),
+                from,
+                (queue, hits),
+                (lane, order, is_painted),
+                (start, face, normal),
+                waiting,
+            );
         }
     }
+}
+
+/// Sends the mirrored and refracted rays of one hit, at `start` with these normals of its face and of its shading.
+// Out of line, so that paths between surfaces without mirrors pay nothing for it.
+#[inline(never)]
+fn send_onward<E: Real>(
+    (scene, paths): (&Prepared<E>, &Paths),
+    from: Origin<E>,
+    (queue, hits): (&RayBatch<E>, &Hits<E>),
+    (lane, order, is_painted): (usize, usize, bool),
+    (start, face, normal): (DVec3, DVec3, DVec3),
+    waiting: &mut RayQueues<E>,
+) {
+    let entry = &scene.entries[order];
+    let turns = from.turns;
+    let is_foggy = scene.fog().is_some();
+    let has_faces = !hits.face[0].is_empty();
+    let direction = read(&queue.direction, lane);
+    let mut weight = read(&queue.weight, lane);
+    let mut mirror = if is_painted {
+        read_of(&hits.mirror, lane)
+    } else {
+        DVec3::from_array(entry.mirror.map(E::widen)) * weight
+    };
+    if is_foggy {
+        weight *= hits.clearness[lane].widen();
+    }
+    let clear = waiting.clear_share(lane, turns.hits());
+    let glass = paths.glass(order);
+    let [offset, within] = hits.sides.each_ref().map(|side| side.0[lane].widen());
+    let mean = |glass: Glass| (glass.color().element_sum() / 3.0).clamp(0.0, 1.0);
+    if let Some(facets) = paths.microfacets(order) {
+        let cosine = -direction.dot(normal);
+        let facet = facets.normal(-direction, normal, from.numbers());
+        let towards = reflected(direction, facet);
+        let shown = if towards.dot(face) > 0.0 { facets.masking(towards.dot(normal)) } else { 0.0 };
+        mirror /= facets.energy(cosine);
+        if let Some((glass, is_flat)) = glass {
+            let Refraction { mirrored, direction: bent } =
+                refract(glass, direction, facet, within != 0.0, is_flat);
+            mirror += mirrored * weight;
+            let bent = if is_flat { towards - 2.0 * towards.dot(normal) * normal } else { bent };
+            let left = if bent.dot(face) < 0.0 { facets.masking(-bent.dot(normal)) } else { 0.0 };
+            let left = left * (1.0 - mirrored);
+            let clear = if clear > 0.0 { clear * left * mean(glass) } else { -1.0 };
+            let weight = weight * glass.color() * left;
+            from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
+        }
+        from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| (start, towards));
+        return;
+    }
+    let normal = if has_faces { read_of(&hits.onward, lane) } else { normal };
+    if let Some((glass, is_flat)) = glass {
+        let Refraction { mirrored, direction: bent } =
+            refract(glass, direction, normal, within != 0.0, is_flat);
+        mirror += mirrored * weight;
+        let clear = if clear > 0.0 { clear * (1.0 - mirrored) * mean(glass) } else { -1.0 };
+        let weight = weight * glass.color() * (1.0 - mirrored);
+        from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
+    }
+    from.send(waiting, Way::Mirrored, mirror, -1.0, |_| (start, reflected(direction, normal)));
 }
 
 /// The hit from which rays go on.
