@@ -65,7 +65,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     if args.check || args.write {
         ensure!(
-            args.random % machines::IN_A_LINE == 0,
+            args.random.is_multiple_of(machines::IN_A_LINE),
             "--random must be a multiple of {}",
             machines::IN_A_LINE
         );
