@@ -12,12 +12,13 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, ensure};
 use rayfold_files::OutputFile;
 use rayfold_scene::assets::{Library, MemoryFiles};
-use rayfold_scene::{Limits, natural_cmp, parse_with_files};
+use rayfold_scene::{Limits, parse_with_files};
 use rayfold_tracer::{Level, RenderOptions, probe};
 use rayon::prelude::*;
 
-use super::scripts;
+use super::{is_script, scripts, sorted};
 use crate::backends::levels;
+use crate::needs::parts;
 
 /// The table.
 const TABLE: &str = include_str!("../../fingerprints.txt");
@@ -160,9 +161,8 @@ fn batches(random: u64) -> Result<Vec<Batch>> {
     let mut batches: Vec<Batch> = Vec::new();
     for folder in sorted(&scenes)?.into_iter().filter(|path| path.is_dir()) {
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let (scripts, files): (Vec<_>, Vec<_>) = sorted(&folder)?
-            .into_iter()
-            .partition(|path| path.extension().is_some_and(|extension| extension == "txt"));
+        let (scripts, files): (Vec<_>, Vec<_>) =
+            sorted(&folder)?.into_iter().partition(|path| is_script(path));
         let named = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let files =
             files.iter().map(|path| Ok((named(path), std::fs::read(path)?))).collect::<Result<_>>()?;
@@ -177,14 +177,6 @@ fn batches(random: u64) -> Result<Vec<Batch>> {
     let scripts = (1..=random).map(|seed| (random_name(seed), scripts::script(seed))).collect();
     batches.push(Batch { files, scripts });
     Ok(batches)
-}
-
-fn sorted(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let mut paths: Vec<PathBuf> =
-        entries.map(|entry| Ok(entry?.path())).collect::<Result<_, std::io::Error>>()?;
-    paths.sort_by(|a, b| natural_cmp(&a.to_string_lossy(), &b.to_string_lossy()));
-    Ok(paths)
 }
 
 /// Returns a script with small pictures.
@@ -278,10 +270,7 @@ impl Machine {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target").join(self.name());
         eprintln!("{}: building the tracer", self.name());
         let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-        let features = rayfold_tracer::parts::PARTS.iter().map(|part| part.feature);
-        let mut with: Vec<_> =
-            ["beyond", "boxes", "glass", "mirrors", "shadows", "tree", "triangles"].to_vec();
-        with.extend(features);
+        let with: Vec<_> = parts().map(|(part, _)| part).collect();
         let status = Command::new(cargo)
             .args([
                 "build",

@@ -71,6 +71,7 @@ pub fn run(args: &Args) -> Result<()> {
         );
     }
     if args.write {
+        ensure!(args.random > 0, "--random says how many random scripts the table has");
         return machines::write(args.random);
     }
     if args.check {
@@ -97,16 +98,26 @@ fn print(lines: &[String]) -> Result<()> {
     Ok(out.flush()?)
 }
 
-/// Finds the scripts below a folder, in order.
-fn find(folder: &Path, scripts: &mut Vec<PathBuf>) -> Result<()> {
+/// Returns what a folder holds, in order.
+fn sorted(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
     let mut paths: Vec<PathBuf> =
         entries.map(|entry| Ok(entry?.path())).collect::<Result<_, std::io::Error>>()?;
     paths.sort_by(|a, b| natural_cmp(&a.to_string_lossy(), &b.to_string_lossy()));
-    for path in paths {
+    Ok(paths)
+}
+
+/// Returns whether the name of a file is that of a script.
+fn is_script(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "txt")
+}
+
+/// Finds the scripts below a folder, in order.
+fn find(folder: &Path, scripts: &mut Vec<PathBuf>) -> Result<()> {
+    for path in sorted(folder)? {
         if path.is_dir() {
             find(&path, scripts)?;
-        } else if path.extension().is_some_and(|extension| extension == "txt") {
+        } else if is_script(&path) {
             scripts.push(path);
         }
     }

@@ -4,6 +4,8 @@
 
 use fastrand::Rng;
 
+use crate::needs::SKY;
+
 /// The files that scripts name.
 pub(super) const FILES: [(&str, &[u8]); 2] = [("model.obj", MODEL), ("sky.png", SKY)];
 
@@ -15,9 +17,6 @@ vt 0 0\nvt .9 0\nvt .5 1\nvt .2 .1\nvt .3 .8\nvt .7 .3
 f 1/1/1 3/3/3 5/5/5\nf 3/3/3 2/2/2 5/5/5\nf 2/2/2 4/4/4 5/5/5\nf 4/4/4 1/1/1 5/5/5
 f 3/3/3 1/1/1 6/6/6\nf 2/2/2 3/3/3 6/6/6\nf 4/4/4 2/2/2 6/6/6\nf 1/1/1 4/4/4 6/6/6
 ";
-
-/// A panorama.
-const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
 
 /// The words that are written as solid letters.
 const WORDS: [&str; 4] = ["A&", "ray", "8i", "%"];

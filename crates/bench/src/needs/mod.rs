@@ -16,7 +16,9 @@ use anyhow::{Context, Result, ensure};
 use rayfold_files::OutputFile;
 use rayon::prelude::*;
 
-use self::parts::{Build, builds, parts, uses};
+pub(crate) use self::parts::parts;
+use self::parts::{Build, builds, uses};
+pub(crate) use self::subjects::SKY;
 use self::subjects::{Subject, subjects};
 
 /// The options of the subcommand.

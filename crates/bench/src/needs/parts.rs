@@ -25,7 +25,7 @@ const OF_VERSION_1: [(&str, IsUsed); 7] = [
 ];
 
 /// Returns all parts that can be left out, each with the scenes that use it.
-pub(super) fn parts() -> impl Iterator<Item = (&'static str, IsUsed)> {
+pub(crate) fn parts() -> impl Iterator<Item = (&'static str, IsUsed)> {
     OF_VERSION_1.into_iter().chain(PARTS.iter().map(|part| (part.feature, part.is_used)))
 }
 

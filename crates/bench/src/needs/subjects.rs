@@ -37,7 +37,7 @@ pub(super) fn subjects() -> Result<Vec<Subject>> {
 }
 
 /// A panorama, which scenes name as `sky.png`.
-pub(super) const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
+pub(crate) const SKY: &[u8] = include_bytes!("../../../../docs/models/dusk.png");
 
 /// The camera and the sun of the scenes of version 2.
 const BEFORE: &str = "\
