@@ -16,7 +16,8 @@ use rayfold_scene::{Limits, parse_with_files};
 use rayfold_tracer::{Level, RenderOptions, probe};
 use rayon::prelude::*;
 
-use super::{is_script, scripts, sorted};
+use super::folders::{is_script, sorted};
+use super::scripts;
 use crate::backends::levels;
 use crate::needs::parts;
 

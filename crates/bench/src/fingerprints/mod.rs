@@ -14,6 +14,7 @@
 //! With `--check` it compares other pictures with a table that is kept: those that every kind of machine must draw
 //! alike (`machines`).
 
+mod folders;
 mod machines;
 mod scripts;
 
@@ -26,11 +27,12 @@ use anyhow::{Context, Result, ensure};
 use glam::{DVec2, DVec3};
 use rayfold_scene::{
     Camera, Cuboid, DirectionalLight, Light, Limits, Material, Object, Pinhole, Scene, Screen, Sphere,
-    Triangle, natural_cmp, parse,
+    Triangle, parse,
 };
 use rayfold_tracer::{Precision, RenderOptions, probe, reference, render, render_naive};
 use rayon::prelude::*;
 
+use self::folders::find;
 use self::machines::Machine;
 use crate::backends::levels;
 
@@ -96,32 +98,6 @@ fn print(lines: &[String]) -> Result<()> {
     let mut out = std::io::stdout().lock();
     lines.iter().try_for_each(|line| out.write_all(line.as_bytes()))?;
     Ok(out.flush()?)
-}
-
-/// Returns what a folder holds, in order.
-fn sorted(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let mut paths: Vec<PathBuf> =
-        entries.map(|entry| Ok(entry?.path())).collect::<Result<_, std::io::Error>>()?;
-    paths.sort_by(|a, b| natural_cmp(&a.to_string_lossy(), &b.to_string_lossy()));
-    Ok(paths)
-}
-
-/// Returns whether the name of a file is that of a script.
-fn is_script(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "txt")
-}
-
-/// Finds the scripts below a folder, in order.
-fn find(folder: &Path, scripts: &mut Vec<PathBuf>) -> Result<()> {
-    for path in sorted(folder)? {
-        if path.is_dir() {
-            find(&path, scripts)?;
-        } else if is_script(&path) {
-            scripts.push(path);
-        }
-    }
-    Ok(())
 }
 
 fn of_script(path: &Path) -> Result<String> {
