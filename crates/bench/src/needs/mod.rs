@@ -33,10 +33,10 @@ pub struct Args {
     /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
-    /// Use the build without all parts of version 2, and every third of those without some of them; write nothing
+    /// Use the build without all parts of version 2, and every fifth of those without some of them; write nothing
     #[arg(long)]
     slice: bool,
-    /// Begin with this of those; without it, with one of the first three
+    /// Begin with this of those; without it, with one of the first five
     #[arg(long, requires = "slice")]
     first: Option<usize>,
 }
@@ -68,7 +68,7 @@ const MOST: f64 = 0.5;
 const LEFT_OUT: i32 = 3;
 
 /// The number of slices that have all builds.
-const SLICES: usize = 3;
+const SLICES: usize = 5;
 
 /// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;
@@ -235,8 +235,8 @@ fn compare(subject: &Subject, script: &Path, (builds, programs): (&[Build], &[Pa
 /// Returns the instructions of one frame, and a digest of several frames.
 fn frame(program: &Path, script: &Path, precision: &str) -> Result<(u64, String)> {
     let (one, _) = count(program, script, "1", precision)?;
-    let (three, digest) = count(program, script, "3", precision)?;
-    Ok(((three - one) / 2, digest))
+    let (two, digest) = count(program, script, "2", precision)?;
+    Ok((two - one, digest))
 }
 
 fn count(program: &Path, script: &Path, times: &str, precision: &str) -> Result<(u64, String)> {

@@ -121,7 +121,8 @@ impl Namer {
         if finish.own {
             clauses.push(line(Clause::Own, &[], None));
         }
-        if finish.glow != DVec3::ZERO {
+        // A glow of -0 is written, too: the script then reads back bit for bit.
+        if finish.glow.to_array().iter().any(|x| x.to_bits() != 0) {
             clauses.push(line(Clause::Glow, &[&finish.glow.to_array()], None));
         }
         if let Some(rough) = finish.rough {
