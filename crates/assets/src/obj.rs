@@ -194,7 +194,7 @@ impl Counts {
     fn of(text: &[u8]) -> Self {
         let mut counts = Self::default();
         let mut lines = Lines { rest: text, number: 0 };
-        while let Some((_, line)) = lines.next() {
+        for (_, line) in lines.by_ref() {
             match words(&line).next() {
                 Some(b"v") => counts.positions += 1,
                 Some(b"vt") => counts.uvs += 1,
@@ -748,7 +748,6 @@ mod tests {
             "l 1 2",
             "p 1",
             "f 1 \\\r\n 2 \\\n 3",
-            "# a comment",
             "",
         ];
         let faults = ["v 1 2", "f 1 2 999", "vn 1 x 0", "f 1 2", "f 1 2 -9999"];
