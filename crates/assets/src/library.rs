@@ -1,8 +1,9 @@
 //! Models and pictures by name, and letters by their words, each made once.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use crate::decode::decode;
 use crate::error::AssetError;
@@ -16,7 +17,9 @@ use crate::referred::{Referred, absent, content};
 /// The models and pictures of a folder, and letters. One is made again only if its files have changed.
 pub struct Library {
     files: Box<dyn Files>,
-    kept: Mutex<Vec<Kept>>,
+    models: Mutex<Models>,
+    /// Wakes threads when a model has been made.
+    made: Condvar,
     /// The files that faulty models refer to, by the names of the models.
     faulty: Mutex<BTreeMap<String, Vec<(String, String)>>>,
     pictures: Mutex<Vec<KeptPicture>>,
@@ -58,7 +61,37 @@ struct KeptLetters {
 const FONTS: usize = 4;
 const LETTERINGS: usize = 1024;
 
+/// The models that were made, and the names of those that threads are making.
+#[derive(Default)]
+struct Models {
+    kept: Vec<Kept>,
+    making: Vec<String>,
+}
+
+thread_local! {
+    /// The number of models that this thread is making.
+    static MAKING: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Marks a model as being made, until it is dropped.
+struct Making<'a> {
+    library: &'a Library,
+    name: &'a str,
+}
+
+impl Drop for Making<'_> {
+    fn drop(&mut self) {
+        MAKING.set(MAKING.get() - 1);
+        let mut models = self.library.models.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = models.making.iter().position(|name| name == self.name) {
+            models.making.swap_remove(at);
+        }
+        self.library.made.notify_all();
+    }
+}
+
 /// A decoded model, and the files that it was made of.
+#[derive(Clone)]
 struct Kept {
     name: String,
     smoothing: Smoothing,
@@ -79,7 +112,8 @@ impl Library {
     pub fn new(files: impl Files + 'static) -> Self {
         Self {
             files: Box::new(files),
-            kept: Mutex::default(),
+            models: Mutex::default(),
+            made: Condvar::new(),
             faulty: Mutex::default(),
             pictures: Mutex::default(),
             letters: Mutex::default(),
@@ -99,37 +133,47 @@ impl Library {
         if !self.files.are_readable() {
             return Err(AssetError::NotHere { name: name.into() });
         }
-        // Held while a model is decoded, so that scripts that are parsed at the same time decode it once.
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.retain(|kept| kept.name != name || self.is_current(&kept.sources));
-        if let Some(kept) = kept.iter().find(|kept| kept.name == name && kept.smoothing == smoothing) {
+        let mut models = self.made(name);
+        models.kept.retain(|kept| kept.name != name || self.is_current(&kept.sources));
+        if let Some(kept) = models.find(name, smoothing) {
             return Ok(kept.model.clone());
         }
-        let of_file = kept.iter().find(|kept| kept.name == name && kept.smoothing == Smoothing::OfFile);
-        let (model, sources) = match of_file {
-            Some(base) => (base.model.clone(), base.sources.clone()),
+        let of_file = models.find(name, Smoothing::OfFile).cloned();
+        models.making.push(name.into());
+        MAKING.set(MAKING.get() + 1);
+        // Nothing is locked meanwhile: several models are read at the same time, each by several threads.
+        drop(models);
+        let making = Making { library: self, name };
+        let of_file = match of_file {
+            Some(of_file) => of_file,
             None => {
                 let (model, sources) = self.decode(name)?;
-                let (smoothing, model) = (Smoothing::OfFile, Arc::new(model));
-                kept.push(Kept {
-                    name: name.into(),
-                    smoothing,
-                    sources: sources.clone(),
-                    model: model.clone(),
-                });
-                (model, sources)
+                Kept { name: name.into(), smoothing: Smoothing::OfFile, sources, model: Arc::new(model) }
             }
         };
-        let model = match smoothing {
-            Smoothing::OfFile => model,
-            _ => {
-                let model = Arc::new(model.with(smoothing));
-                kept.push(Kept { name: name.into(), smoothing, sources, model: model.clone() });
-                model
-            }
+        let made = match smoothing {
+            Smoothing::OfFile => of_file.clone(),
+            _ => Kept { smoothing, model: Arc::new(of_file.model.with(smoothing)), ..of_file.clone() },
         };
-        forget_unused(&mut kept);
+        let mut models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
+        for made in [of_file, made.clone()] {
+            if models.find(name, made.smoothing).is_none() {
+                models.kept.push(made);
+            }
+        }
+        // Another call may have made it meanwhile: all have the same one.
+        let model = models.find(name, smoothing).map_or(made.model, |kept| kept.model.clone());
+        forget_unused(&mut models.kept);
+        drop((models, making));
         Ok(model)
+    }
+
+    /// Locks the models, after all threads that make the one of this name have made it. A thread that makes a model does
+    /// not wait: while others work for it, it may take up work that asks for a model, and two would wait for each other.
+    fn made(&self, name: &str) -> MutexGuard<'_, Models> {
+        let models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
+        let waits = |models: &mut Models| MAKING.get() == 0 && models.making.iter().any(|of| of == name);
+        self.made.wait_while(models, waits).unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns the picture in the file of this name.
@@ -206,9 +250,9 @@ impl Library {
     /// refers to. Of a faulty model they are those that it refers to before the fault. There are none for a model that was not
     /// asked for.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let models = self.made(name);
         let pair = |source: &Source| (source.name.clone(), source.path.clone());
-        match kept.iter().find(|kept| kept.name == name) {
+        match models.kept.iter().find(|kept| kept.name == name) {
             Some(kept) => kept.sources.iter().map(pair).collect(),
             None => {
                 let faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);
@@ -219,7 +263,7 @@ impl Library {
 
     /// Drops the model and the picture of this name, as far as no script uses them. For files that are gone for good.
     pub fn forget(&self, name: &str) {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
+        self.made(name).kept.retain(|kept| kept.name != name);
         self.faulty.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
         self.pictures.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
     }
@@ -254,6 +298,12 @@ impl Library {
 
     fn is_current(&self, sources: &[Source]) -> bool {
         sources.iter().all(|source| self.files.look(&source.name) == Ok(source.info))
+    }
+}
+
+impl Models {
+    fn find(&self, name: &str, smoothing: Smoothing) -> Option<&Kept> {
+        self.kept.iter().find(|kept| kept.name == name && kept.smoothing == smoothing)
     }
 }
 
@@ -359,6 +409,40 @@ mod tests {
         assert_eq!(reads.load(Ordering::Relaxed), 3);
         let names: Vec<_> = library.sources("c.obj").into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["c.obj", "c.mtl"]);
+    }
+
+    /// Waits until another model is being read, so that both are read at the same time.
+    struct Meeting(MemoryFiles, std::sync::Barrier, AtomicUsize);
+
+    impl Files for Meeting {
+        fn names(&self) -> Vec<String> {
+            self.0.names()
+        }
+
+        fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
+            self.0.look(name)
+        }
+
+        fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+            assert!(self.2.fetch_add(1, Ordering::Relaxed) < 2, "each model is read once");
+            self.1.wait();
+            self.0.read(name)
+        }
+    }
+
+    #[test]
+    fn several_models_are_read_at_the_same_time_and_each_once() {
+        let plain = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec();
+        let files = MemoryFiles::from([("a.obj", plain.clone()), ("b.obj", plain)]);
+        let library = Library::new(Meeting(files, std::sync::Barrier::new(2), AtomicUsize::new(0)));
+        let read = |name| library.model(name, Smoothing::OfFile).unwrap();
+        let read = &read;
+        let models: Vec<_> = std::thread::scope(|scope| {
+            let names = ["a.obj", "b.obj", "a.obj", "b.obj"];
+            let threads = names.map(|name| scope.spawn(move || read(name)));
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(Arc::ptr_eq(&models[0], &models[2]) && Arc::ptr_eq(&models[1], &models[3]));
     }
 
     #[test]
