@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
 use crate::fast::acceleration::tree::{Content, Node, Tree};
-use crate::fast::arithmetic::real::{Fused, Real, Vec3, constant};
+use crate::fast::arithmetic::real::{Fused, Lanes, Real, Vec3, constant};
 use crate::fast::arithmetic::rounding::distance_error;
 use crate::fast::rays::bounds::Crossing;
 use crate::fast::rays::kind::Kind;
@@ -24,7 +24,7 @@ struct RayQueues([u32; WAITING]);
 pub(crate) fn descend<E: Real>(
     tree: &Tree<E>,
     backwards: [bool; 3],
-    mut intersects: impl FnMut(&Node<E>) -> bool,
+    mut intersects: impl FnMut(usize, &Node<E>) -> bool,
     mut visit: impl FnMut(Kind, core::ops::Range<usize>) -> bool,
 ) {
     let RayQueues(waiting) = &mut RayQueues([0; WAITING]);
@@ -41,8 +41,9 @@ pub(crate) fn descend<E: Real>(
             }
         }
         count -= 1;
-        let node = &tree.nodes[waiting[count] as usize];
-        if !intersects(node) {
+        let at = waiting[count] as usize;
+        let node = &tree.nodes[at];
+        if !intersects(at, node) {
             continue;
         }
         match node.content() {
@@ -83,6 +84,32 @@ pub(crate) fn nearest_in<S: Simd, E: Real>(
     nearest: Nearest<S, E>,
     mut visit: impl FnMut(Kind, core::ops::Range<usize>, &mut Nearest<S, E>),
 ) -> Nearest<S, E> {
+    nearest_past(
+        simd,
+        tree,
+        ray,
+        nearest,
+        #[inline(always)]
+        |_, _| false,
+        #[inline(always)]
+        |kind, items, nearest| {
+            visit(kind, items, nearest);
+            true
+        },
+    )
+}
+
+/// As [`nearest_in`], but skips nodes of which `is_missed` says, by their number and how far the rays are followed, that no
+/// ray meets anything in them, and ends once `visit` returns false.
+#[inline(always)]
+pub(crate) fn nearest_past<S: Simd, E: Real>(
+    simd: S,
+    tree: &Tree<E>,
+    ray: Ray<S, E>,
+    nearest: Nearest<S, E>,
+    is_missed: impl Fn(usize, Lanes<S, E>) -> bool,
+    mut visit: impl FnMut(Kind, core::ops::Range<usize>, &mut Nearest<S, E>) -> bool,
+) -> Nearest<S, E> {
     let found = core::cell::Cell::new(nearest);
     // A computed distance is below that of the box around its object by no more than this error.
     let slack = constant::<S, E>(simd, distance_error::<E>());
@@ -92,14 +119,17 @@ pub(crate) fn nearest_in<S: Simd, E: Real>(
         tree,
         backwards(ray.direction),
         #[inline(always)]
-        |node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
+        |at, node| {
+            crossing.intersects(simd, node.low, node.high, limit.get()).any_true()
+                && !is_missed(at, limit.get())
+        },
         #[inline(always)]
         |kind, items| {
             let mut nearest = found.get();
-            visit(kind, items, &mut nearest);
+            let goes_on = visit(kind, items, &mut nearest);
             found.set(nearest);
             limit.set(nearest.distance.fused_mul_add(slack, nearest.distance + slack));
-            true
+            goes_on
         },
     );
     found.get()

@@ -6,6 +6,7 @@
 pub(crate) mod binned;
 pub(crate) mod candidates;
 pub(crate) mod descent;
+pub(crate) mod hollow;
 pub(crate) mod light_buffer;
 pub(crate) mod lists;
 pub(crate) mod overlap;

@@ -46,7 +46,8 @@ pub(super) use self::solid::{Solid, body, reach};
 use self::torus::{Torus, TorusForm};
 use super::shapes::Shape as PlacedShape;
 use super::shapes::instance::{Turned, turned};
-use crate::fast::acceleration::descent::nearest_in;
+use crate::fast::acceleration::descent::{nearest_in, nearest_past};
+use crate::fast::acceleration::hollow::Hollows;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::packet::{Nearest, Ray, Surface};
@@ -387,6 +388,8 @@ pub(super) struct Bodies<E> {
     way: Way<E>,
     /// The bounding volumes of the bodies of the tree, if a mask has enough bits.
     few: Option<BodyCuller<E>>,
+    /// Balls without surfaces in the tree, where many bodies lie around one another.
+    hollows: Option<Hollows<E>>,
 }
 
 /// The mask of all bodies, for any number of them.
@@ -410,6 +413,8 @@ impl<E: Real> Bodies<E> {
         let count = planes.len();
         let tree = branches.map(|branches| Tree::new(&branches, &bounded, |place| (count + place) as u32));
         let few = BodyCuller::new(&bounded);
+        let many = tree.as_ref().filter(|_| few.is_none());
+        let hollows = many.and_then(|tree| Hollows::new(tree, |at| bounded[at - count].hollow()));
         planes.append(&mut bounded);
         let way = match tree {
             Some(tree) if count == 0 => Way::Tree(tree),
@@ -417,7 +422,7 @@ impl<E: Real> Bodies<E> {
             None => Way::Planes,
         };
         let bodies = planes.iter().map(|solid| Body::new(solid, objects, holes)).collect();
-        Self { bodies, planes: count, first_planes: count, way, few }
+        Self { bodies, planes: count, first_planes: count, way, few, hollows }
     }
 
     /// Lets shadow rays ask for glass apart from opaque bodies. Returns the bodies of glass as bits, or `None` if there are too
@@ -553,6 +558,12 @@ impl<E: Real> Bodies<E> {
 
     #[inline(always)]
     fn meet_in_tree<S: Simd>(&self, simd: S, tree: &Tree<E>, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
+        if let Some(hollows) = &self.hollows {
+            let mut with = *nearest;
+            self.meet_around(simd, (tree, hollows), ray, &mut with);
+            *nearest = with;
+            return;
+        }
         *nearest = nearest_in(
             simd,
             tree,
@@ -565,6 +576,76 @@ impl<E: Real> Bodies<E> {
                 }
             },
         );
+    }
+
+    // Out of line, so that scenes whose boxes separate bodies keep their registers.
+    #[inline(never)]
+    fn meet_around<S: Simd>(
+        &self,
+        simd: S,
+        (tree, hollows): (&Tree<E>, &Hollows<E>),
+        ray: Ray<S, E>,
+        nearest: &mut Nearest<S, E>,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                *nearest = nearest_past(
+                    simd,
+                    tree,
+                    ray,
+                    *nearest,
+                    #[inline(always)]
+                    |at, distance| hollows.hold(simd, at, ray, distance),
+                    #[inline(always)]
+                    |_, items, nearest| {
+                        for body in &self.bodies[items] {
+                            body.intersect(simd, ray, nearest);
+                        }
+                        true
+                    },
+                );
+            },
+        );
+    }
+
+    /// Returns the rays of `lit` that hit none of the bodies of the tree nearer than `far`. A ray that has hit one is not
+    /// followed further.
+    // Out of line, as the search for the nearest is.
+    #[inline(never)]
+    fn unoccluded_around<S: Simd>(
+        &self,
+        simd: S,
+        (tree, hollows): (&Tree<E>, &Hollows<E>),
+        ray: Ray<S, E>,
+        far: Lanes<S, E>,
+        lit: Mask<S, E>,
+    ) -> Mask<S, E> {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (nearest, limit) = shadow_limit(simd, far, lit);
+                let zero = constant::<S, E>(simd, 0.0);
+                let reached = nearest_past(
+                    simd,
+                    tree,
+                    ray,
+                    nearest,
+                    #[inline(always)]
+                    |at, distance| hollows.hold(simd, at, ray, distance),
+                    #[inline(always)]
+                    |_, items, nearest| {
+                        for body in &self.bodies[items] {
+                            body.intersect(simd, ray, nearest);
+                        }
+                        let is_hit = nearest.distance.simd_lt(limit);
+                        nearest.distance = is_hit.select(constant::<S, E>(simd, -1.0), nearest.distance);
+                        nearest.distance.simd_ge(zero).any_true()
+                    },
+                );
+                lit & reached.distance.simd_ge(limit)
+            },
+        )
     }
 
     /// Offers the hits of the rays with the planes. A plane needs only one axis.
@@ -657,6 +738,9 @@ impl<E: Real> Bodies<E> {
             && (bits != ANY || few.is_short)
         {
             return self.unoccluded_by_few(simd, (few, bits & few.all), ray, far, lit);
+        }
+        if let Some(hollows) = &self.hollows {
+            return self.unoccluded_around(simd, (tree, hollows), ray, far, lit);
         }
         let (mut nearest, limit) = shadow_limit(simd, far, lit);
         self.meet_in_tree(simd, tree, ray, &mut nearest);

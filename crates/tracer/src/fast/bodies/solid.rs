@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayfold_scene::Object;
 
 use super::AnyForm;
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::acceleration::tree::Grouped;
 use crate::fast::rays::bounds::{Bounds, NOTHING};
 use crate::fast::shapes::instance::{in_world, turned};
@@ -73,6 +74,9 @@ const WIDER: f64 = 32.0 * f64::EPSILON;
 /// The distance from the origin within which rounding may put a surface on the other side of it, relative to the body's
 /// numbers.
 const AT_ORIGIN: f64 = 64.0 * f64::EPSILON;
+
+/// The radius of the ball above a disc, as a part of the distance of the eye from its plane.
+const OVER_DISC: f64 = 1.5;
 
 /// Returns an object in the kernels' coordinates, if it is a body that can be hit.
 pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f64) -> Option<Solid> {
@@ -171,6 +175,31 @@ impl Solid {
             AnyForm::Roundbox(form) => shortest(form.half),
             AnyForm::Plane(_) | AnyForm::Capsule(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => None,
         }
+    }
+
+    /// Returns a ball that holds nothing of its surface, as computed; `None` for shapes without a useful one.
+    pub(super) fn hollow(&self) -> Option<Hollow> {
+        let Frame { axes: [.., axis], center } = self.frame;
+        let (center, radius) = match &self.form {
+            AnyForm::Disc(_) => {
+                // Above the side that the eye sees, and not much larger than needed to hold it, so that balls of many discs
+                // have much in common.
+                let radius = OVER_DISC * axis.dot(center).abs();
+                let up = if axis.dot(center) > 0.0 { -axis } else { axis };
+                (center + radius * up, radius)
+            }
+            AnyForm::Cone(form) => {
+                let ([a, b], height) = (form.radii, form.height);
+                let side = 0.5 * (a + b) * height / libm::hypot(height, b - a);
+                (0.5 * (center + form.end), side.min(0.5 * height))
+            }
+            AnyForm::Torus(form) => (center, form.radius - form.thickness),
+            AnyForm::Capsule(form) => (form.ball(&self.frame).0, form.radius),
+            AnyForm::Cuboid(form) => (center, form.half.min_element()),
+            AnyForm::Roundbox(form) => (center, form.half.min_element()),
+            AnyForm::Plane(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => return None,
+        };
+        (radius > 0.0).then_some((center, radius))
     }
 
     /// Returns its bounding box; `None` for a plane.

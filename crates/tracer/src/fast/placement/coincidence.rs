@@ -115,6 +115,14 @@ impl Region {
     fn steepest(&self) -> f64 {
         (2.0 * self.slack / self.pixel).powi(2)
     }
+
+    /// Returns whether no two faces of two boxes are in almost one plane. Perpendicular ones are within the slack over less
+    /// than a pixel.
+    fn separates_boxes(&self, a: Bounds, b: Bounds) -> bool {
+        let apart = |x: DVec3, y: DVec3| (x - y).abs();
+        let nearest = apart(a.0, b.0).min(apart(a.0, b.1)).min(apart(a.1, b.0)).min(apart(a.1, b.1));
+        2.0 * self.slack < self.pixel && nearest.min_element() > self.slack
+    }
 }
 
 /// A search of a tree for a pair, by any number of threads.
@@ -284,6 +292,11 @@ impl Search<'_> {
             (Some(ball), None) => self.sphere_blurs(ball, &other.shape, &region),
             (None, Some(ball)) => self.sphere_blurs(ball, &one.shape, &region),
             (None, None) => {
+                if matches!((&one.shape, &other.shape), (Shape::Cuboid(_), Shape::Cuboid(_)))
+                    && region.separates_boxes(bounds.0, bounds.1)
+                {
+                    return false;
+                }
                 let is_near = faces(&one.shape).any(|a| {
                     let slack = self.slack(a.normal.abs().dot(region.reach));
                     faces(&other.shape).any(|b| faces_z_fight(&a, &b, slack, region.pixel))

@@ -177,7 +177,7 @@ fn unoccluded_in_tree<S: Simd, E: Real, F: Features<E>>(
         tree,
         backwards(direction),
         #[inline(always)]
-        |node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
+        |_, node| crossing.intersects(simd, node.low, node.high, limit.get()).any_true(),
         #[inline(always)]
         |kind, items| {
             let lit = limit.get().simd_gt(zero);
