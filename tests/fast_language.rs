@@ -272,6 +272,39 @@ fn boxes_with_round_edges_are_the_references() {
 }
 
 #[test]
+fn bodies_around_one_another_are_the_references() {
+    let mut dice = Dice::new("bodies around one another", SEED);
+    let mut scenes: Vec<Scene> = vec![];
+    for kinds in [0..1, 1..2, 2..3, 3..4, 4..5, 5..6, 0..6] {
+        scenes.extend([(); 3].map(|()| {
+            let objects = (0..90)
+                .map(|_| {
+                    let (at, about, material) = (dice.point(0.2), dice.point(1.0), dice.finished());
+                    let radius = dice.within(1.0, 6.0);
+                    let ends = [-1.0, 1.0].map(|side| at + side * radius * about.normalize());
+                    let body: Object = match dice.0.u8(kinds.clone()) {
+                        0 => Torus::new(radius, 0.1 * radius, at, about, material).unwrap().into(),
+                        1 => Cylinder::new(radius, ends, material).unwrap().into(),
+                        2 => Cone::new([radius, 0.3 * radius], ends, material).unwrap().into(),
+                        3 => Capsule::new(radius, ends, material).unwrap().into(),
+                        4 => {
+                            let corners = [at - radius, at + radius];
+                            Roundbox::new(corners, 0.2 * radius, material).unwrap().into()
+                        }
+                        _ => Disc::new(radius, ends[0], about, material).unwrap().into(),
+                    };
+                    if dice.0.u8(0..3) == 0 { placed(&mut dice, body) } else { body }
+                })
+                .collect();
+            let mut scene = dice.scene(objects);
+            dice.add_lamps(&mut scene);
+            scene
+        }));
+    }
+    hold(&scenes);
+}
+
+#[test]
 fn fog_is_the_references() {
     let mut dice = Dice::new("fog", SEED);
     let mut scenes: Vec<Scene> = vec![];

@@ -27,7 +27,7 @@ pub(crate) struct Hollows<E> {
 
 impl<E: Real> Hollows<E> {
     /// Makes the balls of the nodes of a tree. `of_item` returns the ball of an object, by its index. Returns `None` if
-    /// fewer than half of the nodes have one.
+    /// fewer than half of the nodes with children have one: bodies that lie apart have a ball each, and none together.
     pub(crate) fn new(tree: &Tree<E>, of_item: impl Fn(usize) -> Option<Hollow>) -> Option<Self> {
         let mut balls: Vec<Option<Hollow>> = vec![None; tree.nodes.len()];
         // Children come after their parents.
@@ -37,7 +37,13 @@ impl<E: Real> Hollows<E> {
                 Content::Children(first, _) => within_both(balls[first as usize], balls[first as usize + 1]),
             };
         }
-        let has_many = 2 * balls.iter().flatten().count() >= balls.len();
+        let (mut parents, mut common) = (0, 0);
+        for (node, ball) in tree.nodes.iter().zip(&balls) {
+            let is_parent = matches!(node.content(), Content::Children(..));
+            parents += usize::from(is_parent);
+            common += usize::from(is_parent && ball.is_some());
+        }
+        let has_many = common > 0 && 2 * common >= parents;
         let ball = |ball: Option<Hollow>| {
             let (center, radius) = ball.unwrap_or((DVec3::ZERO, 0.0));
             let numbers = center.abs().element_sum() + radius;
