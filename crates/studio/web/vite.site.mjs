@@ -14,6 +14,8 @@ export default defineConfig({
   resolve: { alias: { "#connection": own("static/connection.ts"), "#drawn": own("static/drawn.tsx") } },
   worker: { format: "es", rollupOptions: { output: { entryFileNames: "worker.js", minify } } },
   build: {
+    outDir: join(import.meta.dirname, "../../../target/site"),
+    emptyOutDir: true,
     modulePreload: false,
     cssCodeSplit: false,
     target: ["chrome123", "firefox120", "safari17.5"],

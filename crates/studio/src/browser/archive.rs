@@ -2,7 +2,6 @@
 
 use std::io::{Cursor, Read, Write};
 
-use rayfold_scene::assets::file_name;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
@@ -32,15 +31,15 @@ pub fn zipped(files: &[File]) -> Result<Vec<u8>, Error> {
 /// Fails if it is no zip file, or if its files are more than the studio holds.
 pub fn unzipped(bytes: &[u8]) -> Result<Vec<File>, Error> {
     let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| refused(&error))?;
-    let named = zip.file_names().map(|name| name.map(|name| name.into_owned()));
-    let names: Vec<String> = named.collect::<Result<_, _>>().map_err(|error| refused(&error))?;
+    let name_at = |at| Some(zip.name_for_index(at)?.ok()?.into_owned());
+    let names: Vec<String> = (0..zip.len()).filter_map(name_at).collect();
     let first = names.first().and_then(|name| name.split_once('/')).map(|(folder, _)| format!("{folder}/"));
     let folder = first.filter(|folder| names.iter().all(|name| name.starts_with(folder))).unwrap_or_default();
     let mut room = TEXT;
     let mut files = Vec::new();
     for name in names {
         let own = &name[folder.len()..];
-        if file_name(own).is_err() {
+        if !is_plain(own) {
             continue;
         }
         let entry = zip.by_name(&name).map_err(|error| refused(&error))?;
@@ -55,6 +54,11 @@ pub fn unzipped(bytes: &[u8]) -> Result<Vec<File>, Error> {
         }
     }
     Ok(files)
+}
+
+/// Returns whether a name is that of a file, and of no hidden one, in this very folder.
+fn is_plain(name: &str) -> bool {
+    !name.is_empty() && !name.starts_with('.') && !name.chars().any(|c| c.is_control() || "/\\:".contains(c))
 }
 
 fn refused(error: &dyn std::error::Error) -> Error {
