@@ -111,6 +111,7 @@ test("after the first load an example opens without a network", async (t) => {
   await context.setOffline(true);
   await page.goto(`${address}studio.html?#example=marbles`);
   await page.waitForURL(/#project=marbles$/);
-  await drawn();
+  // Its final picture takes long.
+  await page.waitForFunction(() => document.querySelector("canvas")?.dataset.picture !== undefined);
   check();
 });
