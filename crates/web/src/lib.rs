@@ -6,11 +6,13 @@
 //! many bytes as that returns from the place that [`output`] returns. The first byte of a result is 0; or it is 1, and a
 //! message of what went wrong follows.
 //!
+//! A panic ends a module: no call returns from it, and none may follow. Then [`fault`] returns the length of its message.
+//!
 //! The module needs nothing of the page. There is no unsafe code here: exporting a name is what the lint
 //! `unsafe_code` denies elsewhere, because two functions of one name would be undefined behaviour.
 
 use std::fmt::Display;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 use rayfold_studio::browser::{Desk, Drawer, Effect, File, Reel, files_of, packet, unzipped, zipped};
 
@@ -33,6 +35,7 @@ fn locked<T>(of: &'static Mutex<T>) -> MutexGuard<'static, T> {
 #[allow(unsafe_code, reason = "the name is exported")]
 #[unsafe(no_mangle)]
 pub extern "C" fn input(length: usize) -> *mut u8 {
+    locked(&OUTPUT).clear();
     let mut input = locked(&INPUT);
     input.clear();
     input.resize(length, 0);
@@ -46,26 +49,36 @@ pub extern "C" fn output() -> *const u8 {
     locked(&OUTPUT).as_ptr()
 }
 
+/// Returns the length of the message of the panic that ended a call. 0 if the call ended otherwise.
+#[allow(unsafe_code, reason = "the name is exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn fault() -> usize {
+    locked(&OUTPUT).len()
+}
+
+/// Lets a panic leave its message as the result.
+fn keep_faults() {
+    static KEPT: Once = Once::new();
+    KEPT.call_once(|| {
+        std::panic::set_hook(Box::new(|panic| *locked(&OUTPUT) = panic.to_string().into_bytes()));
+    });
+}
+
 /// Does what `what` names, at this time in milliseconds. Returns the length of the result.
 #[allow(unsafe_code, reason = "the name is exported")]
 #[unsafe(no_mangle)]
 pub extern "C" fn call(what: u32, number: u32, time: f64) -> usize {
+    keep_faults();
     set_time((1000.0 * time) as u64);
     let bytes = std::mem::take(&mut *locked(&INPUT));
     let result = run(&mut locked(&STATE), what, number, bytes);
-    let mut output = locked(&OUTPUT);
-    output.clear();
-    match result {
-        Ok(bytes) => {
-            output.push(0);
-            output.extend_from_slice(&bytes);
-        }
-        Err(why) => {
-            output.push(1);
-            output.extend_from_slice(why.as_bytes());
-        }
-    }
-    output.len()
+    let output = match result {
+        Ok(bytes) => [&[0], bytes.as_slice()].concat(),
+        Err(why) => [&[1], why.as_bytes()].concat(),
+    };
+    let length = output.len();
+    *locked(&OUTPUT) = output;
+    length
 }
 
 #[cfg(target_arch = "wasm32")]
@@ -86,7 +99,7 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
             let opened = Desk::open(&name, files.collect(), number as usize).map_err(told)?;
             return Ok(written(desk.insert(opened).effects()));
         }
-        1..=6 => {
+        1..=7 => {
             let desk = desk.as_mut().ok_or("no project is open")?;
             match what {
                 1 => desk.hear(&text(bytes)?),
@@ -94,6 +107,7 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
                 3 => desk.drawn(number as usize, bytes),
                 4 => desk.get(number, &text(bytes)?),
                 5 => unpacked(&bytes)?.into_iter().for_each(|(name, content)| desk.put(&name, content)),
+                7 => desk.lost(number as usize),
                 _ => {
                     let (name, files) = desk.files();
                     return Ok([packet([(name.as_str(), [].as_slice())]), packed(&files)].concat());

@@ -151,6 +151,14 @@ impl Desk {
         }
     }
 
+    /// Takes the news that a drawing worker has failed, and that a new one without files is in its place.
+    pub fn lost(&mut self, worker: usize) {
+        if let Some(worker) = self.workers.get_mut(worker) {
+            worker.has.clear();
+        }
+        self.drawn(worker, Vec::new());
+    }
+
     /// Takes a request for a file of the page: its address, as the server's. The answer comes as an [`Effect::Answer`].
     pub fn get(&mut self, number: u32, address: &str) {
         let (name, query) = address.split_once('?').unwrap_or((address, ""));

@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createReadStream, existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
@@ -17,14 +17,33 @@ const KINDS = { ".html": "text/html", ".js": "text/javascript", ".css": "text/cs
 const film =
   "Screen 160 120\nSamples 4\nFrames 6\nLook 0 2 8  0 1 0  40\nIlight 1 1 1  1 -2 -1\nSphere 1  (1:-2 6:2) 1 0  .1 .1 .1  .5 .6 .7  .4 .4 .4\nTrace\n";
 
+/** What goes before the workers' program in the address with `faulty`: drawing a second frame ends the module, as a panic does. */
+const FAULTY = `{
+  const Instance = WebAssembly.Instance;
+  WebAssembly.Instance = function (module, imports) {
+    const { exports } = new Instance(module, imports);
+    let at = 0, size = 0;
+    const input = (length) => (at = exports.input((size = length)));
+    const call = (what, ...rest) => {
+      const task = what === 11 ? new TextDecoder().decode(new Uint8Array(exports.memory.buffer, at, size)) : "";
+      if (/"frame":1\\b/.test(task)) throw new WebAssembly.RuntimeError("unreachable");
+      return exports.call(what, ...rest);
+    };
+    return { exports: { ...exports, input, call } };
+  };
+}
+`;
+
 let browser, host, address;
 before(async () => {
   browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
   host = createServer((request, response) => {
-    const path = join(site, new URL(request.url, "http://host").pathname.replace(/\/$/, "/index.html"));
+    const asked = new URL(request.url, "http://host").pathname.replace(/\/$/, "/index.html");
+    const path = join(site, asked.replace("/faulty/", "/"));
     if (!existsSync(path)) return response.writeHead(404).end();
     response.writeHead(200, { "content-type": KINDS[extname(path)] ?? "application/octet-stream" });
-    createReadStream(path).pipe(response);
+    if (asked === "/faulty/worker.js") response.end(FAULTY + readFileSync(path));
+    else createReadStream(path).pipe(response);
   });
   await new Promise((done) => host.listen(0, "127.0.0.1", done));
   address = `http://127.0.0.1:${host.address().port}/`;
@@ -113,3 +132,34 @@ test("after the first load the studio opens and draws without a network", async 
   await drawn();
   check();
 });
+
+test("the page says that a worker failed, and a new one draws", async (t) => {
+  const { page, drawn, check } = await open(t, `faulty/studio.html${linked("film", [["film.txt", film]])}`);
+  await drawn();
+  const before = await page.evaluate(() => document.querySelector("canvas").toDataURL());
+  await page.keyboard.press(".");
+  await page.getByText(/the tracer has failed: RuntimeError: unreachable/).first().waitFor();
+  await page.keyboard.press(".");
+  await page.locator("output", { hasText: "frame 3 of 6" }).waitFor();
+  await page.waitForFunction((before) => document.querySelector("canvas").toDataURL() !== before, before);
+  await drawn();
+  check();
+});
+
+for (const file of readdirSync(join(site, "examples")).filter((file) => file.endsWith(".zip"))) {
+  test(`a picture of the example ${file} appears`, async (t) => {
+    const { page, check } = await open(t, `studio.html#example=${file.replace(".zip", "")}`);
+    // Slow ones are refined for minutes: a first picture is enough.
+    const isPicture = () => {
+      const canvas = document.querySelector("canvas");
+      if (!canvas?.width || !canvas.height) return false;
+      const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+      copy.drawImage(canvas, 0, 0);
+      const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+      return new Set(new Uint32Array(data.buffer)).size > 16;
+    };
+    await page.waitForFunction(isPicture, null, { timeout: 60000, polling: 250 });
+    assert.equal(await page.getByText(/tracer has failed/).count(), 0);
+    check();
+  });
+}

@@ -5,7 +5,7 @@ import type { OutputState, ServerMessage } from "../protocol";
 import { Film } from "./film";
 import { Helper } from "./helper";
 import type { Place, Question, ToDesk, ToPage } from "./messages";
-import { Call, Module, bytesOf, packed, textOf, unpacked, type File } from "./module";
+import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File } from "./module";
 import { Folder, keep, project, projects, remove } from "./projects";
 
 /** The milliseconds between two looks at the files. */
@@ -156,8 +156,12 @@ export class Session {
     else if (kind === Kind.put) this.#drawers[number]?.tell(Call.put, content);
     else if (kind === Kind.draw) {
       const drawn = (bytes: Uint8Array): void => this.#do(Call.drawn, number, bytes);
-      // What cannot be drawn is not shown: the session tells the errors of a script.
-      this.#drawers[number]?.call(Call.draw, 0, content).then(drawn, () => drawn(new Uint8Array()));
+      const failed = (error: unknown): void => {
+        // What cannot be drawn is not shown: the session tells the errors of a script.
+        if (error instanceof Fault) this.#replace(number, error);
+        else drawn(new Uint8Array());
+      };
+      this.#drawers[number]?.call(Call.draw, 0, content).then(drawn, failed);
     } else if (kind === Kind.save) {
       for (const file of unpacked(content)) void this.#write(file);
     } else if (kind === Kind.answer) {
@@ -169,6 +173,15 @@ export class Session {
       if (content.length === 0) this.#film?.cancel();
       else void this.#render(textOf(content) as "gif" | "apng" | "webp");
     }
+  }
+
+  /** Starts a new worker in place of one that has failed. */
+  #replace(number: number, fault: Fault): void {
+    if (!this.#module || !this.#compiled) return;
+    this.#tell({ notice: `This cannot be drawn, because the tracer has failed: ${fault.message}` });
+    this.#drawers[number]?.end();
+    this.#drawers[number] = new Helper(this.#compiled);
+    this.#do(Call.lost, number);
   }
 
   async #write(file: File): Promise<void> {

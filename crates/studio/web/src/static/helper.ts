@@ -1,10 +1,12 @@
 // A worker that the session's worker starts: it draws, encodes or draws frames, one call after the other.
 
 import type { ToWorker } from "./messages";
+import { Fault } from "./module";
 
 interface Answer {
   readonly result?: Uint8Array;
   readonly why?: string;
+  readonly isFault?: boolean;
 }
 
 export class Helper {
@@ -17,7 +19,7 @@ export class Helper {
     this.#worker.onmessage = ({ data }: MessageEvent<Answer>) => {
       const next = this.#waiting.shift();
       if (data.result) next?.done(data.result);
-      else next?.failed(new Error(data.why));
+      else next?.failed(data.isFault ? new Fault(data.why) : new Error(data.why));
     };
     this.#post({ is: "start", module });
   }

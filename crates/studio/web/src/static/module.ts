@@ -2,7 +2,7 @@
 
 /** The calls, as `run` in crates/web numbers them. */
 export const Call = {
-  open: 0, hear: 1, tick: 2, drawn: 3, get: 4, insert: 5, files: 6,
+  open: 0, hear: 1, tick: 2, drawn: 3, get: 4, insert: 5, files: 6, lost: 7,
   put: 10, draw: 11,
   begin: 20, frame: 21, push: 22, finish: 23,
   unzip: 30, zip: 31,
@@ -18,7 +18,11 @@ interface Exports {
   readonly input: (length: number) => number;
   readonly output: () => number;
   readonly call: (what: number, number: number, time: number) => number;
+  readonly fault: () => number;
 }
+
+/** An error after which the module is of no use. */
+export class Fault extends Error {}
 
 const NONE = new Uint8Array();
 const encoder = new TextEncoder();
@@ -46,13 +50,24 @@ export class Module {
 
   /** Does what `what` names. The result is valid until the next call. */
   call(what: number, number = 0, bytes: Uint8Array = NONE): Uint8Array {
-    const { memory, input, output, call } = this.#exports;
-    const at = input(bytes.length) >>> 0;
-    new Uint8Array(memory.buffer, at, bytes.length).set(bytes);
-    const length = call(what, number, performance.now());
+    const { memory, output } = this.#exports;
+    const length = this.#run(what, number, bytes);
     const result = new Uint8Array(memory.buffer, output() >>> 0, length);
     if (result[0] !== 0) throw new Error(textOf(result.slice(1)));
     return result.subarray(1);
+  }
+
+  /** Returns the length of the result. */
+  #run(what: number, number: number, bytes: Uint8Array): number {
+    const { memory, input, output, call, fault } = this.#exports;
+    try {
+      const at = input(bytes.length) >>> 0;
+      new Uint8Array(memory.buffer, at, bytes.length).set(bytes);
+      return call(what, number, performance.now());
+    } catch (error) {
+      const message = new Uint8Array(memory.buffer, output() >>> 0, fault());
+      throw new Fault(message.length > 0 ? textOf(message) : String(error));
+    }
   }
 }
 

@@ -2,7 +2,7 @@
 
 import { Session } from "./desk";
 import type { ToDesk, ToWorker } from "./messages";
-import { Module } from "./module";
+import { Fault, Module } from "./module";
 
 let session: Session | null = null;
 let module: Module | null = null;
@@ -19,7 +19,7 @@ function serve(message: ToWorker): void {
     const result = module?.call(message.what, message.number, message.bytes).slice() ?? new Uint8Array();
     if (message.answers) scope.postMessage({ result }, [result.buffer]);
   } catch (error) {
-    scope.postMessage({ why: error instanceof Error ? error.message : String(error) });
+    if (message.answers) scope.postMessage({ why: error instanceof Error ? error.message : String(error), isFault: error instanceof Fault });
   }
 }
 
