@@ -74,11 +74,11 @@ impl Storage for Disk {
     }
 
     fn write(&self, name: &str, content: &[u8]) -> Result<(), Error> {
-        Ok(OutputFile::write(&self.path(name), content, true)?)
+        Ok(OutputFile::write(self.path(name), content, true)?)
     }
 
     fn create(&self, name: &str, content: &[u8]) -> Result<bool, Error> {
-        match OutputFile::write_new(&self.folder.join(name), content) {
+        match OutputFile::write_new(self.folder.join(name), content) {
             Ok(()) => Ok(true),
             Err(error) if error.is_taken() => Ok(false),
             Err(error) => Err(error.into()),
