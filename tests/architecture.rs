@@ -36,6 +36,7 @@ const KNOWS: &[(&str, &[&str])] = &[
             "rayfold-client",
         ],
     ),
+    ("rayfold-web", &["rayfold-studio"]),
     (
         "rayfold",
         &[

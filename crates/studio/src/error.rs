@@ -16,6 +16,7 @@ pub enum Error {
         source: io::Error,
     },
     /// A file cannot be written.
+    #[cfg(feature = "server")]
     #[error(transparent)]
     Write(#[from] rayfold_files::Error),
     /// The folder in which something should be written does not exist.
@@ -67,7 +68,7 @@ pub(crate) fn words(error: &dyn std::error::Error) -> String {
     text
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "server"))]
 mod tests {
     use super::*;
 

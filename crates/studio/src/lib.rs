@@ -12,13 +12,17 @@
 //! everything restores the original bytes.
 
 mod arrange;
+pub mod browser;
+mod clock;
+#[cfg(feature = "server")]
+mod disk;
 mod document;
+#[cfg(feature = "server")]
 mod door;
 mod edits;
 mod error;
 mod examples;
 mod extent;
-mod files;
 mod frame;
 mod groups;
 mod handles;
@@ -26,15 +30,22 @@ mod line;
 mod materials;
 mod names;
 mod output;
+#[cfg(feature = "server")]
+mod outputs;
 mod pace;
 mod packing;
+#[cfg(feature = "server")]
 mod page;
+#[cfg(feature = "server")]
 mod pictures;
+#[cfg(feature = "server")]
 mod pipe;
 mod project;
 mod protocol;
 mod rotate_handles;
+#[cfg(feature = "server")]
 mod runs;
+#[cfg(feature = "server")]
 mod server;
 mod session;
 mod settings;
@@ -42,18 +53,25 @@ mod silhouette;
 mod snap_to_boxes;
 mod snap_to_ground;
 mod source_map;
+#[cfg(feature = "server")]
 mod start;
+mod storage;
 mod tables;
 mod text_edit;
 mod tracks;
 mod values;
 mod view;
+mod wanted;
 
 pub use document::{Document, Splice};
 pub use error::Error;
 pub use line::Line;
+#[cfg(feature = "server")]
 pub use page::Page;
 pub use project::{Opened, Project, Saved};
+#[cfg(feature = "server")]
 pub use runs::Cloud;
+#[cfg(feature = "server")]
 pub use server::Server;
+#[cfg(feature = "server")]
 pub use start::{Choice, Recent, Start};

@@ -1,12 +1,12 @@
-//! The open animation as a GIF, APNG or WebP, rendered on a thread of its own. Its bytes equal those of `rayfold
-//! render` for the files.
+//! The open animation as a GIF, APNG or WebP, and its scripts and frames as files. The bytes of an animation equal those
+//! of `rayfold render` for the files.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
+#[cfg(feature = "server")]
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use axum::body::Body;
 use image::{DynamicImage, ImageFormat};
 use rayfold_movie::{Container, Encoding, Movie, Plays};
 use rayfold_scene::{AnimationSettings, Camera, Scene, Screen, Script};
@@ -15,9 +15,9 @@ use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use crate::error::Error;
-use crate::pipe::{frame_file, zip_of};
 use crate::project::Project;
-use crate::protocol::{MovieFormat, OutputState};
+#[cfg(feature = "server")]
+use crate::protocol::OutputState;
 
 /// The largest file in bytes that is kept in memory.
 const LARGEST: usize = 512 << 20;
@@ -25,26 +25,33 @@ const LARGEST: usize = 512 << 20;
 /// The longer side of a small picture, in pixels.
 const THUMBNAIL: f64 = 96.0;
 
-/// A file with an animation.
-pub(crate) type File = (Container, Arc<Vec<u8>>);
-
-/// The file that was rendered last, and the rendering in progress.
-#[derive(Debug, Default)]
-pub(crate) struct Outputs {
-    file: Mutex<Option<File>>,
-    running: Mutex<Option<Arc<AtomicBool>>>,
-}
-
 /// The input of a rendering: scripts in order, the settings, and the kind of file.
 #[derive(Debug)]
-struct Job {
+pub(crate) struct Job {
     container: Container,
-    scripts: Vec<Arc<Script>>,
+    pub(crate) scripts: Vec<Arc<Script>>,
     settings: AnimationSettings,
 }
 
+/// An animation on its way into a file in memory.
+#[derive(Debug)]
+pub(crate) struct Film {
+    job: Job,
+    /// The script and the index of each frame, in the order in which they are shown.
+    frames: Vec<(Arc<Script>, usize)>,
+    /// The seconds of those frames that have their own.
+    durations: BTreeMap<u64, f64>,
+    file: Bounded,
+    encoding: Option<Encoding<Bounded>>,
+    pushed: usize,
+}
+
 impl Job {
-    fn of(project: &Project, container: Container) -> Result<Self, Error> {
+    /// Takes the input from a project.
+    ///
+    /// # Errors
+    /// Fails if a script has errors, or if there are fewer frames than the settings say.
+    pub(crate) fn of(project: &Project, container: Container) -> Result<Self, Error> {
         if let Some(file) = project.files.iter().find(|file| !file.is_sound()) {
             return Err(Error::Output(format!("{} has errors; mend them first", file.name)));
         }
@@ -58,98 +65,99 @@ impl Job {
         }
     }
 
-    fn run(&self, cancel: &AtomicBool, report: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
-        let frames: Vec<_> = self
-            .scripts
-            .iter()
-            .flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)))
-            .collect();
-        let of = self.settings.shown(&frames).count();
-        let ending = self.container.ending();
-        let failed =
-            |error: &dyn std::error::Error| Error::Output(format!("cannot make the .{ending}: {error}"));
-        let durations = self.settings.shown_durations(frames.len() as u64);
-        let mut file = Bounded(Vec::new());
-        let mut encoding: Option<Encoding<&mut Bounded>> = None;
-        let mut out = Some(&mut file);
+    /// Renders the animation, and reports each frame.
+    ///
+    /// # Errors
+    /// Fails if a frame cannot be rendered, or if the file is beyond the limits.
+    #[cfg(feature = "server")]
+    pub(crate) fn run(self, cancel: &AtomicBool, report: &impl Fn(OutputState)) -> Result<Vec<u8>, Error> {
         let options = RenderOptions { cancel: Some(cancel), ..RenderOptions::default() };
+        let mut film = Film::new(self);
+        let of = film.count();
         report(OutputState::Running { done: 0, of });
-        for (done, &(script, k)) in self.settings.shown(&frames).enumerate() {
-            let Some(frame) = picture_of_frame(script, k, &options) else { break };
-            let frame = frame.map_err(|error| failed(&error))?;
-            if let Some(out) = out.take() {
-                let movie = Movie {
-                    size: (frame.width(), frame.height()),
-                    frames: Some(of as u64),
-                    fps: self.settings.fps(),
-                    plays: Plays::repeated(self.settings.loops()),
-                    last_delay_cs: None,
-                    exact: false,
-                    alpha: self.scripts.iter().any(|script| script.shots().any(|shot| shot.is_clear)),
-                };
-                encoding = Some(Encoding::begin(out, self.container, movie).map_err(|error| failed(&error))?);
-            }
-            if let Some(encoding) = &mut encoding {
-                let seconds = durations.get(&(done as u64)).copied();
-                encoding.push(frame, seconds).map_err(|error| failed(&error))?;
-            }
+        for done in 0..of {
+            film.push(film.draw(done, &options)?)?;
             report(OutputState::Running { done: done + 1, of });
         }
-        let encoding = encoding.ok_or_else(|| Error::Output("there is no frame to draw".into()))?;
-        encoding.finish().map_err(|error| failed(&error))?.complete(&mut file.0);
-        Ok(file.0)
+        film.finish()
     }
 }
 
-impl Outputs {
-    /// Starts rendering the animation unless a rendering is in progress. Reports the progress to `report`.
-    pub(crate) fn start(
-        self: &Arc<Self>,
-        project: &Project,
-        format: MovieFormat,
-        report: impl Fn(OutputState) + Send + 'static,
-    ) {
-        let container = Container::from(format);
-        let job = Job::of(project, container);
-        let cancel = Arc::new(AtomicBool::new(false));
-        {
-            let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-            if running.is_some() {
-                return;
-            }
-            *running = Some(Arc::clone(&cancel));
-        }
-        let own = Arc::clone(self);
-        let spawned = thread::Builder::new().name("output".into()).spawn(move || {
-            let made = job.and_then(|job| job.run(&cancel, &report));
-            *own.running.lock().unwrap_or_else(PoisonError::into_inner) = None;
-            report(match made {
-                _ if cancel.load(Ordering::Relaxed) => OutputState::Cancelled,
-                Err(error) => OutputState::Failed { why: error.to_string() },
-                Ok(file) => {
-                    let bytes = file.len();
-                    *own.file.lock().unwrap_or_else(PoisonError::into_inner) =
-                        Some((container, Arc::new(file)));
-                    OutputState::Done { bytes, format }
-                }
-            });
-        });
-        if spawned.is_err() {
-            *self.running.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        }
+impl Film {
+    pub(crate) fn new(job: Job) -> Self {
+        let frames: Vec<_> = job
+            .scripts
+            .iter()
+            .flat_map(|script| (0..script.frame_count()).map(move |k| (Arc::clone(script), k)))
+            .collect();
+        let durations = job.settings.shown_durations(frames.len() as u64);
+        let frames = job.settings.shown(&frames).cloned().collect();
+        Self { job, frames, durations, file: Bounded::default(), encoding: None, pushed: 0 }
     }
 
-    /// Cancels the rendering in progress.
-    pub(crate) fn cancel(&self) {
-        if let Some(cancel) = &*self.running.lock().unwrap_or_else(PoisonError::into_inner) {
-            cancel.store(true, Ordering::Relaxed);
-        }
+    /// Makes a film of each frame once, whatever the settings say.
+    pub(crate) fn of_all_frames(mut job: Job) -> Self {
+        job.settings = AnimationSettings::default();
+        Self::new(job)
     }
 
-    /// Returns the file that was rendered last.
-    pub(crate) fn file(&self) -> Option<File> {
-        self.file.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// Returns the number of frames, each counted as often as it is shown.
+    pub(crate) fn count(&self) -> usize {
+        self.frames.len()
     }
+
+    /// Renders a frame, counted from 0 in the order in which they are shown.
+    ///
+    /// # Errors
+    /// Fails if there is no such frame, or if it cannot be rendered.
+    pub(crate) fn draw(&self, number: usize, options: &RenderOptions) -> Result<DynamicImage, Error> {
+        let frame = self.frames.get(number).and_then(|(script, k)| picture_of_frame(script, *k, options));
+        frame.ok_or_else(nothing)?.map_err(|error| self.failed(&error))
+    }
+
+    /// Adds the next frame to the file.
+    ///
+    /// # Errors
+    /// Fails if the file is beyond the limits.
+    pub(crate) fn push(&mut self, frame: DynamicImage) -> Result<(), Error> {
+        if self.encoding.is_none() {
+            let movie = Movie {
+                size: (frame.width(), frame.height()),
+                frames: Some(self.count() as u64),
+                fps: self.job.settings.fps(),
+                plays: Plays::repeated(self.job.settings.loops()),
+                last_delay_cs: None,
+                exact: false,
+                alpha: self.job.scripts.iter().any(|script| script.shots().any(|shot| shot.is_clear)),
+            };
+            let begun = Encoding::begin(self.file.clone(), self.job.container, movie);
+            self.encoding = Some(begun.map_err(|error| self.failed(&error))?);
+        }
+        let seconds = self.durations.get(&(self.pushed as u64)).copied();
+        self.pushed += 1;
+        let pushed = self.encoding.as_mut().map_or(Ok(()), |encoding| encoding.push(frame, seconds));
+        pushed.map_err(|error| self.failed(&error))
+    }
+
+    /// Returns the file with all frames that were added.
+    ///
+    /// # Errors
+    /// Fails if there was no frame, or if the file is beyond the limits.
+    pub(crate) fn finish(mut self) -> Result<Vec<u8>, Error> {
+        let encoding = self.encoding.take().ok_or_else(nothing)?;
+        let finished = encoding.finish().map_err(|error| self.failed(&error))?;
+        let mut file = std::mem::take(&mut *self.file.bytes());
+        finished.complete(&mut file);
+        Ok(file)
+    }
+
+    fn failed(&self, error: &dyn std::error::Error) -> Error {
+        Error::Output(format!("cannot make the .{}: {error}", self.job.container.ending()))
+    }
+}
+
+fn nothing() -> Error {
+    Error::Output("there is no frame to draw".into())
 }
 
 /// Renders a frame at the script's own size, as PNG. Returns `None` if there is nothing to draw.
@@ -193,28 +201,6 @@ fn no_picture(error: &dyn std::error::Error) -> Error {
     Error::Output(format!("cannot make the picture: {error}"))
 }
 
-/// Renders all frames at their scripts' own sizes to a zip file of PNGs, which is sent while they are rendered. If
-/// the reader stops, the rendering stops and releases its `permit`.
-///
-/// # Errors
-/// Fails if a script has errors, or if the system cannot start a thread.
-pub(crate) fn frames_zip(project: &Project, permit: impl Send + 'static) -> Result<Body, Error> {
-    let job = Job::of(project, Container::Gif)?;
-    let of: usize = job.scripts.iter().map(|script| script.frame_count()).sum();
-    let made = zip_of(move |zip| {
-        let _permit = permit;
-        let frames =
-            job.scripts.iter().flat_map(|script| (0..script.frame_count()).map(move |k| (script, k)));
-        for ((script, k), number) in frames.zip(1..) {
-            if let Some(png) = frame_png(script, k).map_err(io::Error::other)? {
-                zip.add(&frame_file(number, of as u64), &png)?;
-            }
-        }
-        Ok(())
-    });
-    made.map_err(|error| Error::Output(format!("cannot make the zip file: {error}")))
-}
-
 /// Returns all scripts, as they are on the page, as a zip file.
 ///
 /// # Errors
@@ -229,17 +215,32 @@ pub(crate) fn scripts_zip(project: &Project) -> Result<Vec<u8>, Error> {
     Ok(zip.finish().map_err(|error| failed(&error))?.into_inner())
 }
 
-/// A buffer with a size limit.
-struct Bounded(Vec<u8>);
+/// Returns the name of a frame's file in a zip file of `of` frames. Its number is padded so that all programs
+/// sort the files correctly.
+pub(crate) fn frame_file(number: u64, of: u64) -> String {
+    let digits = of.max(1).to_string().len();
+    format!("frame{number:0digits$}.png")
+}
+
+/// A buffer with a size limit. Its clones are the same buffer.
+#[derive(Clone, Debug, Default)]
+struct Bounded(Arc<Mutex<Vec<u8>>>);
+
+impl Bounded {
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 impl Write for Bounded {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.0.len() + bytes.len() > LARGEST {
+        let mut file = self.bytes();
+        if file.len() + bytes.len() > LARGEST {
             return Err(io::Error::other(format!(
                 "it is larger than {LARGEST} bytes; `rayfold render` writes it to a file"
             )));
         }
-        self.0.extend_from_slice(bytes);
+        file.extend_from_slice(bytes);
         Ok(bytes.len())
     }
 
@@ -248,13 +249,17 @@ impl Write for Bounded {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "server"))]
 mod tests {
-    use std::collections::BTreeMap;
 
     use rayfold_scene::{Limits, parse};
 
     use super::*;
+
+    #[test]
+    fn programs_sort_the_files_of_frames() {
+        assert_eq!((frame_file(7, 50), frame_file(7, 9)), ("frame07.png".into(), "frame7.png".into()));
+    }
 
     #[test]
     fn an_animation_runs_back_and_shows_frames_for_times_of_their_own() {

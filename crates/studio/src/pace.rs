@@ -5,6 +5,24 @@ use std::time::Duration;
 use glam::DVec3;
 use rayfold_scene::{Camera, Material, Scene, Screen};
 
+/// The largest number of pictures that the page has not shown yet while something moves.
+pub(crate) const MOVING_UNDER_WAY: u32 = 1;
+
+/// The same limit at rest, where sketches precede the final picture.
+pub(crate) const RESTING_UNDER_WAY: u32 = 2;
+
+/// The time from the last request of something that moves to its rest.
+pub(crate) const REST: Duration = Duration::from_millis(120);
+
+/// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
+pub(crate) const PATIENCE: f64 = 0.1;
+
+/// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
+pub(crate) const FEW: u32 = 4;
+
+/// The factor by which the next sketch is wider and higher.
+pub(crate) const GROWTH: f64 = 2.0;
+
 /// The time for a picture while something moves, in seconds. More than half of the time of a picture at 55 per second
 /// goes to packing, the browser, and the wait for the next request.
 const MOVING: f64 = 0.009;
@@ -54,6 +72,7 @@ pub(crate) struct Effort {
 
 impl Pace {
     /// Records the time before the first pixel.
+    #[cfg(feature = "server")]
     pub(crate) fn prepared(&mut self, took: Duration) {
         self.preparing = took.as_secs_f64();
     }
@@ -105,6 +124,11 @@ impl Pace {
         effort
     }
 
+    /// Returns the seconds that a picture of this size with one ray per pixel takes, once one was rendered.
+    pub(crate) fn seconds(&self, screen: Screen) -> Option<f64> {
+        self.per_pixel.map(|per_pixel| self.preparing + per_pixel * screen.pixels() as f64)
+    }
+
     /// Returns the share of width and height of a sketch that can be rendered in this many seconds.
     pub(crate) fn share(&self, scene: &Scene, seconds: f64) -> f64 {
         if matches!(scene.camera, Camera::Orthographic) {
@@ -125,6 +149,12 @@ fn fewest(scene: &Scene) -> u32 {
         if is_glass { Some(THROUGH_GLASS) } else { is_mirror.then_some(0) }
     };
     scene.objects.iter().filter_map(|object| of(object.material())).max().unwrap_or(u32::MAX)
+}
+
+/// Returns a share of a screen's size, rounded up.
+pub(crate) fn smaller(screen: Screen, share: f64) -> Screen {
+    let side = |side: u32| (f64::from(side) * share).ceil().max(1.0) as u32;
+    Screen::new(side(screen.width()), side(screen.height())).unwrap_or(screen)
 }
 
 #[cfg(test)]

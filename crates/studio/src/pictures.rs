@@ -12,80 +12,15 @@ use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use rayfold_scene::{Samples, Scene, Screen, Script};
+use rayfold_scene::{Samples, Scene};
 use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
-use crate::pace::{Effort, Pace};
+use crate::clock::Instant;
+use crate::pace::{Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller};
 use crate::packing::{Packer, Picture, Quality};
-
-/// The largest number of pictures that the page has not shown yet while something moves.
-const MOVING_UNDER_WAY: u32 = 1;
-
-/// The same limit at rest, where sketches precede the final picture.
-const RESTING_UNDER_WAY: u32 = 2;
-
-/// The time from the last request of something that moves to its rest.
-const REST: Duration = Duration::from_millis(120);
-
-/// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
-const PATIENCE: f64 = 0.1;
-
-/// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
-const FEW: u32 = 4;
-
-/// The factor by which the next sketch is wider and higher.
-const GROWTH: f64 = 2.0;
-
-/// A request for a picture.
-#[derive(Clone, Debug)]
-pub(crate) struct Wanted {
-    /// The scene to draw. Its screen is the size of the picture.
-    pub(crate) scene: Scene,
-    /// The motion of the scene while its shutter is open.
-    pub(crate) motion: Option<Motion>,
-    /// Something is being dragged, so speed matters more than quality.
-    pub(crate) moving: bool,
-    /// The number by which the page knows the picture.
-    pub(crate) number: u32,
-}
-
-/// A frame of a script that can be evaluated at other moments.
-#[derive(Clone, Debug)]
-pub(crate) struct Motion {
-    /// The script of the frame.
-    pub(crate) script: Arc<Script>,
-    /// The index of the frame, from 0.
-    pub(crate) frame: usize,
-    /// The view is that of the free camera, which does not move.
-    pub(crate) is_free: bool,
-}
-
-impl Wanted {
-    /// Returns whether the same picture is requested, at the same quality.
-    fn is_same(&self, other: &Self) -> bool {
-        let is_same_motion = match (&self.motion, &other.motion) {
-            (Some(own), Some(other)) => own.is_same(other),
-            (own, other) => own.is_none() && other.is_none(),
-        };
-        self.moving == other.moving && is_same_motion && self.scene == other.scene
-    }
-}
-
-impl Motion {
-    fn is_same(&self, other: &Self) -> bool {
-        let of = |motion: &Self| (motion.frame, motion.is_free);
-        Arc::ptr_eq(&self.script, &other.script) && of(self) == of(other)
-    }
-
-    /// Returns the scene this many frames after the frame.
-    fn after(&self, scene: &Scene, frames: f64) -> Scene {
-        let Some(then) = self.script.frame_after(self.frame, frames) else { return scene.clone() };
-        let camera = if self.is_free { scene.camera } else { then.camera };
-        Scene { screen: scene.screen, camera, indirect: scene.indirect, ..then }
-    }
-}
+use crate::wanted::Wanted;
 
 /// A handle of the rendering thread.
 #[derive(Clone, Debug)]
@@ -313,27 +248,24 @@ impl Shared {
     }
 }
 
-/// Returns a share of a screen's size, rounded up.
-fn smaller(screen: Screen, share: f64) -> Screen {
-    let side = |side: u32| (f64::from(side) * share).ceil().max(1.0) as u32;
-    Screen::new(side(screen.width()), side(screen.height())).unwrap_or(screen)
-}
-
 #[cfg(test)]
 mod tests {
     use image::DynamicImage;
+    use rayfold_scene::Screen;
     use rayfold_tracer::{picture_of_frame, render, render_picture};
     use std::sync::mpsc;
 
     use super::*;
     use crate::packing::HEADER;
     use crate::packing::tests::Shown;
+    use crate::project::Place;
+    use crate::wanted::{Motion, ViewSettings};
 
     fn wanted(number: u32, moving: bool) -> Wanted {
         let text = "Screen 64 48\nBackground 0 0.5 1\nSphere 10 30 20 -20  1 0 0  0 0 0\nTrace";
         let scene =
             rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
-        Wanted { scene, motion: None, moving, number }
+        Wanted { scene, motion: None, moving, number, place: Place::default(), view: ViewSettings::default() }
     }
 
     /// Returns a request for a picture that may be rendered in any size.
@@ -342,7 +274,9 @@ mod tests {
         let parsed = rayfold_scene::parse("a", text.as_bytes(), &Default::default());
         let script = Arc::new(parsed.script.unwrap());
         let scene = script.frame(0).unwrap();
-        Wanted { scene, motion: Some(Motion { script, frame: 0, is_free: false }), moving: false, number }
+        let motion = Some(Motion { script, frame: 0, is_free: false });
+        let (place, view) = (Place::default(), ViewSettings::default());
+        Wanted { scene, motion, moving: false, number, place, view }
     }
 
     fn is_final(picture: &[u8]) -> bool {

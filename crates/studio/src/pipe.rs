@@ -77,13 +77,6 @@ impl Zip {
     }
 }
 
-/// Returns the name of a frame's file in a zip file of `of` frames. Its number is padded so that all programs
-/// sort the files correctly.
-pub(crate) fn frame_file(number: u64, of: u64) -> String {
-    let digits = of.max(1).to_string().len();
-    format!("frame{number:0digits$}.png")
-}
-
 impl Pipe {
     /// Returns the sender for an error, which breaks the response.
     pub(crate) fn failures(&self) -> Sender<io::Result<Bytes>> {
@@ -152,10 +145,5 @@ mod tests {
         });
         drop(body);
         assert!(heard.recv_timeout(std::time::Duration::from_secs(20)).unwrap());
-    }
-
-    #[test]
-    fn frames_are_named_so_that_they_sort() {
-        assert_eq!((frame_file(7, 50), frame_file(7, 9)), ("frame07.png".into(), "frame7.png".into()));
     }
 }

@@ -4,27 +4,33 @@
 //! another program. In that case it is in [`Saved::Conflict`] until the user chooses a text.
 
 use std::cell::{OnceCell, RefCell};
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+#[cfg(feature = "server")]
+use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Duration;
 
-use rayfold_files::{Folder, NotRead, OutputFile, library_beside};
-use rayfold_scene::assets::{Library, file_name};
+#[cfg(feature = "server")]
+use rayfold_files::{Folder, NotRead};
+use rayfold_scene::assets::{FileInfo, Library, file_name};
 use rayfold_scene::{
     AnimationSettings, Diagnostic, Limits, Script, natural_cmp, parse_with_files, script_name,
 };
 use serde::Serialize;
 
+use crate::clock::Instant;
+#[cfg(feature = "server")]
+use crate::disk::{Disk, LINK, leads_out};
 use crate::document::{Document, Splice};
 use crate::error::{Error, words};
-use crate::files::{LINK, TEXT, leads_out, read};
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::settings::Settings;
+use crate::storage::Storage;
 use crate::text_edit::{self, TextChange};
 use crate::tracks::{Tracks, tracks};
+
+/// The largest size in bytes of all files of a project together.
+pub(crate) const TEXT: u64 = 256 << 20;
 
 /// The endings of models.
 const MODELS: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];
@@ -67,7 +73,6 @@ pub enum Saved {
 pub struct Opened {
     /// The name of the file.
     pub name: String,
-    path: PathBuf,
     /// The lines of the script.
     pub document: Document,
     /// The parsed script; the last valid one if the lines have an error now.
@@ -84,11 +89,11 @@ pub struct Opened {
     /// and the numbers that change.
     frame: RefCell<Option<(usize, Arc<Frame>)>>,
     tracks: OnceCell<Tracks>,
-    /// The folder of the script, and the models in it.
-    folder: PathBuf,
+    /// The place of the script, and the models there.
+    storage: Arc<dyn Storage>,
     library: Arc<Library>,
     /// The files that the script names, each with its state when it was parsed.
-    named: Vec<(Option<(u64, SystemTime)>, String)>,
+    named: Vec<(Option<FileInfo>, String)>,
 }
 
 /// The open scripts of an animation.
@@ -99,14 +104,16 @@ pub struct Project {
     /// The scripts in the order of the animation; never empty.
     pub files: Vec<Opened>,
     /// The files that look like a part of the animation but are not read.
+    #[cfg(feature = "server")]
     pub not_read: Vec<NotRead>,
     settings: Settings,
-    /// The folder, if one was opened.
-    folder: Option<PathBuf>,
+    storage: Arc<dyn Storage>,
+    /// Scripts may be added.
+    can_create: bool,
 }
 
 /// A position in the animation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// The index of its file.
     pub file: usize,
@@ -121,6 +128,7 @@ impl Project {
     ///
     /// # Errors
     /// Fails if a file cannot be read, the folder of the path does not exist, or its `animation.json` is invalid.
+    #[cfg(feature = "server")]
     pub fn open(path: &Path) -> Result<Self, Error> {
         let name = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let name = name.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -132,40 +140,58 @@ impl Project {
             return Err(Error::NoFolder { path: parent.to_path_buf() });
         }
         if is_new && path.extension().is_none() {
-            fs::create_dir(path).map_err(read)?;
+            std::fs::create_dir(path).map_err(read)?;
         }
-        let (mut paths, mut not_read) = (Vec::new(), Vec::new());
-        if path.is_dir() {
-            let listed = Folder::list(path).map_err(read)?;
-            not_read = listed.not_read;
-            for (_, script) in listed.scripts {
-                if leads_out(path, &script) {
-                    not_read.push(NotRead { path: script, problem: LINK });
-                    continue;
-                }
-                let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                paths.push((name, script));
+        if !path.is_dir() {
+            let disk = Arc::new(Disk::of_script(&name, path));
+            return Self::of(name.clone(), disk, vec![name], false);
+        }
+        let listed = Folder::list(path).map_err(read)?;
+        let (mut names, mut not_read) = (Vec::new(), listed.not_read);
+        for (_, script) in listed.scripts {
+            if leads_out(path, &script) {
+                not_read.push(NotRead { path: script, problem: LINK });
+                continue;
             }
-            if paths.is_empty() {
-                paths.push((FIRST.to_owned(), path.join(FIRST)));
-            }
-        } else {
-            paths.push((name.clone(), path.to_path_buf()));
+            names.push(script.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        }
+        Ok(Self { not_read, ..Self::of(name, Arc::new(Disk::new(path)), names, true)? })
+    }
+
+    /// Opens scripts by their names, in the order of the animation. Without any, one begins with an example.
+    ///
+    /// # Errors
+    /// Fails if a file cannot be read, or if `animation.json` is invalid.
+    pub(crate) fn of(
+        name: String,
+        storage: Arc<dyn Storage>,
+        mut names: Vec<String>,
+        can_create: bool,
+    ) -> Result<Self, Error> {
+        if names.is_empty() {
+            names.push(FIRST.to_owned());
         }
         let mut room = TEXT;
-        let files = paths
+        let files = names
             .into_iter()
-            .map(|(name, path)| {
-                let file = Opened::open(name, path)?;
+            .map(|name| {
+                let file = Opened::open(name, &storage)?;
                 room = room
                     .checked_sub(file.on_disk.as_ref().map_or(0, |text| text.len() as u64))
-                    .ok_or_else(|| Error::TooLarge { path: file.path.clone(), limit: TEXT })?;
+                    .ok_or_else(|| Error::TooLarge { path: file.name.clone().into(), limit: TEXT })?;
                 Ok(file)
             })
             .collect::<Result<_, Error>>()?;
-        let folder = path.is_dir().then(|| path.to_path_buf());
-        let settings = Settings::open(folder.as_deref())?;
-        Ok(Self { name, files, not_read, settings, folder })
+        let settings = Settings::open(can_create.then(|| Arc::clone(&storage)))?;
+        Ok(Self {
+            name,
+            files,
+            #[cfg(feature = "server")]
+            not_read: Vec::new(),
+            settings,
+            storage,
+            can_create,
+        })
     }
 
     /// Returns the settings of the animation.
@@ -213,7 +239,7 @@ impl Project {
 
     /// Returns whether scripts can be added, that is, whether a folder was opened.
     pub fn can_create(&self) -> bool {
-        self.folder.is_some()
+        self.can_create
     }
 
     /// Adds a script to the folder under a new name. Returns its index.
@@ -222,9 +248,9 @@ impl Project {
     /// Fails if no folder was opened, if the name is invalid or taken, or if the file cannot be written.
     pub fn create(&mut self, name: &str, text: &[u8]) -> Result<usize, Error> {
         let refused = |problem| Error::Name { name: name.chars().take(80).collect(), problem };
-        let Some(folder) = &self.folder else {
+        if !self.can_create {
             return Err(refused("one script was opened, and nothing beside it may be written"));
-        };
+        }
         let is_plain = script_name(name).is_some()
             && name.len() <= NAME
             && !name.chars().any(|c| c.is_control() || "/\\:".contains(c));
@@ -232,18 +258,17 @@ impl Project {
             return Err(refused("expected a plain file name that ends with .txt"));
         }
         let held: usize = self.files.iter().filter_map(|file| file.on_disk.as_ref()).map(Vec::len).sum();
-        let path = folder.join(name);
         if (held + text.len()) as u64 > TEXT {
-            return Err(Error::TooLarge { path, limit: TEXT });
+            return Err(Error::TooLarge { path: name.into(), limit: TEXT });
         }
-        OutputFile::write_new(&path, text).map_err(|error| {
-            if error.is_taken() { refused("there is such a file already") } else { error.into() }
-        })?;
+        if !self.storage.create(name, text)? {
+            return Err(refused("there is such a file already"));
+        }
         let order = |name: &str, other: &str| {
             natural_cmp(script_name(name).unwrap_or(name), script_name(other).unwrap_or(other))
         };
         let at = self.files.partition_point(|file| order(&file.name, name).is_lt());
-        self.files.insert(at, Opened::open(name.to_owned(), path)?);
+        self.files.insert(at, Opened::open(name.to_owned(), &self.storage)?);
         Ok(at)
     }
 
@@ -285,16 +310,11 @@ impl Project {
 }
 
 impl Opened {
-    fn open(name: String, path: PathBuf) -> Result<Self, Error> {
-        // So a link keeps pointing to the file that is written.
-        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-        let library = library_beside(&path);
-        let path = path.canonicalize().unwrap_or(path);
-        let on_disk = read(&path)?;
+    fn open(name: String, storage: &Arc<dyn Storage>) -> Result<Self, Error> {
+        let on_disk = storage.read(&name)?;
         let text = on_disk.clone().unwrap_or_else(|| STARTER.into());
         let mut file = Self {
             name,
-            path,
             document: Document::new(&text),
             script: None,
             diagnostics: Vec::new(),
@@ -304,20 +324,16 @@ impl Opened {
             failure: String::new(),
             frame: RefCell::default(),
             tracks: OnceCell::new(),
-            folder,
-            library,
+            storage: Arc::clone(storage),
+            library: storage.library(),
             named: Vec::new(),
         };
         file.parse();
         Ok(file)
     }
 
-    /// Reads the file. Its path was without links when it was opened, so a link is that of another program.
     fn read(&self) -> Result<Option<Vec<u8>>, Error> {
-        if self.path.is_symlink() {
-            return Err(Error::Read { path: self.path.clone(), source: io::Error::other(LINK) });
-        }
-        read(&self.path)
+        self.storage.read(&self.name)
     }
 
     /// Returns the number of frames that can be shown.
@@ -372,7 +388,7 @@ impl Opened {
     fn parse(&mut self) {
         let limits = Limits { max_described: DESCRIBED, ..Limits::default() };
         let parsed = parse_with_files(&self.name, &self.document.bytes(), &limits, &self.library);
-        self.named = parsed.files.into_iter().map(|name| (self.state_of(&name), name)).collect();
+        self.named = parsed.files.into_iter().map(|name| (self.storage.look(&name), name)).collect();
         self.diagnostics = parsed.diagnostics;
         if parsed.script.is_some() {
             self.script = parsed.script.map(Arc::new);
@@ -382,6 +398,7 @@ impl Opened {
     }
 
     /// Returns the models and pictures in the script's folder.
+    #[cfg(feature = "server")]
     pub(crate) fn library(&self) -> &Arc<Library> {
         &self.library
     }
@@ -399,22 +416,13 @@ impl Opened {
     }
 
     fn files_with(&self, endings: &[&str]) -> Vec<String> {
-        let folder = if self.folder == Path::new("") { Path::new(".") } else { &self.folder };
-        let names = folder.read_dir().into_iter().flatten();
-        let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
         let is_one = |name: &String| {
             let ending = name.rsplit('.').next().unwrap_or_default();
             endings.iter().any(|known| ending.eq_ignore_ascii_case(known)) && file_name(name).is_ok()
         };
-        let mut names: Vec<_> = names.filter(is_one).collect();
+        let mut names: Vec<_> = self.storage.names().into_iter().filter(is_one).collect();
         names.sort_by(|a, b| natural_cmp(a, b));
         names
-    }
-
-    /// Returns the state of a file that the script names.
-    fn state_of(&self, name: &str) -> Option<(u64, SystemTime)> {
-        let metadata = self.folder.join(name).metadata().ok()?;
-        Some((metadata.len(), metadata.modified().ok()?))
     }
 
     /// Returns a frame, counted from 0.
@@ -444,7 +452,7 @@ impl Opened {
             let is_back = self.saved == Saved::Conflict && self.changed.is_none();
             self.saved = if is_back { Saved::Yes } else { self.saved };
             // A file that the script names may have changed.
-            let is_new = self.named.iter().any(|(state, name)| *state != self.state_of(name));
+            let is_new = self.named.iter().any(|(state, name)| *state != self.storage.look(name));
             if is_new {
                 self.parse();
             }
@@ -519,12 +527,12 @@ impl Opened {
                 self.changed = None;
                 Saved::Yes
             }
-            Ok(_) => match OutputFile::write(&self.path, &text, true) {
+            Ok(_) => match self.storage.write(&self.name, &text) {
                 Ok(()) => {
                     (self.on_disk, self.changed) = (Some(text), None);
                     Saved::Yes
                 }
-                Err(error) => self.failed(&error.into()),
+                Err(error) => self.failed(&error),
             },
             Err(error) => self.failed(&error),
         };
@@ -532,8 +540,11 @@ impl Opened {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "server"))]
 mod tests {
+    use std::fs;
+    use std::path::PathBuf;
+
     use super::*;
 
     #[test]

@@ -535,6 +535,10 @@ pub(crate) struct FaultState {
 }
 
 /// The state of the GIF.
+#[cfg_attr(
+    not(any(test, feature = "server")),
+    expect(dead_code, reason = "the scripts of a page without a program make it")
+)]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "kebab-case", tag = "is")]

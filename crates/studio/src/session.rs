@@ -26,7 +26,6 @@ use crate::frame::Frame;
 use crate::line::Line;
 use crate::materials;
 use crate::names;
-use crate::pictures::Wanted;
 use crate::project::{Place, Project};
 use crate::protocol::{ClientMessage, FileState, MovieFormat, ServerMessage};
 use crate::snap_to_ground;
@@ -34,6 +33,7 @@ use crate::tables::{Role, commands, role};
 use crate::tracks::{self, Copied, Tracks};
 use crate::values::changed;
 use crate::view::Orbit;
+use crate::wanted::Wanted;
 use hold::Held;
 
 /// The reply to a move of what has no position.

@@ -3,33 +3,24 @@
 //! Only the number of `fps` is changed; every other byte stays. The file is read before each change, so that changes
 //! by other programs stay, too. A single script has no such file: its frame rate lasts as long as the program.
 
-use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use rayfold_files::OutputFile;
 use rayfold_scene::{AnimationSettings, SETTINGS_FILE, parse_settings};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::error::Error;
-use crate::files::{self, LINK};
 use crate::line::written;
+use crate::storage::Storage;
 
 /// The settings of the animation, and their file.
 #[derive(Debug)]
 pub(crate) struct Settings {
-    /// The path of the file; `None` for a single script.
-    path: Option<PathBuf>,
+    /// The folder of the file; `None` for a single script.
+    folder: Option<Arc<dyn Storage>>,
     /// The content of the file when it was last read or written; `None` if it did not exist.
     on_disk: Option<Vec<u8>>,
     now: AnimationSettings,
-}
-
-/// Reads the file of settings, unless it is a link to another place.
-fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
-    if path.parent().is_some_and(|folder| files::leads_out(folder, path)) {
-        return Err(Error::Settings(format!("{SETTINGS_FILE}: {LINK}")));
-    }
-    files::read(path)
 }
 
 impl Settings {
@@ -37,11 +28,10 @@ impl Settings {
     ///
     /// # Errors
     /// Fails if the file cannot be read or is invalid.
-    pub(crate) fn open(folder: Option<&Path>) -> Result<Self, Error> {
-        let path = folder.map(|folder| folder.join(SETTINGS_FILE));
-        let on_disk = path.as_deref().map(read).transpose()?.flatten();
+    pub(crate) fn open(folder: Option<Arc<dyn Storage>>) -> Result<Self, Error> {
+        let on_disk = folder.as_deref().map(|folder| folder.read(SETTINGS_FILE)).transpose()?.flatten();
         let now = parsed(on_disk.as_deref())?;
-        Ok(Self { path, on_disk, now })
+        Ok(Self { folder, on_disk, now })
     }
 
     pub(crate) fn now(&self) -> AnimationSettings {
@@ -53,18 +43,18 @@ impl Settings {
     /// # Errors
     /// Fails if an animation cannot have the frame rate, or if the file cannot be read or written.
     pub(crate) fn set_fps(&mut self, fps: f64) -> Result<(), Error> {
-        let held = match &self.path {
-            Some(path) => read(path)?,
+        let held = match &self.folder {
+            Some(folder) => folder.read(SETTINGS_FILE)?,
             None => None,
         };
         let there = parsed(held.as_deref())?;
-        let of = if self.path.is_some() { there.clone() } else { self.now.clone() };
+        let of = if self.folder.is_some() { there.clone() } else { self.now.clone() };
         let next = of.with_fps(fps).map_err(|error| Error::Output(error.to_string()))?;
-        if let Some(path) = &self.path
+        if let Some(folder) = &self.folder
             && next != there
         {
             let text = with_fps(held.as_deref().unwrap_or_default(), fps);
-            OutputFile::write(path, &text, true)?;
+            folder.write(SETTINGS_FILE, &text)?;
             self.on_disk = Some(text);
         } else {
             self.on_disk = held;
@@ -78,9 +68,9 @@ impl Settings {
     /// # Errors
     /// Fails if the new file is invalid. The old settings stay in effect, and the error is reported once.
     pub(crate) fn look(&mut self) -> Result<bool, Error> {
-        let Some(path) = &self.path else { return Ok(false) };
+        let Some(folder) = &self.folder else { return Ok(false) };
         // A file that cannot be read now is checked again later.
-        let Ok(theirs) = read(path) else { return Ok(false) };
+        let Ok(theirs) = folder.read(SETTINGS_FILE) else { return Ok(false) };
         if theirs == self.on_disk {
             return Ok(false);
         }
@@ -131,11 +121,17 @@ fn with_fps(bytes: &[u8], fps: f64) -> Vec<u8> {
     [&whole[..at], &inserted, &whole[at + removed..]].concat().into()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "server"))]
 mod tests {
     use std::fs;
+    use std::path::Path;
 
     use super::*;
+    use crate::disk::Disk;
+
+    fn open(folder: &Path) -> Result<Settings, Error> {
+        Settings::open(Some(Arc::new(Disk::new(folder))))
+    }
 
     #[test]
     fn only_the_number_changes() {
@@ -162,7 +158,7 @@ mod tests {
     fn what_others_have_written_meanwhile_stays() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(SETTINGS_FILE);
-        let mut settings = Settings::open(Some(folder.path())).unwrap();
+        let mut settings = open(folder.path()).unwrap();
         settings.set_fps(10.0).unwrap();
         assert!(!path.exists(), "what holds anyway is not written");
         settings.set_fps(20.0).unwrap();
@@ -180,7 +176,7 @@ mod tests {
         assert_eq!((settings.look().unwrap(), settings.now().fps()), (false, 50.0), "reported once");
         assert!(settings.set_fps(30.0).is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "{\"fps\": 0}");
-        assert!(matches!(Settings::open(Some(folder.path())), Err(Error::Settings(_))));
+        assert!(matches!(open(folder.path()), Err(Error::Settings(_))));
     }
 
     #[test]

@@ -1,10 +1,15 @@
+import { join } from "node:path";
+
 import { defineConfig } from "vite";
 
 import { privateNames } from "./shorten.mjs";
 
+const own = (name) => join(import.meta.dirname, "src", name);
+
 // Fixed names: three files, which the server knows.
 export default defineConfig({
   base: "./",
+  resolve: { alias: { "#connection": own("connection/socket.ts"), "#drawn": own("connection/drawn.tsx") } },
   build: {
     modulePreload: false,
     cssCodeSplit: false,

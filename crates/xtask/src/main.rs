@@ -12,6 +12,7 @@ mod manual;
 mod package;
 mod pictures;
 mod plot;
+mod site;
 mod sources;
 mod toolchain;
 mod wheel;
@@ -34,6 +35,8 @@ enum Chore {
     Wheel,
     /// Draw the pictures of docs/language.md from the scripts in it, into docs/images/language
     Pictures(pictures::Args),
+    /// Build the studio as a static site: target/site, a folder for any host of files
+    Site,
 }
 
 fn main() -> anyhow::Result<()> {
@@ -42,5 +45,6 @@ fn main() -> anyhow::Result<()> {
         Chore::Dist(args) => dist::run(&args),
         Chore::Wheel => wheel::run(),
         Chore::Pictures(args) => pictures::run(&args),
+        Chore::Site => site::run(),
     }
 }

@@ -30,7 +30,8 @@ use super::offer::{Ready, Refusal};
 use super::sending::{UploadProgress, Uploads};
 use super::updates::{FrameUpdate, RunState, RunUpdate, Summary, faults, summary};
 use crate::error::words;
-use crate::pipe::{Zip, frame_file, pipe};
+use crate::output::frame_file;
+use crate::pipe::{Zip, pipe};
 use crate::project::Project;
 
 /// The largest body of a request in bytes: names of scripts that may be deleted.

@@ -9,12 +9,12 @@ use crate::document::Splice;
 use crate::edits;
 use crate::handles::handles;
 use crate::line::Line;
-use crate::pictures::Wanted;
 use crate::project::Project;
 use crate::protocol::{FaultState, FileState, LineState, LinesChanged, ServerMessage, State};
 use crate::tables::role;
 use crate::values::Values;
 use crate::view::Projection;
+use crate::wanted::Wanted;
 
 impl Session {
     pub(super) fn answer(&mut self, project: &Project, mut tell: ServerMessage, change: Change) -> Answer {
@@ -44,7 +44,8 @@ impl Session {
                 self.pictures = self.pictures.wrapping_add(1);
                 let moving = change == Change::Moving;
                 let motion = self.motion(project, scene);
-                Some(Wanted { scene: scene.clone(), motion, moving, number: self.pictures })
+                let (place, view) = (self.place(project), self.view());
+                Some(Wanted { scene: scene.clone(), motion, moving, number: self.pictures, place, view })
             }
         };
         if change != Change::Nothing {

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::viewport::PIXELS;
 use super::*;
 use crate::handles::{DragOptions, Handle, HandleKind};
 use crate::protocol::{Source, State};
@@ -211,7 +210,7 @@ fn the_picture_through_the_scripts_camera_is_the_scene_of_the_script() {
         rayfold_scene::parse("a", TEXT.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap();
     assert_eq!(picture.scene, scene, "as large as fits, in the script's proportions");
     let picture = desk.ask(ClientMessage::Size { width: 100_000, height: 100_000 }).picture.unwrap();
-    assert!(picture.scene.screen.pixels() <= PIXELS + 10_000);
+    assert!(picture.scene.screen.pixels() <= crate::wanted::PIXELS + 10_000);
 }
 
 #[test]

@@ -4,22 +4,18 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use rayfold_scene::model::Indirect;
-use rayfold_scene::{Camera, Command, Pinhole, Scene, Screen};
+use rayfold_scene::{Command, Pinhole, Scene};
 
 use super::{Change, Session};
 use crate::document::Splice;
 use crate::edits;
 use crate::extent;
 use crate::line::Line;
-use crate::pictures::Motion;
 use crate::project::Project;
 use crate::protocol::{Navigation, ServerMessage, ViewPreset};
 use crate::silhouette::View;
 use crate::view::{Bounds, Orbit, Projection};
-
-/// The largest number of pixels of a picture.
-pub(super) const PIXELS: u64 = 8 << 20;
+use crate::wanted::{Motion, ViewSettings};
 
 /// The number of grid lines in each direction from the middle.
 const GRID: i32 = 10;
@@ -39,25 +35,12 @@ const BEYOND: f64 = 1e5;
 impl Session {
     /// Returns the scene in the viewport.
     pub(super) fn scene(&self, project: &Project) -> Option<Scene> {
-        let mut scene = self.shown(project).scene.clone()?;
-        if self.is_draft {
-            scene.indirect = Indirect::default();
-        }
-        let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
-        match (&self.free, &scene.camera) {
-            (Some(orbit), _) => {
-                scene.screen = fitted(width, height)?;
-                scene.camera = Camera::Pinhole(orbit.camera(width / height).ok()?);
-            }
-            // Its pixels are world units.
-            (None, Camera::Orthographic) => {}
-            (None, _) => {
-                let (columns, rows) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
-                let scale = (width / columns).min(height / rows);
-                scene.screen = fitted(columns * scale, rows * scale)?;
-            }
-        }
-        Some(scene)
+        self.view().of(self.shown(project).scene.clone()?)
+    }
+
+    /// Returns the view of the viewport.
+    pub(super) fn view(&self) -> ViewSettings {
+        ViewSettings { size: self.size, free: self.free, is_draft: self.is_draft }
     }
 
     /// Returns the motion of the scene while its shutter is open.
@@ -295,13 +278,6 @@ impl Session {
 /// Returns the scene of another frame with the current camera and screen.
 pub(super) fn picture_of(scene: Scene, now: &Scene) -> Scene {
     Scene { screen: now.screen, camera: now.camera, ..scene }
-}
-
-/// Returns a screen of this size, or a smaller one if it would be too large.
-fn fitted(width: f64, height: f64) -> Option<Screen> {
-    let scale = (PIXELS as f64 / (width * height)).sqrt().min(1.0);
-    let side = |side: f64| (side * scale).round().max(1.0) as u32;
-    Screen::new(side(width), side(height)).ok()
 }
 
 /// Returns the number of decimals of a position that a pixel of this size shows.

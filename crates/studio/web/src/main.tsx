@@ -1,69 +1,8 @@
-// The page: its panels, and its connection.
+// The page of the program.
 
-import { options, render } from "preact";
-
-import { listen } from "./actions";
-import { listenClipboard } from "./clipboard";
-import "./base.css";
-import { Inspector } from "./inspector/inspector";
-import { Split } from "./parts/split";
-import { Viewport } from "./picture/viewport";
 import { Runs } from "./runs/panel";
 import { follow } from "./runs/runs";
-import { Materials } from "./scene/materials";
-import { Outliner } from "./scene/outliner";
-import { Palette } from "./scene/palette";
-import { Scenes } from "./scene/scenes";
-import { Script } from "./script/panel";
-import { connect, connected, state } from "./store";
-import { Timeline } from "./timeline/timeline";
-import { Bar, startTheme } from "./top/bar";
-import { FileDialog } from "./top/file";
-import { Keys } from "./top/keys";
-import { Notices } from "./top/notices";
-import { Search } from "./top/search";
-import { Tour } from "./top/tour";
+import { start } from "./studio";
 
-function Studio() {
-  // Without a studio, nothing can be changed. What was typed can still be selected and copied.
-  const isDead = !connected.value;
-  return (
-    <>
-      <Bar />
-      <Notices />
-      <main>
-        <div class="side left" inert={isDead}>
-          <Palette />
-          <Scenes />
-          <Outliner />
-          <Materials />
-        </div>
-        <Split name="left" label="Width of the left panels" first={208} least={140} most={480} />
-        <div class="middle" inert={isDead}>
-          <Viewport />
-          <Timeline />
-        </div>
-        <Split name="right" label="Width of the right panels" first={340} least={220} most={900} after />
-        <div class="side right">
-          <Inspector />
-          <Split name="script" label="Height of the script" first={360} least={80} most={900} upright after />
-          <Script />
-        </div>
-      </main>
-      <Keys />
-      <Search />
-      {state.value && <Tour />}
-      <FileDialog />
-      <Runs />
-    </>
-  );
-}
-
-// Once per frame of the browser: more updates would be invisible and delay the picture.
-options.debounceRendering = (update) => requestAnimationFrame(update);
-startTheme();
-render(<Studio />, document.body);
-listen();
-listenClipboard();
-connect();
+start({ children: <Runs /> });
 follow();

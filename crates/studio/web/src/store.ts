@@ -3,6 +3,8 @@
 
 import { batch, computed, signal } from "@preact/signals";
 
+import type { Send } from "./connection/listener";
+import { open } from "#connection";
 import type { ClientMessage, CommandTable, FileState, Ghost, Language, LineState, OutputState, State, ServerMessage, Tracks } from "./protocol";
 
 export const connected = signal(true);
@@ -46,7 +48,7 @@ export const commands = computed(() => new Map(tables.value.map((table) => [tabl
 /** Receives pictures as bytes with their header. */
 type Show = (picture: ArrayBuffer) => void;
 
-let socket: WebSocket | null = null;
+let send: Send | null = null;
 let show: Show = () => {};
 /** The messages that came before the editor. */
 const early: ServerMessage[] = [];
@@ -79,9 +81,7 @@ export function gesture(): number {
 }
 
 export function ask(wish: ClientMessage): void {
-  if (socket?.readyState !== WebSocket.OPEN) return;
-  sent += 1;
-  socket.send(JSON.stringify(wish));
+  if (send?.(JSON.stringify(wish))) sent += 1;
 }
 
 /** Drags what is held. While a reply is awaited, only the newest place is kept. */
@@ -118,25 +118,20 @@ export function hover(x: number, y: number): void {
 }
 
 export function connect(): void {
-  const address = new URL("socket", location.href);
-  address.protocol = "ws:";
-  const opened = new WebSocket(address);
-  opened.binaryType = "arraybuffer";
-  opened.onopen = () => {
-    connected.value = true;
-    hovering = false;
-    [sent, dragged] = [0, 0];
-    dispatchEvent(new Event("resize"));
-  };
-  opened.onmessage = (message: MessageEvent<string | ArrayBuffer>) => {
-    if (typeof message.data === "string") hear(JSON.parse(message.data) as ServerMessage);
-    else show(message.data);
-  };
-  opened.onclose = () => {
-    connected.value = false;
-    playing.value = false;
-  };
-  socket = opened;
+  send = open({
+    opened: () => {
+      connected.value = true;
+      hovering = false;
+      [sent, dragged] = [0, 0];
+      dispatchEvent(new Event("resize"));
+    },
+    told: (text) => hear(JSON.parse(text) as ServerMessage),
+    shown: (picture) => show(picture),
+    closed: () => {
+      connected.value = false;
+      playing.value = false;
+    },
+  });
 }
 
 function hear(tell: ServerMessage): void {

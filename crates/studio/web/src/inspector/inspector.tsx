@@ -6,6 +6,7 @@ import { ChevronDown, ChevronRight, Plus, Settings2, Trash2 } from "lucide";
 import type { JSX } from "preact";
 
 import { actions } from "../actions";
+import { Drawn } from "#drawn";
 import { Button } from "../parts/button";
 import { Icon } from "../parts/icon";
 import { NumberField } from "../parts/number";
@@ -143,7 +144,7 @@ function Clauses({ inspected }: { readonly inspected: Inspected }): JSX.Element 
   const sphere = sphereOf(inspected.line);
   return (
     <div class="card">
-      {sphere && <img src={sphere} alt="" width={72} height={72} />}
+      {sphere && <Drawn src={sphere} width={72} height={72} />}
       <div class="chips" role="group" aria-label="Clauses">
         {language.value?.clauses.map(({ name, about }) => (
           <button

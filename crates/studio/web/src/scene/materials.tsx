@@ -4,6 +4,7 @@ import { computed, effect, signal } from "@preact/signals";
 import { Plus } from "lucide";
 import type { JSX } from "preact";
 
+import { Drawn } from "#drawn";
 import { Icon } from "../parts/icon";
 import { Panel } from "../parts/panel";
 import { ask, lines, playing, presets, select, selection, state } from "../store";
@@ -87,7 +88,7 @@ export function Materials(): JSX.Element {
               {...carries("Material", name)}
               onClick={() => (given.length > 0 ? ask({ ask: "surface", lines: given, material: name }) : select([at]))}
             >
-              <img src={sphereOf(at)} alt="" width={48} height={48} />
+              <Drawn src={sphereOf(at)} width={48} height={48} />
               <span>{name}</span>
             </button>
           ))}
@@ -105,7 +106,7 @@ export function Materials(): JSX.Element {
               {...carries("Preset", name)}
               onClick={() => given.length > 0 && ask({ ask: "preset", lines: given, preset: name })}
             >
-              <img src={`preset.png?${name}`} alt="" width={48} height={48} loading="lazy" />
+              <Drawn src={`preset.png?${name}`} width={48} height={48} loading="lazy" />
               <span>{name}</span>
             </button>
           ))}

@@ -3,6 +3,7 @@
 import { effect, signal } from "@preact/signals";
 import type { JSX } from "preact";
 
+import { Drawn } from "#drawn";
 import { List } from "../parts/list";
 import { Panel } from "../parts/panel";
 import { visible } from "../parts/visible";
@@ -43,7 +44,7 @@ export function Scenes(): JSX.Element | null {
               aria-current={row === shown}
               onClick={() => ask({ ask: "frame", frame: starts[row] ?? 0, moving: false })}
             >
-              <img src={`thumbnail.png?${row},${written.value.get(file.name) ?? 0}`} alt="" loading="lazy" />
+              <Drawn src={`thumbnail.png?${row},${written.value.get(file.name) ?? 0}`} loading="lazy" />
               <span class="name">{name}</span>
               {file.faulty && <span class="failed">error</span>}
             </button>

@@ -2,7 +2,7 @@
 // or becomes a new script of the folder.
 
 import { signal } from "@preact/signals";
-import type { JSX } from "preact";
+import type { ComponentChildren, JSX } from "preact";
 
 import { visible } from "../parts/visible";
 import type { Source } from "../protocol";
@@ -46,7 +46,7 @@ async function choose(file: File | undefined): Promise<void> {
   name.value = file.name;
 }
 
-export function FileDialog(): JSX.Element | null {
+export function FileDialog({ places }: { readonly places?: ComponentChildren }): JSX.Element | null {
   if (!filing.value) return null;
   const now = state.value;
   const shown = files.value[now?.file ?? 0]?.name ?? "";
@@ -95,6 +95,7 @@ export function FileDialog(): JSX.Element | null {
       ) : (
         <p class="note">The studio was opened with a single script; open a folder to add scripts.</p>
       )}
+      {places}
       <div class="buttons">
         <a class="button" href={`script.txt?${now?.file ?? 0}`} download={shown}>
           Download {visible(shown)}

@@ -10,7 +10,10 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::leaf_collapser::collapse;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
@@ -185,8 +188,7 @@ fn plant<T: Grouped>(solids: &mut Vec<T>, copies: Copies) -> Branches {
         return plant_many(solids, &boxes);
     }
     let items: Vec<Item> = (0..clusters.len()).map(|at| Item(clusters.bounds(&boxes, at))).collect();
-    let params = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::fast_build() };
-    let grown = build_bvh2(&items, params, &mut Default::default());
+    let grown = grown(&items);
     // Depth first, children next to each other and after their parent.
     let mut branches = Vec::with_capacity(grown.nodes.len());
     branches.push(Branch::EMPTY);
@@ -209,6 +211,22 @@ fn plant<T: Grouped>(solids: &mut Vec<T>, copies: Copies) -> Branches {
     }
     *solids = order;
     Branches::bounded(branches, solids)
+}
+
+/// Groups items. `obvhs` has a function of these steps, but it also reads a clock, and a browser's module has none.
+fn grown(items: &[Item]) -> Bvh2 {
+    let params = BvhBuildParams::fast_build();
+    let indices = (0..items.len() as u32).collect();
+    let mut grown = PlocBuilder::with_capacity(items.len()).build(
+        params.ploc_search_distance,
+        items,
+        indices,
+        params.sort_precision,
+        params.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut grown, params.reinsertion_batch_ratio, None);
+    collapse(&mut grown, LEAF, params.collapse_traversal_cost);
+    grown
 }
 
 fn are_of_one_kind<T: Grouped>(solids: &[T]) -> bool {

@@ -140,7 +140,8 @@ pub(crate) struct FullKernel<By>(PhantomData<By>);
 
 impl<E: Real, By: Formulas<E>> Kernel<E> for FullKernel<By> {
     type By = By;
-    const FITTED: bool = true;
+    // A browser loads the kernel from a network.
+    const FITTED: bool = !cfg!(target_arch = "wasm32");
 }
 
 /// The kernel for the instruction sets of old machines: smaller, and somewhat slower.

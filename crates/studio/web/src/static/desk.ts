@@ -1,0 +1,269 @@
+// The session of a page in a worker: carries messages between the page, the module with the session, and the workers that
+// draw; and keeps the files.
+
+import type { OutputState, ServerMessage } from "../protocol";
+import { Film } from "./film";
+import { Helper } from "./helper";
+import type { Place, Question, ToDesk, ToPage } from "./messages";
+import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File } from "./module";
+import { Folder, keep, project, projects, remove } from "./projects";
+
+/** The milliseconds between two looks at the files. */
+const TICK = 250;
+
+/** The milliseconds between two looks at the files of a folder on the disk. */
+const DISK = 1000;
+
+/** The most workers that draw. */
+const MOST = 8;
+
+/** What the session wants done, as `written` in crates/web numbers it. */
+const Kind = { tell: 0, show: 1, put: 2, draw: 3, save: 4, answer: 5, wake: 6, film: 7 } as const;
+
+type Post = (message: ToPage, transfer?: Transferable[]) => void;
+
+const why = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+
+export class Session {
+  readonly #post: Post;
+  /** Messages that came before the session was open. */
+  #early: ToDesk[] | null = [];
+  #compiled: WebAssembly.Module | null = null;
+  #module: Module | null = null;
+  #drawers: Helper[] = [];
+  #folder = new Folder(null);
+  /** The time at which each file on the disk was last modified, as far as it is known here. */
+  #times = new Map<string, number>();
+  #waking = 0;
+  #film: Film | null = null;
+  #made: Uint8Array = new Uint8Array();
+  /** The questions that the module answers, by their numbers. */
+  readonly #asked = new Set<number>();
+
+  constructor(post: Post) {
+    this.#post = post;
+  }
+
+  take(message: ToDesk): void {
+    if (typeof message !== "string" && message.is === "open") {
+      this.#open(message.module, message.place).catch((error: unknown) => this.#post({ is: "closed", why: why(error) }));
+    } else if (this.#early) this.#early.push(message);
+    else if (typeof message === "string") this.#do(Call.hear, 0, bytesOf(message));
+    else void this.#answer(message.number, message.question);
+  }
+
+  async #open(address: string, place: Place): Promise<void> {
+    const compiled = await compile(address);
+    this.#compiled = compiled;
+    const module = new Module(compiled);
+    this.#module = module;
+    const { name, files } = await this.#files(place);
+    const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
+    this.#drawers = Array.from({ length: workers }, () => new Helper(compiled));
+    this.#alone(name);
+    this.#post({ is: "opened", project: name, folder: place.is === "folder" });
+    this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
+    if (!this.#folder.isKept) this.#tell({ notice: "This browser keeps no files in this window: save the project as a zip file." });
+    const early = this.#early ?? [];
+    this.#early = null;
+    for (const message of early) this.take(message);
+    setInterval(() => this.#do(Call.tick, 0), TICK);
+    if (place.is === "folder") this.#look();
+  }
+
+  /** Reads the files of a place. Those from outside become a project of the browser. */
+  async #files(place: Place): Promise<{ readonly name: string; readonly files: readonly File[] }> {
+    if (place.is === "folder") {
+      this.#folder = new Folder(place.handle);
+      const files = await this.#folder.files();
+      this.#times = new Map(files.map(({ name, modified }) => [name, modified]));
+      return { name: place.handle.name, files };
+    }
+    if (place.is === "project") {
+      const name = place.name ?? (await projects())[0] ?? "scene";
+      this.#folder = await project(name);
+      return { name, files: await this.#folder.files() };
+    }
+    let files: readonly File[];
+    if (place.is === "files") files = place.files;
+    else {
+      const answer = await fetch(place.address);
+      if (!answer.ok) throw new Error(`there is no example ${place.name}`);
+      files = this.#unzip(new Uint8Array(await answer.arrayBuffer()));
+    }
+    const name = await keep(place.name, files);
+    this.#folder = await project(name);
+    return { name, files };
+  }
+
+  /** One page works on a project: a new one takes over. */
+  #alone(name: string): void {
+    const held = navigator.locks.request(`rayfold ${name}`, { steal: true }, () => new Promise<never>(() => undefined));
+    held.catch(() => {
+      this.#tell({ notice: "Another page has taken over; this one rests." });
+      this.#post({ is: "closed", why: "" });
+      this.#film?.cancel();
+      for (const drawer of this.#drawers) drawer.end();
+      this.#module = null;
+    });
+  }
+
+  /** Takes files that other programs have written to a folder on the disk. */
+  #look(): void {
+    const look = async (): Promise<void> => {
+      for (const [name, time] of await this.#folder.times()) {
+        if (this.#times.get(name) === time) continue;
+        this.#times.set(name, time);
+        this.#do(Call.insert, 0, packed([{ name, content: await this.#folder.read(name) }]));
+      }
+    };
+    // What cannot be read now is looked at again.
+    setInterval(() => void look().catch(() => undefined), DISK);
+  }
+
+  #unzip(zip: Uint8Array): File[] {
+    return unpacked(this.#call(Call.unzip, 0, zip));
+  }
+
+  #call(what: number, number = 0, bytes?: Uint8Array): Uint8Array {
+    if (!this.#module) throw new Error("no project is open");
+    return this.#module.call(what, number, bytes).slice();
+  }
+
+  /** Makes a call of the session, and does what it wants done. */
+  #do(what: number, number = 0, bytes?: Uint8Array): void {
+    if (!this.#module) return;
+    let effects: Uint8Array;
+    try {
+      effects = this.#call(what, number, bytes);
+    } catch (error) {
+      this.#module = null;
+      this.#post({ is: "closed", why: why(error) });
+      return;
+    }
+    const view = new DataView(effects.buffer);
+    for (let at = 0; at < effects.length; ) {
+      const [kind, number, length] = [0, 4, 8].map((offset) => view.getUint32(at + offset, true)) as [number, number, number];
+      const content = effects.slice(at + 12, at + 12 + length);
+      at += 12 + length;
+      this.#follow(kind, number, content);
+    }
+  }
+
+  #follow(kind: number, number: number, content: Uint8Array<ArrayBuffer>): void {
+    if (kind === Kind.tell) this.#post(textOf(content));
+    else if (kind === Kind.show) this.#post(content.buffer, [content.buffer]);
+    else if (kind === Kind.put) this.#drawers[number]?.tell(Call.put, content);
+    else if (kind === Kind.draw) {
+      const drawn = (bytes: Uint8Array): void => this.#do(Call.drawn, number, bytes);
+      const failed = (error: unknown): void => {
+        // What cannot be drawn is not shown: the session tells the errors of a script.
+        if (error instanceof Fault) this.#replace(number, error);
+        else drawn(new Uint8Array());
+      };
+      this.#drawers[number]?.call(Call.draw, 0, content).then(drawn, failed);
+    } else if (kind === Kind.save) {
+      for (const file of unpacked(content)) void this.#write(file);
+    } else if (kind === Kind.answer) {
+      if (this.#asked.delete(number)) this.#post({ is: "answer", number, value: content }, [content.buffer]);
+    } else if (kind === Kind.wake) {
+      clearTimeout(this.#waking);
+      this.#waking = setTimeout(() => this.#do(Call.tick, 0), number);
+    } else if (kind === Kind.film) {
+      if (content.length === 0) this.#film?.cancel();
+      else void this.#render(textOf(content) as "gif" | "apng" | "webp");
+    }
+  }
+
+  /** Starts a new worker in place of one that has failed. */
+  #replace(number: number, fault: Fault): void {
+    if (!this.#module || !this.#compiled) return;
+    this.#tell({ notice: `This cannot be drawn, because the tracer has failed: ${fault.message}` });
+    this.#drawers[number]?.end();
+    this.#drawers[number] = new Helper(this.#compiled);
+    this.#do(Call.lost, number);
+  }
+
+  async #write(file: File): Promise<void> {
+    try {
+      await this.#folder.write(file);
+      if (this.#times.size > 0) this.#times = await this.#folder.times();
+    } catch (error) {
+      this.#tell({ notice: `${file.name} cannot be written: ${why(error)}` });
+    }
+  }
+
+  #tell(message: Partial<ServerMessage>): void {
+    this.#post(JSON.stringify(message));
+  }
+
+  async #render(format: "gif" | "apng" | "webp"): Promise<void> {
+    if (this.#film) return;
+    const report = (output: OutputState): void => this.#tell({ output });
+    const film = this.#newFilm();
+    this.#film = film;
+    try {
+      this.#made = await film.make(this.#filesFor(format), (done, of) => report({ is: "running", done, of }));
+      report({ is: "done", bytes: this.#made.length, format });
+    } catch (error) {
+      report(film.isCancelled ? { is: "cancelled" } : { is: "failed", why: why(error) });
+    } finally {
+      this.#film = null;
+    }
+  }
+
+  #newFilm(): Film {
+    if (!this.#compiled) throw new Error("no project is open");
+    return new Film(this.#compiled, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
+  }
+
+  /** The files of the project, after one whose name is the format of an animation. */
+  #filesFor(format: string): Uint8Array {
+    const [, ...files] = unpacked(this.#call(Call.files));
+    return packed([{ name: format, content: new Uint8Array() }, ...files]);
+  }
+
+  async #answer(number: number, question: Question): Promise<void> {
+    try {
+      if (question.is === "get" && !["animation", "frames.zip"].includes(question.address)) {
+        this.#asked.add(number);
+        this.#do(Call.get, number, bytesOf(question.address));
+      } else this.#post({ is: "answer", number, value: await this.#know(question) });
+    } catch (error) {
+      this.#tell({ notice: why(error) });
+      this.#post({ is: "answer", number, value: null });
+    }
+  }
+
+  async #know(question: Question): Promise<unknown> {
+    switch (question.is) {
+      case "get":
+        return question.address === "animation" ? this.#made : this.#newFilm().make(this.#filesFor("frames"), () => undefined);
+      case "files":
+        return unpacked(this.#call(Call.files));
+      case "projects":
+        return projects();
+      case "remove":
+        return remove(question.name);
+      case "zip": {
+        const [, ...files] = unpacked(this.#call(Call.files));
+        return this.#call(Call.zip, 0, packed(files));
+      }
+      case "unzip":
+        return this.#unzip(question.content);
+      case "import":
+        return keep(question.name, question.files);
+      case "write":
+        this.#do(Call.tick, 1);
+        return this.#folder.settle();
+    }
+  }
+}
+
+/** Compiles the module, also from a host that does not know its media type. */
+async function compile(address: string): Promise<WebAssembly.Module> {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error(`${address} cannot be loaded`);
+  if (answer.headers.get("content-type") === "application/wasm") return WebAssembly.compileStreaming(answer);
+  return WebAssembly.compile(await answer.arrayBuffer());
+}

@@ -1,0 +1,11 @@
+// The page without a program: its studio is in its workers.
+
+import { start } from "../studio";
+import { Places } from "./places";
+import { listenDownloads } from "./save";
+import "./static.css";
+
+start({ places: <Places /> });
+listenDownloads();
+// The site works without a network after this.
+void navigator.serviceWorker?.register("offline.js").catch(() => undefined);

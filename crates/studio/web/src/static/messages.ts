@@ -1,0 +1,44 @@
+// Messages between the page, the worker of its session, and the workers that draw.
+
+import type { File } from "./module";
+
+/** What a page opens. */
+export type Place =
+  | { readonly is: "project"; readonly name: string | null }
+  /** A zip file at an address of the site. */
+  | { readonly is: "example"; readonly name: string; readonly address: string }
+  | { readonly is: "files"; readonly name: string; readonly files: readonly File[] }
+  | { readonly is: "folder"; readonly handle: FileSystemDirectoryHandle };
+
+/** What the page wants to know. */
+export type Question =
+  | { readonly is: "get"; readonly address: string }
+  /** The name of the project, and its files. */
+  | { readonly is: "files" }
+  | { readonly is: "projects" }
+  | { readonly is: "remove"; readonly name: string }
+  | { readonly is: "zip" }
+  | { readonly is: "unzip"; readonly content: Uint8Array }
+  /** The name of a new project of these files. */
+  | { readonly is: "import"; readonly name: string; readonly files: readonly File[] }
+  /** Whether everything is written. */
+  | { readonly is: "write" };
+
+/** To the worker of the session. A text is a message of the page for the session. */
+export type ToDesk =
+  | string
+  | { readonly is: "open"; readonly module: string; readonly place: Place }
+  | { readonly is: "ask"; readonly number: number; readonly question: Question };
+
+/** To the page. A text is a message of the session, bytes are a picture. */
+export type ToPage =
+  | string
+  | ArrayBuffer
+  | { readonly is: "opened"; readonly project: string; readonly folder: boolean }
+  | { readonly is: "closed"; readonly why: string }
+  | { readonly is: "answer"; readonly number: number; readonly value: unknown };
+
+/** To a worker that draws, encodes, or draws frames. */
+export type ToWorker =
+  | { readonly is: "start"; readonly module: WebAssembly.Module }
+  | { readonly is: "call"; readonly what: number; readonly number: number; readonly bytes: Uint8Array; readonly answers: boolean };

@@ -1,0 +1,110 @@
+// Where projects come from and go to: the browser's storage, zip files, links, folders on the disk.
+
+import { signal } from "@preact/signals";
+import type { JSX } from "preact";
+import { useEffect } from "preact/hooks";
+
+import { notice } from "../store";
+import { visible } from "../parts/visible";
+import { addressOf } from "./address";
+import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
+import { hasDisk, openFolder } from "./disk";
+import { linked } from "./link";
+import type { File } from "./module";
+import { save } from "./save";
+
+const names = signal<readonly string[]>([]);
+
+/** Opens what an address names, once everything here is written. */
+async function go(address: string): Promise<void> {
+  await write();
+  location.hash = address;
+  location.reload();
+}
+
+async function openFiles(chosen: FileList | null): Promise<void> {
+  const files: File[] = [];
+  let name = "";
+  for (const file of chosen ?? []) {
+    const content = new Uint8Array(await file.arrayBuffer());
+    name ||= file.name.replace(/\.(zip|txt)$/i, "");
+    if (!/\.zip$/i.test(file.name)) files.push({ name: file.name, content });
+    else files.push(...((await unzip(content)) ?? []));
+  }
+  if (files.length === 0) return;
+  const own = await importProject(name, files);
+  if (own) await go(addressOf(own));
+}
+
+async function share(): Promise<void> {
+  const [, ...files] = await ownFiles();
+  const fragment = await linked(project.value, files);
+  if (!fragment) {
+    notice.value = "The project is too large for a link: save it as a zip file.";
+    return;
+  }
+  const link = new URL(fragment, location.href).href;
+  await navigator.clipboard.writeText(link).then(
+    () => (notice.value = `The link is on the clipboard: ${Math.ceil(link.length / 1000)} kB. It holds the whole project.`),
+    // Without a clipboard, the address bar has it.
+    () => history.replaceState(null, "", fragment),
+  );
+}
+
+async function saveZip(): Promise<void> {
+  const content = await zip();
+  if (content) save(content, `${project.value}.zip`);
+}
+
+export function Places(): JSX.Element {
+  useEffect(() => void projects().then((found) => (names.value = found)), []);
+  const others = names.value.filter((name) => name !== project.value);
+  return (
+    <section class="places" aria-label="Projects">
+      <h3>Projects of this browser</h3>
+      {others.length > 0 && (
+        <ul>
+          {others.map((name) => (
+            <li key={name}>
+              <a
+                href={addressOf(name)}
+                onClick={(event) => {
+                  event.preventDefault();
+                  void go(addressOf(name));
+                }}
+              >
+                {visible(name)}
+              </a>{" "}
+              <button
+                type="button"
+                aria-label={`Delete the project ${name}`}
+                onClick={() => confirm(`Delete the project ${name}?`) && void removeProject(name).then(projects).then((found) => (names.value = found))}
+              >
+                Delete
+              </button>
+            </li>
+          ))}
+        </ul>
+      )}
+      <div class="buttons">
+        <label>
+          Open a zip file, or scripts and their files:{" "}
+          <input type="file" multiple aria-label="Open a project" onChange={(event) => void openFiles(event.currentTarget.files)} />
+        </label>
+      </div>
+      <div class="buttons">
+        <button type="button" onClick={() => void saveZip()}>
+          Save as zip
+        </button>
+        <button type="button" onClick={() => void share()}>
+          Copy a link
+        </button>
+        {hasDisk && (
+          <button type="button" onClick={() => void write().then(openFolder)}>
+            Open a folder
+          </button>
+        )}
+      </div>
+    </section>
+  );
+}

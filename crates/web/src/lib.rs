@@ -1,0 +1,179 @@
+//! The studio as a WebAssembly module: what `crates/studio` does without a server ([`browser`]), by functions of numbers
+//! for the scripts of a page (`crates/studio/web/src/static/module.ts`).
+//!
+//! A worker of the page has a module of its own, and uses it as a desk, as a drawer or as a reel. A call takes its bytes from
+//! one buffer and leaves its result in another: the page writes to the place that [`input`] returns, [`call`]s, and reads as
+//! many bytes as that returns from the place that [`output`] returns. The first byte of a result is 0; or it is 1, and a
+//! message of what went wrong follows.
+//!
+//! A panic ends a module: no call returns from it, and none may follow. Then [`fault`] returns the length of its message.
+//!
+//! The module needs nothing of the page. There is no unsafe code here: exporting a name is what the lint
+//! `unsafe_code` denies elsewhere, because two functions of one name would be undefined behaviour.
+
+use std::fmt::Display;
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+
+use rayfold_studio::browser::{Desk, Drawer, Effect, File, Reel, files_of, packet, unzipped, zipped};
+
+static INPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+static OUTPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+static STATE: Mutex<State> = Mutex::new(State { desk: None, drawer: None, reel: None });
+
+/// What the worker of this module does.
+struct State {
+    desk: Option<Desk>,
+    drawer: Option<Drawer>,
+    reel: Option<Reel>,
+}
+
+fn locked<T>(of: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes room for the bytes of the next call, and returns its address.
+#[allow(unsafe_code, reason = "the name is exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn input(length: usize) -> *mut u8 {
+    locked(&OUTPUT).clear();
+    let mut input = locked(&INPUT);
+    input.clear();
+    input.resize(length, 0);
+    input.as_mut_ptr()
+}
+
+/// Returns the address of the last call's result.
+#[allow(unsafe_code, reason = "the name is exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn output() -> *const u8 {
+    locked(&OUTPUT).as_ptr()
+}
+
+/// Returns the length of the message of the panic that ended a call. 0 if the call ended otherwise.
+#[allow(unsafe_code, reason = "the name is exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn fault() -> usize {
+    locked(&OUTPUT).len()
+}
+
+/// Lets a panic leave its message as the result.
+fn keep_faults() {
+    static KEPT: Once = Once::new();
+    KEPT.call_once(|| {
+        std::panic::set_hook(Box::new(|panic| *locked(&OUTPUT) = panic.to_string().into_bytes()));
+    });
+}
+
+/// Does what `what` names, at this time in milliseconds. Returns the length of the result.
+#[allow(unsafe_code, reason = "the name is exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn call(what: u32, number: u32, time: f64) -> usize {
+    keep_faults();
+    set_time((1000.0 * time) as u64);
+    let bytes = std::mem::take(&mut *locked(&INPUT));
+    let result = run(&mut locked(&STATE), what, number, bytes);
+    let output = match result {
+        Ok(bytes) => [&[0], bytes.as_slice()].concat(),
+        Err(why) => [&[1], why.as_bytes()].concat(),
+    };
+    let length = output.len();
+    *locked(&OUTPUT) = output;
+    length
+}
+
+#[cfg(target_arch = "wasm32")]
+use rayfold_studio::browser::set_time;
+
+/// Elsewhere the system tells the time.
+#[cfg(not(target_arch = "wasm32"))]
+fn set_time(_: u64) {}
+
+/// Runs a call. The numbers are those of `Call` in `module.ts`.
+fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<u8>, String> {
+    let State { desk, drawer, reel } = state;
+    match what {
+        0 => {
+            // The first one is the project, and its name is all of it.
+            let mut files = unpacked(&bytes)?.into_iter();
+            let (name, _) = files.next().ok_or("a project has a name")?;
+            let opened = Desk::open(&name, files.collect(), number as usize).map_err(told)?;
+            return Ok(written(desk.insert(opened).effects()));
+        }
+        1..=7 => {
+            let desk = desk.as_mut().ok_or("no project is open")?;
+            match what {
+                1 => desk.hear(&text(bytes)?),
+                2 => desk.tick(number != 0),
+                3 => desk.drawn(number as usize, bytes),
+                4 => desk.get(number, &text(bytes)?),
+                5 => unpacked(&bytes)?.into_iter().for_each(|(name, content)| desk.put(&name, content)),
+                7 => desk.lost(number as usize),
+                _ => {
+                    let (name, files) = desk.files();
+                    return Ok([packet([(name.as_str(), [].as_slice())]), packed(&files)].concat());
+                }
+            }
+            return Ok(written(desk.effects()));
+        }
+        10 => {
+            let drawer = drawer.get_or_insert_default();
+            unpacked(&bytes)?.into_iter().for_each(|(name, content)| drawer.put(&name, content));
+        }
+        11 => return drawer.get_or_insert_default().draw(&text(bytes)?).map_err(told),
+        20 => {
+            // The first one is the format.
+            let mut files = unpacked(&bytes)?.into_iter();
+            let (format, _) = files.next().ok_or("a file has a format")?;
+            let begun = Reel::new(files.collect(), &format).map_err(told)?;
+            return Ok((reel.insert(begun).count() as u32).to_le_bytes().into());
+        }
+        21 => return reel.as_ref().ok_or("nothing is rendered")?.draw(number as usize).map_err(told),
+        22 => reel.as_mut().ok_or("nothing is rendered")?.push(&bytes).map_err(told)?,
+        23 => return reel.take().ok_or("nothing is rendered")?.finish().map_err(told),
+        30 => return unzipped(&bytes).map(|files| packed(&files)).map_err(told),
+        31 => return zipped(&unpacked(&bytes)?).map_err(told),
+        _ => return Err(format!("there is no call {what}")),
+    }
+    Ok(Vec::new())
+}
+
+/// Returns what the page is to do as one run of bytes: for each its kind, its number, the length of its content, and its
+/// content. Numbers are 32-bit and little-endian.
+fn written(effects: Vec<Effect>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for effect in effects {
+        let (kind, number, content) = match effect {
+            Effect::Tell(message) => (0, 0, message.into_bytes()),
+            Effect::Show(picture) => (1, 0, picture),
+            Effect::Put(worker, name, content) => {
+                (2, worker as u32, packet([(name.as_str(), content.as_slice())]))
+            }
+            Effect::Draw(worker, task) => (3, worker as u32, task.into_bytes()),
+            Effect::Save(name, content) => (4, 0, packet([(name.as_str(), content.as_slice())])),
+            Effect::Answer(number, content) => (5, number, content),
+            Effect::Wake(millis) => (6, millis, Vec::new()),
+            Effect::Film(format) => (7, 0, format.unwrap_or_default().into()),
+        };
+        for number in [kind, number, content.len() as u32] {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+        bytes.extend_from_slice(&content);
+    }
+    bytes
+}
+
+fn unpacked(bytes: &[u8]) -> Result<Vec<File>, String> {
+    files_of(bytes).ok_or_else(|| "files were cut off".to_owned())
+}
+
+fn packed(files: &[File]) -> Vec<u8> {
+    packet(files.iter().map(|(name, content)| (name.as_str(), content.as_slice())))
+}
+
+fn text(bytes: Vec<u8>) -> Result<String, String> {
+    String::from_utf8(bytes).map_err(told)
+}
+
+fn told(error: impl Display) -> String {
+    error.to_string()
+}

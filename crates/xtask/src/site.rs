@@ -1,0 +1,153 @@
+//! Builds the studio as a static site: target/site, a folder for any host of files.
+//!
+//! It holds the page and its workers (by Node, from `crates/studio/web`), the module that they run (`crates/web`), a start
+//! page with the examples, and each example as a zip file. Nothing of it asks a server for more than these files.
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, ensure};
+use rayfold_files::Folder;
+
+use crate::archive::{self, Entry};
+use crate::sources::root;
+use crate::toolchain::{self, say};
+
+const TARGET: &str = "wasm32-unknown-unknown";
+
+/// The page of the studio, as the start page names it.
+const STUDIO: &str = "studio.html";
+
+/// Builds the site.
+pub(crate) fn run() -> anyhow::Result<()> {
+    let root = root()?;
+    let (web, site) = (root.join("crates/studio/web"), root.join("target/site"));
+    ensure!(
+        web.join("node_modules").is_dir(),
+        "the page's packages are not installed: `npm ci` in crates/studio/web"
+    );
+    let mut npm = Command::new("npm");
+    toolchain::run(npm.args(["run", "site"]).current_dir(&web))?;
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--locked", "--profile", "web", "--package", "rayfold-web", "--target", TARGET]);
+    toolchain::run(cargo.current_dir(&root))
+        .with_context(|| format!("`rustup target add {TARGET}` is needed once"))?;
+    let module = root.join("target").join(TARGET).join("web/rayfold_web.wasm");
+    fs::copy(&module, site.join("rayfold.wasm"))
+        .with_context(|| format!("cannot copy {}", module.display()))?;
+
+    let examples = site.join("examples");
+    fs::create_dir_all(&examples)?;
+    let mut cards = String::new();
+    for (name, files) in examples_of(&root.join("scenes"))? {
+        let entries = files.iter().map(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Ok(Entry::text(name, fs::read(path)?))
+        });
+        let zip = archive::zip(entries.collect::<anyhow::Result<_>>()?)?;
+        fs::write(examples.join(format!("{name}.zip")), zip)?;
+        cards.push_str(&card(&root, &examples, &name)?);
+    }
+    let read = |name: &str| fs::read_to_string(web.join("site").join(name));
+    fs::write(site.join("index.html"), read("index.html")?.replace("<!-- examples -->", &cards))?;
+    fs::copy(web.join("site/index.css"), site.join("index.css"))?;
+    let (names, version) = kept(&site)?;
+    let offline = read("offline.js")?.replace("@VERSION@", &version).replace("\"@FILES@\"", &names);
+    fs::write(site.join("offline.js"), offline)?;
+    say(&format!("target/site, version {version}: serve it by any host of files"));
+    Ok(())
+}
+
+/// Returns the name of each example and its files: scripts, settings, and what the scripts name.
+fn examples_of(scenes: &Path) -> anyhow::Result<Vec<(String, Vec<PathBuf>)>> {
+    let mut examples = Vec::new();
+    for entry in fs::read_dir(scenes)? {
+        let folder = entry?.path();
+        if !folder.is_dir() || Folder::list(&folder)?.scripts.is_empty() {
+            continue;
+        }
+        let mut files: Vec<_> =
+            fs::read_dir(&folder)?.map(|file| Ok(file?.path())).collect::<anyhow::Result<_>>()?;
+        files.retain(|file| file.is_file());
+        files.sort();
+        examples.push((folder.file_name().unwrap_or_default().to_string_lossy().into_owned(), files));
+    }
+    // Those that are for the studio first.
+    examples.sort_by_key(|(name, _)| (name != "hello", name.clone()));
+    ensure!(!examples.is_empty(), "{} has no examples", scenes.display());
+    Ok(examples)
+}
+
+/// Copies the picture of an example, and returns the part of the start page that shows it.
+fn card(root: &Path, examples: &Path, name: &str) -> anyhow::Result<String> {
+    let images = root.join("docs/images");
+    let picture = ["gif", "png"].map(|ending| format!("{name}.{ending}"));
+    let picture = picture.iter().find(|file| images.join(file).is_file());
+    let picture = picture.with_context(|| format!("docs/images has no picture of {name}"))?;
+    fs::copy(images.join(picture), examples.join(picture))?;
+    Ok(format!(
+        "<li><a href=\"{STUDIO}#example={name}\"><img src=\"examples/{picture}\" alt=\"\" loading=\"lazy\" \
+         width=\"320\" height=\"240\" /><span>{name}</span></a></li>\n        "
+    ))
+}
+
+/// Returns the names of the files that the browser keeps from the start, as the items of a list in JavaScript, and a version
+/// that changes with their content. Pictures of examples are kept when they are shown.
+fn kept(site: &Path) -> anyhow::Result<(String, String)> {
+    let mut names = vec!["index.html".to_owned(), "./".to_owned()];
+    for (folder, prefix) in [(site.to_owned(), ""), (site.join("examples"), "examples/")] {
+        for entry in fs::read_dir(folder)? {
+            let name = entry?.file_name().to_string_lossy().into_owned();
+            let is_app =
+                prefix.is_empty() && ["js", "css", "html", "wasm"].iter().any(|end| name.ends_with(end));
+            if (is_app && !["offline.js", "index.html"].contains(&name.as_str())) || name.ends_with(".zip") {
+                names.push(format!("{prefix}{name}"));
+            }
+        }
+    }
+    names.sort();
+    let mut hasher = DefaultHasher::new();
+    for name in names.iter().filter(|name| *name != "./") {
+        (name, fs::read(site.join(name))?).hash(&mut hasher);
+    }
+    let list: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
+    Ok((list.join(", "), format!("rayfold-{:016x}", hasher.finish())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_example_has_its_files_and_a_picture() {
+        let root = root().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let examples = examples_of(&root.join("scenes")).unwrap();
+        assert_eq!(examples[0].0, "hello");
+        for (name, files) in examples {
+            assert!(
+                files.iter().any(|file| file.extension().is_some_and(|ending| ending == "txt")),
+                "{name}"
+            );
+            assert!(card(&root, folder.path(), &name).unwrap().contains(&format!("#example={name}\"")));
+        }
+    }
+
+    #[test]
+    fn the_version_changes_with_any_file_that_is_kept() {
+        let site = tempfile::tempdir().unwrap();
+        fs::create_dir(site.path().join("examples")).unwrap();
+        for (name, text) in
+            [("index.html", "a"), ("studio.js", "b"), ("examples/x.zip", "c"), ("examples/x.gif", "d")]
+        {
+            fs::write(site.path().join(name), text).unwrap();
+        }
+        let (names, version) = kept(site.path()).unwrap();
+        assert_eq!(names, r#""./", "examples/x.zip", "index.html", "studio.js""#);
+        assert_eq!(kept(site.path()).unwrap().1, version);
+        fs::write(site.path().join("examples/x.zip"), "e").unwrap();
+        assert_ne!(kept(site.path()).unwrap().1, version);
+    }
+}
