@@ -68,7 +68,8 @@ pub(crate) fn words(error: &dyn std::error::Error) -> String {
     text
 }
 
-#[cfg(all(test, feature = "server"))]
+#[cfg(feature = "server")]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -249,7 +249,8 @@ impl Write for Bounded {
     }
 }
 
-#[cfg(all(test, feature = "server"))]
+#[cfg(feature = "server")]
+#[cfg(test)]
 mod tests {
 
     use rayfold_scene::{Limits, parse};

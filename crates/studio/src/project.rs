@@ -540,7 +540,8 @@ impl Opened {
     }
 }
 
-#[cfg(all(test, feature = "server"))]
+#[cfg(feature = "server")]
+#[cfg(test)]
 mod tests {
     use std::fs;
     use std::path::PathBuf;

@@ -121,7 +121,8 @@ fn with_fps(bytes: &[u8], fps: f64) -> Vec<u8> {
     [&whole[..at], &inserted, &whole[at + removed..]].concat().into()
 }
 
-#[cfg(all(test, feature = "server"))]
+#[cfg(feature = "server")]
+#[cfg(test)]
 mod tests {
     use std::fs;
     use std::path::Path;
