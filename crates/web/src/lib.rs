@@ -1,4 +1,4 @@
-//! The studio as a WebAssembly module: what `crates/studio` does without a server ([`browser`]), by functions of numbers
+//! The studio as a WebAssembly module: what `crates/studio` does without a server ([`rayfold_studio::browser`]), by functions of numbers
 //! for the scripts of a page (`crates/studio/web/src/static/module.ts`).
 //!
 //! A worker of the page has a module of its own, and uses it as a desk, as a drawer or as a reel. A call takes its bytes from
