@@ -282,7 +282,10 @@ fn every_crate_takes_lints_and_dependencies_from_the_workspace() {
     for entry in std::fs::read_dir(root().join("crates")).unwrap() {
         let path = entry.unwrap().path().join("Cargo.toml");
         let manifest = read(&path);
-        assert!(manifest.contains("[lints]\nworkspace = true"), "{} sets lints of its own", path.display());
+        // It exports names to a page, which a crate may not do that forbids unsafe code.
+        let has_own_lints = path.ends_with("crates/web/Cargo.toml");
+        let inherits = manifest.contains("[lints]\nworkspace = true");
+        assert!(inherits != has_own_lints, "{} sets lints of its own", path.display());
         let mut in_dependencies = false;
         for line in manifest.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'))
         {

@@ -11,8 +11,7 @@ use rayfold_scene::SETTINGS_FILE;
 use rayfold_scene::assets::{FileInfo, Library};
 
 use crate::error::Error;
-use crate::project::TEXT;
-use crate::storage::Storage;
+use crate::storage::{Storage, TEXT};
 
 /// The problem of a link that is not followed.
 pub(crate) const LINK: &str = "expected a file of this folder, found a link to another place";

@@ -25,12 +25,9 @@ use crate::error::{Error, words};
 use crate::frame::Frame;
 use crate::line::Line;
 use crate::settings::Settings;
-use crate::storage::Storage;
+use crate::storage::{Storage, TEXT};
 use crate::text_edit::{self, TextChange};
 use crate::tracks::{Tracks, tracks};
-
-/// The largest size in bytes of all files of a project together.
-pub(crate) const TEXT: u64 = 256 << 20;
 
 /// The endings of models.
 const MODELS: [&str; 5] = ["obj", "ply", "stl", "glb", "gltf"];

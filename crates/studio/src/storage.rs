@@ -9,6 +9,9 @@ use rayfold_scene::assets::{FileInfo, Files, Library};
 
 use crate::error::Error;
 
+/// The largest size in bytes of all files of a project together.
+pub(crate) const TEXT: u64 = 256 << 20;
+
 /// The files of a project.
 pub(crate) trait Storage: Debug + Send + Sync {
     /// Returns the names of all files beside the scripts, in any order.

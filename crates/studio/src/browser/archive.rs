@@ -7,7 +7,7 @@ use zip::{ZipArchive, ZipWriter};
 
 use super::packet::File;
 use crate::error::Error;
-use crate::project::TEXT;
+use crate::storage::TEXT;
 
 /// The largest number of files in an archive.
 const FILES: usize = 10_000;
