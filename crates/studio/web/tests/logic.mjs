@@ -9,7 +9,7 @@ import { createServer } from "vite";
 const root = join(import.meta.dirname, "..");
 let server;
 before(async () => {
-  server = await createServer({ root, configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
+  server = await createServer({ root, configFile: false, resolve: { alias: { "#connection": join(root, "src/connection/socket.ts"), "#drawn": join(root, "src/connection/drawn.tsx") } }, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
 });
 after(() => server?.close());
 const load = (path) => server.ssrLoadModule(`/src/${path}`);
