@@ -4,16 +4,23 @@
 //! object is encrypted with a customer-managed key or was uploaded in parts; then the digest in the
 //! object's metadata is compared.
 
+use std::io::{Cursor, Read};
 use std::path::PathBuf;
 
 use bytes::Bytes;
 use md5::{Digest, Md5};
-use rayfold_pipeline::store::PutOptions;
+use rayfold_pipeline::store::{ETag, PutOptions, Store, Upload};
 
 use crate::error::{Error, Result};
 
 /// The metadata key of a script's digest.
 pub(crate) const DIGEST: &str = "rayfold-md5";
+
+/// The size from which a file is sent in parts, in bytes.
+const IN_PARTS: u64 = 16 << 20;
+
+/// The size of the pieces in which a file is read, in bytes.
+const PIECE: u64 = 1 << 20;
 
 /// A file as it should be in the bucket.
 #[derive(Debug, Clone)]
@@ -38,8 +45,11 @@ impl File {
     /// # Errors
     /// [`Error::Read`] if the file cannot be read.
     pub fn new(content: Content) -> Result<Self> {
-        let bytes = content.read()?;
-        Ok(Self { size: bytes.len() as u64, digest: digest(&bytes), content })
+        let (mut pieces, mut size) = (content.pieces()?, 0);
+        while let Some(piece) = pieces.next()? {
+            size += piece.len() as u64;
+        }
+        Ok(Self { size, digest: pieces.digest(), content })
     }
 
     /// Makes a file with this text.
@@ -58,16 +68,47 @@ impl File {
         &self.digest
     }
 
-    /// Returns the bytes, for the object `key`.
+    /// Returns the most memory that sending it takes, in bytes.
+    pub(crate) fn memory(&self) -> u64 {
+        self.size.min(IN_PARTS)
+    }
+
+    /// Makes it the object `key`: in one request, or in parts if it is large.
     ///
     /// # Errors
-    /// [`Error::Read`], and [`Error::FileChanged`] if the file has changed since it was digested.
-    pub(crate) fn read(&self, key: &str) -> Result<Bytes> {
-        let bytes = self.content.read()?;
-        if digest(&bytes) != self.digest {
-            return Err(Error::FileChanged { key: key.to_owned() });
+    /// [`Error::Read`], and [`Error::FileChanged`] if the file has changed since it was digested; the errors of the store.
+    /// Then the object is as it was.
+    pub(crate) async fn send<S: Store>(&self, store: &S, key: &str) -> Result<ETag> {
+        let mut pieces = self.content.pieces()?;
+        if self.size < IN_PARTS {
+            let mut bytes = Vec::new();
+            while let Some(piece) = pieces.next()? {
+                bytes.extend_from_slice(&piece);
+            }
+            self.must_be(pieces, key)?;
+            return Ok(store.put(key, bytes.into(), self.options(key)).await?);
         }
-        Ok(bytes)
+        let mut upload = store.upload(key, self.options(key)).await?;
+        match self.write(pieces, key, &mut upload).await {
+            Ok(()) => Ok(upload.finish(None).await?),
+            Err(error) => {
+                // If it cannot be aborted either, it is left to the bucket's rule for unfinished uploads.
+                let _ = upload.abort().await;
+                Err(error)
+            }
+        }
+    }
+
+    async fn write(&self, mut pieces: Pieces<'_>, key: &str, upload: &mut impl Upload) -> Result<()> {
+        while let Some(piece) = pieces.next()? {
+            upload.write(piece).await?;
+        }
+        self.must_be(pieces, key)
+    }
+
+    /// Returns an error unless these were the pieces of the file as it was digested.
+    fn must_be(&self, pieces: Pieces<'_>, key: &str) -> Result<()> {
+        if pieces.digest() == self.digest { Ok(()) } else { Err(Error::FileChanged { key: key.to_owned() }) }
     }
 
     /// Returns the options with which the file is put.
@@ -82,24 +123,59 @@ impl File {
 }
 
 impl Content {
-    fn read(&self) -> Result<Bytes> {
-        match self {
-            Self::Bytes(bytes) => Ok(bytes.clone()),
-            Self::Path(path) => match std::fs::read(path) {
-                Ok(bytes) => Ok(bytes.into()),
-                Err(source) => Err(Error::Read { path: path.clone(), source }),
+    fn pieces(&self) -> Result<Pieces<'_>> {
+        let reader: Box<dyn Read + Send> = match self {
+            Self::Bytes(bytes) => Box::new(Cursor::new(bytes.clone())),
+            Self::Path(path) => match std::fs::File::open(path) {
+                Ok(file) => Box::new(file),
+                Err(source) => return Err(Error::Read { path: path.clone(), source }),
             },
+        };
+        Ok(Pieces { reader, content: self, md5: Md5::new() })
+    }
+}
+
+/// The bytes of a content, piece by piece.
+struct Pieces<'a> {
+    reader: Box<dyn Read + Send>,
+    content: &'a Content,
+    md5: Md5,
+}
+
+impl Pieces<'_> {
+    fn next(&mut self) -> Result<Option<Bytes>> {
+        let mut piece = Vec::new();
+        match (&mut self.reader).take(PIECE).read_to_end(&mut piece) {
+            Ok(0) => Ok(None),
+            Ok(_) => {
+                self.md5.update(&piece);
+                Ok(Some(piece.into()))
+            }
+            Err(source) => {
+                let path = if let Content::Path(path) = self.content { path.clone() } else { PathBuf::new() };
+                Err(Error::Read { path, source })
+            }
         }
+    }
+
+    /// Returns the MD5 of what was read.
+    fn digest(self) -> String {
+        hexadecimal(&self.md5.finalize())
     }
 }
 
 fn digest(bytes: &[u8]) -> String {
-    Md5::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&Md5::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::World;
 
     #[test]
     fn the_digest_is_what_s3_calls_an_entity_tag() {
@@ -107,16 +183,40 @@ mod tests {
         assert_eq!(digest(b"message digest"), "f96b697d7cb7938d525a2f31aaf161d0");
     }
 
-    #[test]
-    fn a_file_that_changes_before_it_is_sent_is_not_sent() {
-        let folder = tempfile::tempdir().unwrap();
+    #[tokio::test]
+    async fn a_file_that_changes_before_it_is_sent_is_not_sent() {
+        let (world, folder) = (World::new(), tempfile::tempdir().unwrap());
         let path = folder.path().join("1.txt");
-        std::fs::write(&path, "first").unwrap();
-        let file = File::new(Content::Path(path.clone())).unwrap();
-        assert_eq!((file.size(), file.read("k").unwrap()), (5, "first".into()));
-        std::fs::write(&path, "other").unwrap();
-        assert!(matches!(file.read("k"), Err(Error::FileChanged { key }) if key == "k"));
-        std::fs::remove_file(&path).unwrap();
-        assert!(matches!(file.read("k"), Err(Error::Read { path: of, .. }) if of == path));
+        for size in [5, IN_PARTS as usize + 5] {
+            std::fs::write(&path, vec![b'a'; size]).unwrap();
+            let file = File::new(Content::Path(path.clone())).unwrap();
+            assert_eq!(file.size(), size as u64);
+            std::fs::write(&path, vec![b'b'; size]).unwrap();
+            let refused = file.send(&world.store, "k").await;
+            assert!(matches!(refused, Err(Error::FileChanged { key }) if key == "k"), "{size}");
+            std::fs::remove_file(&path).unwrap();
+            let refused = file.send(&world.store, "k").await;
+            assert!(matches!(refused, Err(Error::Read { path: of, .. }) if of == path), "{size}");
+        }
+        assert!(world.keys("").await.is_empty());
+    }
+
+    #[tokio::test]
+    async fn a_large_file_goes_in_parts_and_is_known_again() {
+        let world = World::new();
+        let large = |last: u8| {
+            let mut bytes = vec![b'a'; IN_PARTS as usize];
+            bytes.push(last);
+            File::new(Content::Bytes(bytes.into())).unwrap()
+        };
+        for (file, name) in [(large(b'b'), "upload k"), (File::of_text("small"), "put s")] {
+            world.requests.clear();
+            file.send(&world.store, &name[name.len() - 1..]).await.unwrap();
+            assert_eq!(world.requests.seen(), [name]);
+        }
+        let object = world.store.get("k").await.unwrap();
+        assert_eq!(object.body.len() as u64, IN_PARTS + 1);
+        assert_eq!(object.info.metadata[DIGEST], large(b'b').digest());
+        assert_ne!(object.info.metadata[DIGEST], large(b'c').digest());
     }
 }

@@ -5,7 +5,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use rayfold_pipeline::Clock;
 use rayfold_pipeline::keys::{Animation, Key, ScriptName, Uploaded};
@@ -256,12 +255,10 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         mut report: impl FnMut(u64),
     ) -> Result<BTreeMap<String, ETag>> {
         let files = keys.iter().filter_map(|key| Some((key, files.get(key)?)));
-        let largest = files.clone().map(|(_, file)| file.size()).max().unwrap_or(1).max(1);
+        let largest = files.clone().map(|(_, file)| file.memory()).max().unwrap_or(1).max(1);
         let at_once = usize::try_from(UNDER_WAY / largest).unwrap_or(SIDE_BY_SIDE).clamp(1, SIDE_BY_SIDE);
         let puts = files.map(|(key, file)| async move {
-            let bytes: Bytes = file.read(key)?;
-            let version = self.store.put(key, bytes, file.options(key)).await?;
-            Ok::<_, Error>((key.clone(), version))
+            Ok::<_, Error>((key.clone(), file.send(self.store, key).await?))
         });
         let puts: Vec<_> = puts.collect();
         let mut puts = stream::iter(puts).buffer_unordered(at_once);
