@@ -209,9 +209,16 @@ impl Model {
         }
         let Parts { positions, triangles, normals, normal_of, uvs, uv_of, own_uvs, colors, space, .. } =
             parts;
-        let (mut looks, look_of, warnings) = (parts.looks, parts.look_of, parts.warnings);
+        let (mut looks, mut look_of, warnings) = (parts.looks, parts.look_of, parts.warnings);
         if looks.is_empty() {
             looks.push(Look::PLAIN);
+        }
+        // Most models have one look, beside others that no face has.
+        if let Some(&only) = look_of.first()
+            && look_of.iter().all(|look| *look == only)
+        {
+            looks = vec![looks.swap_remove(only as usize)];
+            look_of = Vec::new();
         }
         // Where nothing varies there are no holes.
         for look in looks.iter_mut().filter(|look| look.cutoff.is_some()) {
@@ -372,26 +379,40 @@ impl Model {
         Some(indices.map(|i| self.uvs.get(i as usize).copied().unwrap_or_default()))
     }
 
+    /// Returns the texture coordinates at the corners of a triangle for a picture that has its own, before the picture's
+    /// transform.
+    ///
+    /// # Panics
+    /// Panics if there is no such triangle.
+    pub fn own_uvs(&self, triangle: usize, slot: Slot) -> [Vec2; 3] {
+        let own = &self.own_uvs[slot as usize];
+        self.triangles[triangle].map(|i| own.get(i as usize).copied().unwrap_or_default())
+    }
+
     /// Returns the texture coordinates at the corners of a triangle for its picture, before the picture's transform.
     ///
     /// # Panics
     /// Panics if there is no such triangle.
     pub fn picture_uvs(&self, triangle: usize, slot: Slot) -> [Vec2; 3] {
         let texture = self.looks[self.look(triangle)].texture(slot);
-        if texture.is_some_and(|texture| texture.has_own_uvs) {
-            let own = &self.own_uvs[slot as usize];
-            return self.triangles[triangle].map(|i| own.get(i as usize).copied().unwrap_or_default());
+        match texture.is_some_and(|texture| texture.has_own_uvs) {
+            true => self.own_uvs(triangle, slot),
+            false => self.uvs(triangle).unwrap_or_default(),
         }
-        self.uvs(triangle).unwrap_or_default()
     }
 
     /// Returns the colour factors at the corners of a triangle, if the positions have some.
     ///
     /// # Panics
     /// Panics if there is no such triangle.
-    pub fn vertex_colors(&self, triangle: usize) -> Option<[DVec3; 3]> {
+    pub fn vertex_colors(&self, triangle: usize) -> Option<[Vec3; 3]> {
         let corners = self.triangles[triangle];
-        (!self.colors.is_empty()).then(|| corners.map(|i| self.colors[i as usize].as_dvec3()))
+        (!self.colors.is_empty()).then(|| corners.map(|i| self.colors[i as usize]))
+    }
+
+    /// Returns whether positions have colour factors.
+    pub fn has_vertex_colors(&self) -> bool {
+        !self.colors.is_empty()
     }
 
     /// Returns the factors of alpha at the corners of a triangle.
@@ -442,15 +463,22 @@ impl Model {
         linear || self.space == Colors::Linear
     }
 
-    /// Returns the colour of a triangle at a place, given by its barycentric weights, from 0 to 1 per channel. `level` is that
-    /// of its picture there, and 1 without one; `linear` is whether the picture that is drawn is computed in linear light.
+    /// Returns the colour of a triangle of a look at a place, given by its barycentric weights, from 0 to 1 per channel.
+    /// `corners` are its colour factors, `level` is the level of its picture there, and 1 without one; `linear` is whether the
+    /// picture that is drawn is computed in linear light.
     ///
     /// # Panics
-    /// Panics if there is no such triangle.
-    pub fn color(&self, triangle: usize, weights: [f64; 3], level: DVec3, linear: bool) -> DVec3 {
-        let look = self.look(triangle);
-        let mixed = self.vertex_colors(triangle).map(|corners| {
-            let corners = corners.map(|color| self.read(color, linear));
+    /// Panics if there is no such look.
+    pub fn color(
+        &self,
+        look: usize,
+        corners: Option<[Vec3; 3]>,
+        weights: [f64; 3],
+        level: DVec3,
+        linear: bool,
+    ) -> DVec3 {
+        let mixed = corners.map(|corners| {
+            let corners = corners.map(|color| self.read(color.as_dvec3(), linear));
             corners.into_iter().zip(weights).map(|(color, weight)| color * weight).sum::<DVec3>()
         });
         self.product(look, mixed, level, linear)
@@ -462,6 +490,20 @@ impl Model {
     /// Panics if there is no such look.
     pub fn look_color(&self, look: usize, linear: bool) -> DVec3 {
         self.product(look, None, DVec3::ONE, linear)
+    }
+
+    /// Returns the factor of a look's colour, or 1 for one without.
+    ///
+    /// # Panics
+    /// Panics if there is no such look.
+    pub fn look_factor(&self, look: usize, linear: bool) -> DVec3 {
+        self.looks[look].factor.map_or(DVec3::ONE, |factor| self.read(factor, linear))
+    }
+
+    /// Returns whether the product of a colour's factors is the number of the picture that is drawn. `linear` is whether that is
+    /// computed in linear light.
+    pub fn is_product(&self, linear: bool) -> bool {
+        linear || self.space == Colors::Levels
     }
 
     /// Returns the light that the faces of a look give off, where their picture of it has this `level`; it is 1 without one.
@@ -485,9 +527,9 @@ impl Model {
         if *is_missing || factor.is_none() && texture.is_none() && mixed.is_none() {
             return NEUTRAL;
         }
-        let factor = factor.map_or(DVec3::ONE, |factor| self.read(factor, linear));
+        let factor = self.look_factor(look, linear);
         let product = (factor * level * mixed.unwrap_or(DVec3::ONE)).clamp(DVec3::ZERO, DVec3::ONE);
-        if !linear && self.space == Colors::Linear { product.map(encoded) } else { product }
+        if self.is_product(linear) { product } else { product.map(encoded) }
     }
 
     /// Returns whether the model is a closed body, which glass fills.

@@ -45,13 +45,23 @@ impl Texture {
     }
 
     /// Returns the picture.
-    pub fn picture(&self) -> &Picture {
+    pub fn picture(&self) -> &Arc<Picture> {
         &self.picture
     }
 
     /// Returns how the picture goes on across and down.
     pub fn wraps(&self) -> [Wrap; 2] {
         self.wraps
+    }
+
+    /// Returns whether it lies by [texture coordinates of its own](crate::Model::own_uvs).
+    pub fn has_own_uvs(&self) -> bool {
+        self.has_own_uvs
+    }
+
+    /// Returns whether the material has a transform of texture coordinates.
+    pub fn has_transform(&self) -> bool {
+        self.transform.is_some()
     }
 
     /// Returns the place of texture coordinates after the transform of the material.

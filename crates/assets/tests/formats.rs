@@ -122,6 +122,11 @@ fn glb(node: &str) -> Vec<u8> {
     bytes
 }
 
+/// Returns the colour of the first triangle at a place, without a picture.
+fn color_at(model: &Model, weights: [f64; 3], linear: bool) -> DVec3 {
+    model.color(model.look(0), model.vertex_colors(0), weights, DVec3::ONE, linear)
+}
+
 #[test]
 fn all_formats_give_the_same_triangles() {
     for (name, bytes) in [
@@ -155,13 +160,13 @@ fn polygons_are_fans_and_indices_may_be_negative() {
 #[test]
 fn colours_are_what_the_formats_say() {
     let colored = model("a.ply", ply_binary(true));
-    let color = colored.color(0, [0.2, 0.3, 0.5], DVec3::ONE, false);
+    let color = color_at(&colored, [0.2, 0.3, 0.5], false);
     assert!((color - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-6, "{color}");
-    let linear = colored.color(0, [0.2, 0.3, 0.5], DVec3::ONE, true);
+    let linear = color_at(&colored, [0.2, 0.3, 0.5], true);
     assert!((linear.y - 0.0331).abs() < 1e-4, "levels are decoded: {linear}");
     let gltf = model("a.glb", glb(r#"{"mesh":0}"#));
-    assert_eq!(gltf.color(0, [1.0, 0.0, 0.0], DVec3::ONE, true), DVec3::new(0.5, 0.25, 1.0));
-    assert!((gltf.color(0, [1.0, 0.0, 0.0], DVec3::ONE, false).x - 0.735).abs() < 1e-3, "encoded");
+    assert_eq!(color_at(&gltf, [1.0, 0.0, 0.0], true), DVec3::new(0.5, 0.25, 1.0));
+    assert!((color_at(&gltf, [1.0, 0.0, 0.0], false).x - 0.735).abs() < 1e-3, "encoded");
     assert_eq!(gltf.glow(gltf.look(0), DVec3::ONE, true), DVec3::Y);
     let plain = model("a.obj", obj());
     assert_eq!(
@@ -170,7 +175,7 @@ fn colours_are_what_the_formats_say() {
     );
     let half = model("a.obj", b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec());
     assert_eq!(
-        half.color(0, [0.0, 1.0, 0.0], DVec3::ONE, true),
+        color_at(&half, [0.0, 1.0, 0.0], true),
         DVec3::ONE,
         "a vertex without a colour beside others is white"
     );
@@ -315,6 +320,10 @@ fn what_only_some_lines_of_an_obj_have_is_that_of_these_lines() {
     assert_eq!([0, 1, 2].map(|k| model.normals(k).is_some()), [false, true, false]);
     assert_eq!(model.rounded_normals(1).unwrap()[2].to_array(), [0.0, 0.0, 1.0]);
     assert_eq!(model.rounded_normals(2), None);
-    assert_eq!(model.vertex_colors(0).unwrap(), [DVec3::ONE; 3], "white of its own, not what has no colour");
+    assert_eq!(
+        model.vertex_colors(0).unwrap(),
+        [glam::Vec3::ONE; 3],
+        "white of its own, not what has no colour"
+    );
     assert_eq!([0, 2].map(|k| model.uvs(k).unwrap()[0].y), [0.0, 1.0]);
 }

@@ -30,7 +30,13 @@ fn attempt(bytes: &[u8]) {
                     assert!(uvs.iter().all(|uv| uv.is_finite()));
                 }
                 assert!(model.vertex_alphas(triangle).iter().all(|alpha| alpha.is_finite()));
-                let color = model.color(triangle, [0.25, 0.25, 0.5], glam::DVec3::splat(0.7), true);
+                let color = model.color(
+                    model.look(triangle),
+                    model.vertex_colors(triangle),
+                    [0.25, 0.25, 0.5],
+                    glam::DVec3::splat(0.7),
+                    true,
+                );
                 assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{color}");
             }
             let _ = model.closure();

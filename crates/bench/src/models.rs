@@ -122,6 +122,14 @@ struct Goal {
     unit: &'static str,
 }
 
+/// What the vertices of a file have beside their positions.
+#[derive(Clone, Copy, Default)]
+struct Extras {
+    normals: bool,
+    colors: bool,
+    uvs: bool,
+}
+
 /// A surface of squares of two triangles each, closed around the y axis.
 struct Surface {
     positions: Vec<DVec3>,
@@ -190,28 +198,36 @@ impl Surface {
         })
     }
 
-    fn obj(&self, with_normals: bool, with_colors: bool) -> Result<Vec<u8>> {
+    fn obj(&self, Extras { normals, colors, uvs }: Extras) -> Result<Vec<u8>> {
         let mut text = String::new();
         for p in &self.positions {
             write!(text, "v {:.6} {:.6} {:.6}", p.x, p.y, p.z)?;
-            if with_colors {
+            if colors {
                 let color = (0.5 + 0.4 * *p).clamp(DVec3::ZERO, DVec3::ONE);
                 write!(text, " {:.3} {:.3} {:.3}", color.x, color.y, color.z)?;
             }
             text += "\n";
         }
-        if with_normals {
+        if normals {
             for p in &self.positions {
                 let n = p.normalize_or_zero();
                 writeln!(text, "vn {:.5} {:.5} {:.5}", n.x, n.y, n.z)?;
             }
         }
+        if uvs {
+            // Four times around, and once up.
+            for p in &self.positions {
+                let around = f64::atan2(-p.z, p.x) / std::f64::consts::TAU;
+                writeln!(text, "vt {:.5} {:.5}", 4.0 * around, 0.5 + 0.45 * p.y)?;
+            }
+        }
         for triangle in &self.triangles {
             let [a, b, c] = triangle.map(|i| i + 1);
-            if with_normals {
-                writeln!(text, "f {a}//{a} {b}//{b} {c}//{c}")?;
-            } else {
-                writeln!(text, "f {a} {b} {c}")?;
+            match (normals, uvs) {
+                (true, true) => writeln!(text, "f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}")?,
+                (true, false) => writeln!(text, "f {a}//{a} {b}//{b} {c}//{c}")?,
+                (false, true) => writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}")?,
+                (false, false) => writeln!(text, "f {a} {b} {c}")?,
             }
         }
         Ok(text.into_bytes())
@@ -295,7 +311,7 @@ fn scene(side: u32, library: &Library, lines: &str) -> Result<Scene> {
 fn loading(plan: &Plan, pool: &rayon::ThreadPool, goals: &mut Vec<Goal>) -> Result<String> {
     let surface = Surface::ball(plan.loaded);
     let files = [
-        ("a.obj", surface.obj(true, false)?),
+        ("a.obj", surface.obj(Extras { normals: true, ..Extras::default() })?),
         ("a.ply", surface.ply()),
         ("a.stl", surface.stl()),
         ("a.glb", surface.glb()),
@@ -333,18 +349,34 @@ fn loading(plan: &Plan, pool: &rayon::ThreadPool, goals: &mut Vec<Goal>) -> Resu
     Ok(part + "\n")
 }
 
-/// Draws a model of many triangles: as triangles of a script, flat, with normals, and with colours.
+/// Returns a picture of 1024 x 512 pixels, as a PNG file.
+fn picture() -> Result<Vec<u8>> {
+    let level = |x: u32, y: u32, of: u32| (128.0 + 100.0 * f64::sin(f64::from(x * of + y * y) / 40.0)) as u8;
+    let picture = image::RgbImage::from_fn(1024, 512, |x, y| image::Rgb([1, 2, 3].map(|of| level(x, y, of))));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}
+
+/// Draws a model of many triangles: flat, with normals, with colours, and with a picture.
 fn drawing(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
     let surface = Surface::ball(plan.drawn);
+    let smooth = Extras { normals: true, ..Extras::default() };
     let library = Library::new(MemoryFiles::from([
-        ("plain.obj", surface.obj(false, false)?),
-        ("smooth.obj", surface.obj(true, false)?),
-        ("colored.obj", surface.obj(true, true)?),
+        ("plain.obj", surface.obj(Extras::default())?),
+        ("smooth.obj", surface.obj(smooth)?),
+        ("colored.obj", surface.obj(Extras { colors: true, ..smooth })?),
+        ("textured.obj", surface.obj(Extras { uvs: true, ..smooth })?),
+        ("a.png", picture()?),
     ]));
     let scenes = [
         ("flat", "Mesh \"plain.obj\" .1 .1 .1 .7 .7 .6"),
         ("with normals", "Mesh \"smooth.obj\" .1 .1 .1 .7 .7 .6"),
         ("with normals and colours at its vertices", "Mesh \"colored.obj\""),
+        (
+            "with normals and a picture",
+            "Material m ambient .1 .1 .1 diffuse .7 .7 .6 image \"a.png\" uv\nMesh \"textured.obj\" m",
+        ),
     ];
     let mut part = format!(
         "## Drawing {} triangles\n\n{} x {} pixels with a shadow ray each, without the time to prepare.\n\n\
@@ -373,9 +405,12 @@ fn drawing(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
         let rounds = Rounds(seconds);
         let share = rounds.mean() / flat;
         writeln!(part, "| {what} | {} | {share:.2} |", rounds.cells())?;
-        if *what == "with normals" {
-            goals.push(Goal { what: "normals, of the flat model's time", is: share, most: 1.1, unit: "" });
-        }
+        let goal = match *what {
+            "with normals" => "normals, of the flat model's time",
+            "with normals and a picture" => "normals and a picture, of the flat model's time",
+            _ => continue,
+        };
+        goals.push(Goal { what: goal, is: share, most: 1.1, unit: "" });
     }
     Ok(part + "\n")
 }
@@ -383,7 +418,7 @@ fn drawing(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
 /// Draws a model that is used many times, and the same triangles written out.
 fn instances(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
     let surface = Surface::ball(plan.used);
-    let library = Library::new(MemoryFiles::from([("a.obj", surface.obj(false, false)?)]));
+    let library = Library::new(MemoryFiles::from([("a.obj", surface.obj(Extras::default())?)]));
     let across = (plan.times as f64).cbrt().ceil() as usize;
     let mut lines = String::from("Group g\nMesh \"a.obj\" .1 .1 .1 .7 .7 .6\nEnd\n");
     for k in 0..plan.times {
@@ -449,7 +484,7 @@ fn instances(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
 /// Draws a wine glass that refracts.
 fn glass(plan: &Plan, goals: &mut Vec<Goal>) -> Result<String> {
     let surface = Surface::wine_glass(plan.glass);
-    let library = Library::new(MemoryFiles::from([("glass.obj", surface.obj(false, false)?)]));
+    let library = Library::new(MemoryFiles::from([("glass.obj", surface.obj(Extras::default())?)]));
     let lines = "Clear\nScreen 640 480\nLook 0 2.2 7  0 1.2 0  26\nBackground .9 .93 1 .4 .6 .9\nIlight .9 .9 .85  -1 -2 -1.5\n\
                  Material tile ambient .1 .1 .1 diffuse .2 .25 .3\nMaterial floor ambient .1 .1 .1 diffuse .7 .7 .65 checker .5 tile\n\
                  Material clear glass .97 .98 .98 1.5 shine .6 .6 .6 200\nPlane 0 0 0 0 1 0 floor\nMesh \"glass.obj\" clear smooth 40";
@@ -513,7 +548,7 @@ mod tests {
         assert!(!report.contains("NaN") && report.contains("| glb |"), "{report}");
         let surface = Surface::ball(500);
         let library = Library::new(MemoryFiles::from([
-            ("a.obj", surface.obj(true, true).unwrap()),
+            ("a.obj", surface.obj(Extras { normals: true, colors: true, uvs: true }).unwrap()),
             ("a.ply", surface.ply()),
             ("a.stl", surface.stl()),
             ("a.glb", surface.glb()),
@@ -527,7 +562,7 @@ mod tests {
 
     #[test]
     fn the_wine_glass_is_closed() {
-        let obj = Surface::wine_glass(2000).obj(false, false).unwrap();
+        let obj = Surface::wine_glass(2000).obj(Extras::default()).unwrap();
         let library = Library::new(MemoryFiles::from([("a.obj", obj)]));
         assert_eq!(*library.model("a.obj", Smoothing::OfFile).unwrap().closure(), Closure::Closed);
     }

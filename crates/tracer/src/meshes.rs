@@ -14,7 +14,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayfold_scene::assets::{Closure, Look, Model, Slot, Texture};
 use rayfold_scene::{
     Coefficients, Finish, ImageMap, Instance, Material, Mesh, Object, Placement, Scene, SharedSlice, Tone,
@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use crate::RenderOptions;
 use crate::parts;
-use crate::pictures::{alpha_at, factor_at, level_at};
+use crate::pictures::{FacePicture, alpha_at, factor_at, level_at};
 use crate::reference::onward_normal;
 
 /// A scene without meshes, and the faces that its triangles were.
@@ -113,6 +113,15 @@ pub(crate) struct Shading {
     pub(crate) glow: DVec3,
     /// Whether the ray comes from within a closed body of glass.
     pub(crate) within: bool,
+}
+
+/// What a face has at its corners for its colours, as its model has it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FaceCorners {
+    /// Texture coordinates.
+    pub(crate) uvs: Option<[Vec2; 3]>,
+    /// Factors of the colour.
+    pub(crate) colors: Option<[Vec3; 3]>,
 }
 
 /// A hit on a face.
@@ -369,7 +378,9 @@ impl Faces {
         let weights = weights(run.corners(k, center, scale), point);
         let of_vertices: f64 = model.vertex_alphas(k).iter().zip(weights).map(|(alpha, b)| alpha * b).sum();
         let of_picture = match &look.texture {
-            Some(texture) => alpha_at(texture, run.place_on(texture, k, weights, Slot::Color)),
+            Some(texture) => {
+                alpha_at(texture, run.place_on(texture, k, run.face_corners(k), weights, Slot::Color))
+            }
             None => 1.0,
         };
         look.alpha * of_picture * of_vertices < cutoff
@@ -444,7 +455,7 @@ impl Faces {
                 lift += b * n.dot(corner - point).max(0.0) * n;
             }
         }
-        let [color, glow] = run.colors(k, weights, material);
+        let [color, glow] = run.colors(k, run.face_corners(k), weights, material);
         let glass = material.finish().and_then(|finish| finish.glass);
         let glass = glass.map(|glass| (glass, within, !run.is_filled));
         let onward = onward_normal(direction, normal, face, glass);
@@ -492,29 +503,63 @@ impl Run {
         })
     }
 
+    /// Returns what a face has at its corners for its colours.
+    pub(crate) fn face_corners(&self, k: usize) -> FaceCorners {
+        FaceCorners { uvs: self.model.uvs(k), colors: self.model.vertex_colors(k) }
+    }
+
     /// Returns the factor of the ambient and diffuse coefficients of a face at a place, given by its barycentric weights, and
     /// the colour that is added.
-    pub(crate) fn colors(&self, k: usize, weights: [f64; 3], material: &Material) -> [DVec3; 2] {
+    #[inline(always)]
+    pub(crate) fn colors(
+        &self,
+        k: usize,
+        corners: FaceCorners,
+        weights: [f64; 3],
+        material: &Material,
+    ) -> [DVec3; 2] {
         let (mut color, mut glow) = (DVec3::ONE, DVec3::ZERO);
         let look = || self.model.look(k);
         if self.has_colors && self.model.is_varied(look()) {
-            let level = self.level(k, weights, Slot::Color);
-            color = self.model.color(k, weights, level, self.is_linear);
+            let level = self.level(k, corners, weights, Slot::Color);
+            color = self.model.color(look(), corners.colors, weights, level, self.is_linear);
         }
         if self.has_image
             && let Some(image) = material.finish().and_then(|finish| finish.image.as_ref())
-            && let Some(uvs) = self.model.uvs(k)
+            && let Some(uvs) = corners.uvs
         {
-            let [u, v] = [0, 1].map(|axis: usize| {
-                uvs.iter().zip(weights).map(|(uv, b)| b * f64::from(uv[axis])).sum::<f64>()
-            });
-            let v = if self.model.has_uvs_from_top() { v } else { 1.0 - v };
-            color *= factor_at(image.file().picture(), [u, v], true, self.is_linear);
+            let place = self.from_top(mixed(uvs, weights)).into();
+            color *= factor_at(image.file().picture(), place, true, self.is_linear);
         }
         if self.glows && glows_apart(&self.model, look()) {
-            glow = self.model.glow(look(), self.level(k, weights, Slot::Glow), self.is_linear);
+            let level = self.level(k, corners, weights, Slot::Glow);
+            glow = self.model.glow(look(), level, self.is_linear);
         }
         [color, glow]
+    }
+
+    /// Returns the picture of the faces, if their colours depend on it and on their texture coordinates alone. `material` is that
+    /// of all of them.
+    pub(crate) fn only_picture(&self, material: &Material) -> Option<FacePicture> {
+        let model = &self.model;
+        if self.glows || !model.has_uvs() {
+            return None;
+        }
+        if !self.has_colors {
+            let image = material.finish()?.image.as_ref().filter(|_| self.has_image)?;
+            let picture = image.file().picture();
+            return Some(FacePicture::of_material(picture, model.has_uvs_from_top(), self.is_linear));
+        }
+        let [look] = model.looks() else { return None };
+        let is_product = model.is_varied(0) && !model.has_vertex_colors() && model.is_product(self.is_linear);
+        let texture = look.texture(Slot::Color).filter(|_| is_product && !self.has_image)?;
+        (!texture.has_own_uvs() && !texture.has_transform()).then(|| FacePicture {
+            picture: texture.picture().clone(),
+            wraps: texture.wraps(),
+            is_from_top: model.has_uvs_from_top(),
+            is_linear: model.decodes_pictures(self.is_linear),
+            tint: Some(model.look_factor(0, self.is_linear)),
+        })
     }
 
     /// Returns the corners of a face in coordinates in which a point p of the world is at `(p - center) * scale`.
@@ -526,21 +571,43 @@ impl Run {
     }
 
     /// Returns the level of a face's picture at a place; 1 without one.
-    fn level(&self, k: usize, weights: [f64; 3], slot: Slot) -> DVec3 {
+    #[inline(always)]
+    fn level(&self, k: usize, corners: FaceCorners, weights: [f64; 3], slot: Slot) -> DVec3 {
         let model = &self.model;
         let texture = model.looks()[model.look(k)].texture(slot);
         let Some(texture) = texture.filter(|_| parts::BUILT.pictures) else { return DVec3::ONE };
-        let place = self.place_on(texture, k, weights, slot);
+        let place = self.place_on(texture, k, corners, weights, slot);
         level_at(texture, place, model.decodes_pictures(self.is_linear))
     }
 
     /// Returns the place of a point of a face on its picture, from the upper left corner.
-    fn place_on(&self, texture: &Texture, k: usize, weights: [f64; 3], slot: Slot) -> DVec2 {
-        let uvs = self.model.picture_uvs(k, slot);
-        let mixed = uvs.iter().zip(weights).map(|(uv, b)| b * uv.as_dvec2()).sum::<DVec2>();
-        let DVec2 { x, y } = texture.transformed(mixed);
+    #[inline(always)]
+    fn place_on(
+        &self,
+        texture: &Texture,
+        k: usize,
+        corners: FaceCorners,
+        weights: [f64; 3],
+        slot: Slot,
+    ) -> DVec2 {
+        let uvs = match texture.has_own_uvs() {
+            true => self.model.own_uvs(k, slot),
+            false => corners.uvs.unwrap_or_default(),
+        };
+        self.from_top(texture.transformed(mixed(uvs, weights)))
+    }
+
+    /// Returns the place of texture coordinates, from the upper left corner of a picture.
+    #[inline(always)]
+    fn from_top(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
+}
+
+/// Returns the texture coordinates at a place of a triangle, given by its barycentric weights.
+#[inline(always)]
+fn mixed([a, b, c]: [Vec2; 3], weights: [f64; 3]) -> DVec2 {
+    weights[0] * a.as_dvec2() + weights[1] * b.as_dvec2() + weights[2] * c.as_dvec2()
 }
 
 /// Returns the number of the triangle that the order of a hit on a shared model has.

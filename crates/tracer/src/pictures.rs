@@ -45,6 +45,34 @@ impl Panorama {
     }
 }
 
+/// A picture that alone colours the faces of a model, by their texture coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct FacePicture {
+    pub(crate) picture: Arc<Picture>,
+    pub(crate) wraps: [Wrap; 2],
+    /// Whether (0, 0) of the texture coordinates is its upper left corner, and not the lower left one.
+    pub(crate) is_from_top: bool,
+    /// Whether encoded levels are decoded to linear light.
+    pub(crate) is_linear: bool,
+    /// The factor of a picture of the model's file. `None` for one of a material, whose alpha counts.
+    pub(crate) tint: Option<DVec3>,
+}
+
+impl FacePicture {
+    /// Returns a picture of a material.
+    pub(crate) fn of_material(picture: &Arc<Picture>, is_from_top: bool, is_linear: bool) -> Self {
+        Self { picture: picture.clone(), wraps: [Wrap::Repeat; 2], is_from_top, is_linear, tint: None }
+    }
+
+    /// Returns the value of a pixel.
+    pub(crate) fn value(&self, column: u32, row: u32) -> DVec3 {
+        match self.tint {
+            Some(_) => self.picture.level(column, row, self.is_linear),
+            None => self.picture.factor(column, row, self.is_linear),
+        }
+    }
+}
+
 /// Returns the factor of a picture on an object's surface at a place in the coordinates of its numbers; 1 for a picture by
 /// texture coordinates, whose factor is that of [`factor_at`].
 pub(crate) fn factor(image: &Image, object: &Object, place: DVec3, is_linear: bool) -> DVec3 {

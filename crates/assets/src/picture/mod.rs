@@ -6,6 +6,7 @@ mod hdr;
 mod jpeg;
 mod size;
 
+use std::array;
 use std::sync::{LazyLock, OnceLock};
 
 use glam::DVec3;
@@ -44,11 +45,22 @@ enum Levels {
 }
 
 /// The linear light of each encoded level.
-static BYTES: LazyLock<Vec<f64>> = LazyLock::new(|| linear(255));
-static WORDS: LazyLock<Vec<f64>> = LazyLock::new(|| linear(65535));
+static BYTES: LazyLock<[f64; 256]> = LazyLock::new(|| array::from_fn(|level| linear(level, 255)));
+static WORDS: LazyLock<Vec<f64>> = LazyLock::new(|| (0..=65535).map(|level| linear(level, 65535)).collect());
 
-fn linear(most: u32) -> Vec<f64> {
-    (0..=most).map(|level| decoded(f64::from(level) / f64::from(most))).collect()
+/// Each encoded level of 8 bits as a share of the largest.
+static SHARES: [f64; 256] = {
+    let mut shares = [0.0; 256];
+    let mut level = 0;
+    while level < 256 {
+        shares[level] = level as f64 * (1.0 / 255.0);
+        level += 1;
+    }
+    shares
+};
+
+fn linear(level: usize, most: u32) -> f64 {
+    decoded(level as f64 / f64::from(most))
 }
 
 /// Returns a picture if it can lie on a surface: if its levels are from 0 to 1.
@@ -89,6 +101,17 @@ impl Picture {
         let (level, alpha) = self.pixel(column, row, linear);
         // Without alpha the level itself, to the last bit.
         if alpha == 1.0 { level } else { (1.0 - alpha) + alpha * level }
+    }
+
+    /// Returns the numbers of the pixels, row after row, and the level of each number, in the most frequent case: red, green
+    /// and blue of 8 bits each.
+    pub fn bytes_of_opaque(&self, linear: bool) -> Option<(&[u8], &'static [f64; 256])> {
+        match (&self.levels, self.orientation) {
+            (Levels::Bytes(3, levels), Orientation::NoTransforms) => {
+                Some((levels, if linear { &BYTES } else { &SHARES }))
+            }
+            _ => None,
+        }
     }
 
     /// Returns the alpha of a pixel, from 0 to 1.

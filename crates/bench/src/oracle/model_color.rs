@@ -20,8 +20,10 @@ impl At<'_> {
             (Colors::Levels, true) => color.map(to_light),
             (Colors::Levels, false) | (Colors::Linear, _) => color,
         };
-        let of_vertices =
-            self.model.vertex_colors(self.triangle).map(|corners| self.mixed(corners.map(light)));
+        let of_vertices = self
+            .model
+            .vertex_colors(self.triangle)
+            .map(|corners| self.mixed(corners.map(|corner| light(corner.as_dvec3()))));
         let of_picture = self.level(Slot::Color);
         let factors = [look.factor.map(light), of_vertices, of_picture];
         if look.is_missing || factors.iter().all(Option::is_none) {

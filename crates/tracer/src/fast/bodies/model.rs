@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec2, Vec3 as Color};
 use rayfold_scene::Placement;
 use rayfold_scene::assets::Model;
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ use crate::fast::shapes::Neighbours;
 use crate::fast::shapes::shape::{Items, Precalculations};
 use crate::fast::shapes::triangle::{Facet, RenderSpaceTriangle};
 use crate::fast::shared::Surface;
-use crate::meshes::{ONE_FACE, hit_face};
+use crate::meshes::{FaceCorners, ONE_FACE, hit_face};
 use crate::parallel::map;
 use crate::scale::below_inverse;
 
@@ -56,6 +56,9 @@ struct ModelTree<E> {
     facets: Vec<Facet<E>>,
     /// The normals at their corners, zeros for a flat one; empty if all are flat. They are as exact as those of the file.
     normals: Vec<[[f32; 3]; 3]>,
+    /// The texture coordinates and the colour factors at their corners; empty if there are none.
+    uvs: Vec<[Vec2; 3]>,
+    colors: Vec<[Color; 3]>,
     /// Their corners, as indices among the positions of the model, which are unrounded.
     corners: Vec<[u32; 3]>,
     positions: Vec<DVec3>,
@@ -120,10 +123,28 @@ impl<E: Real> ModelTree<E> {
         };
         let (facets, index) = rayon::join(|| map(&order, facet), index);
         let normals = if model.has_normals() { map(&order, normals) } else { vec![] };
+        let uvs = |&k: &u32| model.uvs(k as usize).unwrap_or_default();
+        let uvs = if model.has_uvs() { map(&order, uvs) } else { vec![] };
+        let colors = |&k: &u32| model.vertex_colors(k as usize).unwrap_or_default();
+        let colors = if model.has_vertex_colors() { map(&order, colors) } else { vec![] };
         let corners = map(&order, |&k| triangles[k as usize]);
         let has_looks = model.looks().len() > 1;
         let looks = (0..count).filter(|_| has_looks).map(|k| model.look(k) as u32).collect();
-        Self { center, scale, half, radius, tree, facets, normals, corners, positions, index, looks }
+        Self {
+            center,
+            scale,
+            half,
+            radius,
+            tree,
+            facets,
+            normals,
+            uvs,
+            colors,
+            corners,
+            positions,
+            index,
+            looks,
+        }
     }
 }
 
@@ -404,11 +425,29 @@ impl<E: Real> ModelFaces<E> {
         (facet, normals)
     }
 
-    /// Reads from the normals of a triangle and returns any of their bits.
+    /// Returns what a triangle has at its corners for its colours.
+    #[inline(always)]
+    pub(in crate::fast) fn face_corners(&self, number: usize) -> FaceCorners {
+        let ModelTree { index, uvs, colors, .. } = &*self.tree;
+        let at = index[number] as usize;
+        FaceCorners { uvs: uvs.get(at).copied(), colors: colors.get(at).copied() }
+    }
+
+    /// Returns the texture coordinates at the corners of a triangle.
+    #[inline(always)]
+    pub(in crate::fast) fn uvs(&self, number: usize) -> [Vec2; 3] {
+        self.tree.uvs.get(self.tree.index[number] as usize).copied().unwrap_or_default()
+    }
+
+    /// Reads from what a triangle has at its corners, and returns any of the bits.
     #[inline(always)]
     pub(in crate::fast) fn fetch(&self, number: usize) -> u32 {
-        let at = self.tree.index[number] as usize;
-        self.tree.normals.get(at).map_or(0, |[first, _, last]| first[0].to_bits() ^ last[2].to_bits())
+        let ModelTree { index, normals, uvs, colors, .. } = &*self.tree;
+        let at = index[number] as usize;
+        let of_normals = normals.get(at).map_or(0, |[first, _, last]| first[0].to_bits() ^ last[2].to_bits());
+        let of_uvs = uvs.get(at).map_or(0, |[first, _, last]| first.x.to_bits() ^ last.y.to_bits());
+        let of_colors = colors.get(at).map_or(0, |[first, _, last]| first.x.to_bits() ^ last.z.to_bits());
+        of_normals ^ of_uvs ^ of_colors
     }
 
     /// Returns a point of the scene and a direction in the coordinates of the triangles.

@@ -11,15 +11,17 @@ use std::sync::Arc;
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::DVec3;
-use rayfold_scene::Scene;
+use rayfold_scene::{Material, Scene};
 use rayon::prelude::*;
 
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant};
 use crate::fast::bodies::ModelFaces;
+use crate::fast::materials::face_pictures::Looked;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::rays::bounce::{Hits, ROOM, RayBatch};
 use crate::fast::shapes::triangle::{Facet, Triangle};
 use crate::meshes::{FaceHit, Faces, Run, hit_face};
+use crate::pictures::FacePicture;
 
 /// The faces of a scene, at least one of which has more than a triangle.
 #[derive(Debug)]
@@ -48,6 +50,8 @@ struct ShadedRun<E> {
     normals: Vec<[[E; 3]; 3]>,
     /// Whether colours vary within faces.
     is_colored: bool,
+    /// The picture of the faces of a model that is drawn from its tree, if nothing else colours them.
+    picture: Option<FacePicture>,
     /// The index of refraction of glass, or 0; and 1 for a closed body of glass.
     ior: E,
     is_filled: E,
@@ -68,6 +72,8 @@ struct Gathered<E> {
     /// shaded by the functions of the reference tracer alone, because it has holes.
     more: [(usize, usize, bool); 16],
     more_count: usize,
+    /// The faces with a picture.
+    looked: Looked<E>,
 }
 
 impl<E: Real> ShadedFaces<E> {
@@ -117,8 +123,14 @@ impl<E: Real> ShadedFaces<E> {
                     while open != 0 {
                         let model = self.gather(&triangle, hits, lanes.clone(), &mut open, &mut gathered);
                         let weights = gathered.mix(simd, model, queue, hits, at);
-                        if gathered.more_count > 0 {
-                            self.add_more::<S, EYE>(queue, hits, (at, &gathered, weights));
+                        let more = gathered.more[..gathered.more_count].first();
+                        if let Some(&(_, run, false)) = more
+                            && let ShadedRun { picture: Some(picture), model: Some(model), .. } =
+                                &self.runs[run]
+                        {
+                            gathered.multiply(simd, picture, model, hits, (at, weights));
+                        } else if more.is_some() {
+                            self.add_more::<S, EYE>(simd, queue, hits, (at, &gathered, weights));
                         }
                     }
                 }
@@ -219,43 +231,82 @@ impl<E: Real> ShadedFaces<E> {
     #[inline(never)]
     fn add_more<S: Simd, const EYE: bool>(
         &self,
+        simd: S,
         queue: &RayBatch<E>,
         hits: &mut Hits<E>,
         (at, gathered, weights): (usize, &Gathered<E>, [Lanes<S, E>; 3]),
     ) {
-        for &(of_packet, run, has_holes) in &gathered.more[..gathered.more_count] {
-            let lane = at + of_packet;
-            let face_order = hits.order.0[lane].widen();
-            let order = face_order as usize;
-            let material = self.scene.objects[order].material();
-            let (direction, face) = (read(&queue.direction, lane), read(&hits.face, lane));
-            let ShadedRun { orders, index, model, .. } = &self.runs[run];
-            let [color, glow] = if has_holes {
-                let (start, offset) = (read(&hits.start, lane), hits.sides[0].0[lane].widen());
-                let point = start - offset * face;
-                let hit = FaceHit { point, center: self.center, scale: self.scale, direction, face };
-                let Some(shading) = self.faces.shading(face_order, material, hit) else { continue };
-                write(&mut hits.normal, lane, shading.normal);
-                write(&mut hits.onward, lane, shading.onward);
-                write(&mut hits.start, lane, start + shading.lift);
-                let hides = shading.lift.dot(face) > offset;
-                let under = if hides { DVec3::ZERO } else { -2.0 * offset * face };
-                write(&mut hits.under, lane, under);
-                if shading.within {
-                    hits.sides[1].0[lane] = E::narrow(1.0);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut corners = [[E::narrow(0.0); 16]; 3];
+                for (into, weights) in corners.iter_mut().zip(weights) {
+                    weights.store_slice(&mut into[..Lanes::<S, E>::LEN]);
                 }
-                [shading.color, shading.glow]
-            } else {
-                let run = &self.faces.runs()[*index];
-                let k = if model.is_some() { hit_face(face_order) } else { order - orders.start };
-                run.colors(k, weights.map(|of| of[of_packet].widen()), material)
-            };
-            let weight = if EYE { DVec3::ONE } else { read(&queue.weight, lane) };
-            let seen = read(&hits.color, lane) * color + weight * glow;
-            write(&mut hits.color, lane, seen);
-            let diffuse = read(&hits.diffuse, lane) * color;
-            write(&mut hits.diffuse, lane, diffuse);
+                let mut colors = [[E::narrow(1.0); 16]; 3];
+                let mut glows = [[E::narrow(0.0); 16]; 3];
+                for &(of_packet, run, has_holes) in &gathered.more[..gathered.more_count] {
+                    let face_order = hits.order.0[at + of_packet].widen();
+                    let order = face_order as usize;
+                    let material = self.scene.objects[order].material();
+                    let ShadedRun { orders, index, model, .. } = &self.runs[run];
+                    let [color, glow] = if has_holes {
+                        self.shade_with_holes(queue, hits, at + of_packet, material)
+                    } else {
+                        let run = &self.faces.runs()[*index];
+                        let (k, of_face) = match model {
+                            Some(model) => (hit_face(face_order), model.face_corners(hit_face(face_order))),
+                            None => (order - orders.start, run.face_corners(order - orders.start)),
+                        };
+                        let lane = of_packet % 16;
+                        let weights = [0, 1, 2].map(|k: usize| corners[k][lane].widen());
+                        run.colors(k, of_face, weights, material)
+                    };
+                    for axis in 0..3 {
+                        colors[axis][of_packet] = E::narrow(color[axis]);
+                        glows[axis][of_packet] = E::narrow(glow[axis]);
+                    }
+                }
+                for axis in 0..3 {
+                    let lanes = at..at + Lanes::<S, E>::LEN;
+                    let load = |from: &[E]| Lanes::<S, E>::from_slice(simd, from);
+                    let factor = load(&colors[axis][..Lanes::<S, E>::LEN]);
+                    let glow = load(&glows[axis][..Lanes::<S, E>::LEN]);
+                    let glow = if EYE { glow } else { load(&queue.weight[axis].0[lanes.clone()]) * glow };
+                    let (color, diffuse) = (&mut hits.color[axis].0, &mut hits.diffuse[axis].0);
+                    (load(&color[lanes.clone()]) * factor + glow).store_slice(&mut color[lanes.clone()]);
+                    (load(&diffuse[lanes.clone()]) * factor).store_slice(&mut diffuse[lanes]);
+                }
+            },
+        );
+    }
+
+    /// Shades a face with holes, and returns its colour and its glow.
+    #[inline(never)]
+    fn shade_with_holes(
+        &self,
+        queue: &RayBatch<E>,
+        hits: &mut Hits<E>,
+        lane: usize,
+        material: &Material,
+    ) -> [DVec3; 2] {
+        let (direction, face) = (read(&queue.direction, lane), read(&hits.face, lane));
+        let (start, offset) = (read(&hits.start, lane), hits.sides[0].0[lane].widen());
+        let point = start - offset * face;
+        let hit = FaceHit { point, center: self.center, scale: self.scale, direction, face };
+        let Some(shading) = self.faces.shading(hits.order.0[lane].widen(), material, hit) else {
+            return [DVec3::ONE, DVec3::ZERO];
+        };
+        write(&mut hits.normal, lane, shading.normal);
+        write(&mut hits.onward, lane, shading.onward);
+        write(&mut hits.start, lane, start + shading.lift);
+        let hides = shading.lift.dot(face) > offset;
+        let under = if hides { DVec3::ZERO } else { -2.0 * offset * face };
+        write(&mut hits.under, lane, under);
+        if shading.within {
+            hits.sides[1].0[lane] = E::narrow(1.0);
         }
+        [shading.color, shading.glow]
     }
 }
 
@@ -275,7 +326,9 @@ impl<E: Real> ShadedRun<E> {
         let glass = scene.objects[orders.start].material().finish().and_then(|finish| finish.glass);
         let ior = E::narrow(glass.map_or(0.0, |glass| glass.ior()));
         let is_filled = E::narrow(if run.is_filled() { 1.0 } else { 0.0 });
-        Self { orders, index, model, normals, is_colored: run.is_colored(), ior, is_filled }
+        let picture = run.only_picture(scene.objects[orders.start].material());
+        let picture = picture.filter(|_| model.is_some());
+        Self { orders, index, model, normals, is_colored: run.is_colored(), picture, ior, is_filled }
     }
 }
 
@@ -291,6 +344,7 @@ impl<E: Real> Gathered<E> {
             is_filled: [E::narrow(0.0); 16],
             more: [(0, 0, false); 16],
             more_count: 0,
+            looked: Looked::new(),
         }
     }
 
@@ -311,6 +365,29 @@ impl<E: Real> Gathered<E> {
                 self.normals[corner][axis][lane] = normals[corner][axis];
             }
         }
+    }
+
+    /// Multiplies colours by the only picture of a model, where its faces are hit.
+    #[inline(always)]
+    fn multiply<S: Simd>(
+        &mut self,
+        simd: S,
+        picture: &FacePicture,
+        model: &ModelFaces<E>,
+        hits: &mut Hits<E>,
+        (at, weights): (usize, [Lanes<S, E>; 3]),
+    ) {
+        let (mut bits, one) = (0, constant::<S, E>(simd, 1.0));
+        for &(lane, ..) in &self.more[..self.more_count] {
+            bits |= 1 << lane;
+            self.looked.put(lane, model.uvs(hit_face(hits.order.0[at + lane].widen())));
+        }
+        let factors = self.looked.factors(simd, picture, weights, bits);
+        let is_face = Lanes::<S, E>::from_slice(simd, &self.is_face[..Lanes::<S, E>::LEN]);
+        let is_face = is_face.simd_gt(constant::<S, E>(simd, 0.0));
+        let factors = Vec3::select(is_face, factors, Vec3::new(one, one, one));
+        factors.mul(Vec3::load(simd, &hits.color, at)).store(&mut hits.color, at);
+        factors.mul(Vec3::load(simd, &hits.diffuse, at)).store(&mut hits.diffuse, at);
     }
 
     /// Mixes the normals of the gathered faces, in the coordinates of their `model` if they have one, and lifts the starts of
@@ -340,35 +417,31 @@ impl<E: Real> Gathered<E> {
             Some(model) => model.enter(simd, (point, face)),
             None => (point, face),
         };
-        let edges: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.edges[k], 0));
-        let areas: [Lanes<S, E>; 3] = [0, 1, 2].map(|k: usize| {
-            let moment = Vec3::<S, E>::load(simd, &self.moments[k], 0);
-            own_face.dot(edges[k].cross(point)) + own_face.dot(moment)
-        });
+        let edges: [Vec3<S, E>; 3] = loaded(simd, &self.edges);
+        let moments: [Vec3<S, E>; 3] = loaded(simd, &self.moments);
+        let [mut a, mut b, mut c] = [zero; 3];
+        for (area, k) in [&mut a, &mut b, &mut c].into_iter().zip(0..) {
+            *area = own_face.dot(edges[k].cross(point)) + own_face.dot(moments[k]);
+        }
         // The face may be seen from its other side.
-        let side = (areas[0] + areas[1] + areas[2]).simd_lt(zero).select(minus, one);
-        let areas = areas.map(|area| (area * side).max(zero));
-        let sum = areas[0] + areas[1] + areas[2];
+        let side = (a + b + c).simd_lt(zero).select(minus, one);
+        let [a, b, c] = [(a * side).max(zero), (b * side).max(zero), (c * side).max(zero)];
+        let sum = a + b + c;
         let is_within = sum.simd_gt(zero);
         let share = one / is_within.select(sum, one);
-        let [a, b, c] = areas.map(|area| area * share);
-        let weights = [is_within.select(a, one), b, c];
-        let normals: [Vec3<S, E>; 3] = [0, 1, 2].map(|k: usize| Vec3::load(simd, &self.normals[k], 0));
-        let towards =
-            |normal: Vec3<S, E>| normal.scale(normal.dot(own_face).simd_lt(zero).select(minus, one));
+        let weights = [is_within.select(a * share, one), b * share, c * share];
+        let normals: [Vec3<S, E>; 3] = loaded(simd, &self.normals);
         let mixed = normals[0].scale(weights[0]);
         let mixed = normals[2].scale_add(weights[2], normals[1].scale_add(weights[1], mixed));
         let length = mixed.dot(mixed).sqrt();
         let is_any = length.simd_gt(zero);
-        let mixed = towards(mixed.scale(one / is_any.select(length, one)));
-        // The ways from the hit to the corners.
-        let ways = [(1, 2), (2, 0), (0, 1)].map(|(next, last): (usize, usize)| {
-            edges[next].scale(weights[last]).sub(edges[last].scale(weights[next]))
-        });
+        let mixed = towards(simd, mixed.scale(one / is_any.select(length, one)), own_face);
         let mut lift = Vec3::<S, E>::zero(simd);
-        for corner in 0..3 {
-            let normal = towards(normals[corner]);
-            let above = normal.dot(ways[corner]).max(zero);
+        for (corner, next, last) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+            // The way from the hit to the corner.
+            let way = edges[next].scale(weights[last]).sub(edges[last].scale(weights[next]));
+            let normal = towards(simd, normals[corner], own_face);
+            let above = normal.dot(way).max(zero);
             lift = normal.scale_add(above * weights[corner], lift);
         }
         let (mixed, lift) = match model {
@@ -434,6 +507,20 @@ impl<E: Real> Hits<E> {
             self.normal[axis].0.copy_from_slice(&self.onward[axis]);
         }
     }
+}
+
+/// Loads three vectors. `map` of arrays is not inlined.
+#[inline(always)]
+fn loaded<S: Simd, E: Real>(simd: S, columns: &[[[E; 16]; 3]; 3]) -> [Vec3<S, E>; 3] {
+    let [a, b, c] = columns;
+    [Vec3::load(simd, a, 0), Vec3::load(simd, b, 0), Vec3::load(simd, c, 0)]
+}
+
+/// Returns vectors that point to the same side as others, each itself or its opposite.
+#[inline(always)]
+fn towards<S: Simd, E: Real>(simd: S, v: Vec3<S, E>, side: Vec3<S, E>) -> Vec3<S, E> {
+    let is_away = v.dot(side).simd_lt(constant::<S, E>(simd, 0.0));
+    v.scale(is_away.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0)))
 }
 
 /// Returns normals of triangles, on the sides from which their corners go round counterclockwise.

@@ -2,6 +2,7 @@
 //!
 //! In: materials of the scene. Out: tables that the steps of [`super::transport`] read. Read [`finish`] first.
 
+mod face_pictures;
 pub(crate) mod faces;
 pub(crate) mod finish;
 pub(crate) mod fog;

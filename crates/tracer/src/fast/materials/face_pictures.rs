@@ -1,0 +1,151 @@
+//! Pictures that lie on the faces of a model by texture coordinates, looked up in lanes.
+//!
+//! These are the functions of [`crate::pictures`], with the same results in `f64`. Only the pixels themselves are read lane by
+//! lane.
+
+use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use glam::Vec2;
+use rayfold_scene::assets::Wrap;
+
+use crate::fast::arithmetic::real::{Lanes, Real, Vec3, constant};
+use crate::pictures::FacePicture;
+
+/// The data of a packet's faces, lane by lane. Only lanes that hit faces have any.
+pub(super) struct Looked<E> {
+    /// Texture coordinates at the corners, by corner and axis.
+    coordinates: [[[E; 16]; 2]; 3],
+    /// The columns and rows around the place of a hit: left, right, first, second.
+    around: [[E; 16]; 4],
+    /// The values of the pixels there, by pixel and channel, the first row first.
+    values: [[[E; 16]; 3]; 4],
+}
+
+impl<E: Real> Looked<E> {
+    pub(super) fn new() -> Self {
+        let nothing = [E::narrow(0.0); 16];
+        Self { coordinates: [[nothing; 2]; 3], around: [nothing; 4], values: [[nothing; 3]; 4] }
+    }
+
+    /// Takes the texture coordinates of the face that a lane hits.
+    #[inline(always)]
+    pub(super) fn put(&mut self, lane: usize, uvs: [Vec2; 3]) {
+        for (into, uv) in self.coordinates.iter_mut().zip(uvs) {
+            into[0][lane % 16] = E::narrow(uv.x.into());
+            into[1][lane % 16] = E::narrow(uv.y.into());
+        }
+    }
+
+    /// Returns the factors of a picture where faces are hit. `bits` are the lanes that hit some, and the others have any
+    /// number.
+    #[inline(always)]
+    pub(super) fn factors<S: Simd>(
+        &mut self,
+        simd: S,
+        picture: &FacePicture,
+        [a, b, c]: [Lanes<S, E>; 3],
+        bits: u32,
+    ) -> Vec3<S, E> {
+        let one = constant::<S, E>(simd, 1.0);
+        let [mut u, mut v] = [one; 2];
+        for (place, axis) in [&mut u, &mut v].into_iter().zip(0..) {
+            let [first, second, third] = &self.coordinates;
+            *place = a * load::<S, E>(simd, &first[axis])
+                + b * load::<S, E>(simd, &second[axis])
+                + c * load::<S, E>(simd, &third[axis]);
+        }
+        let v = if picture.is_from_top { v } else { one - v };
+        let [width, height] = [picture.picture.width(), picture.picture.height()];
+        let (left, right, across) = neighbours::<S, E>(simd, u, width, picture.wraps[0]);
+        let (first, second, down) = neighbours::<S, E>(simd, v, height, picture.wraps[1]);
+        for (into, place) in self.around.iter_mut().zip([left, right, first, second]) {
+            place.store_slice(&mut into[..Lanes::<S, E>::LEN]);
+        }
+        self.read(picture, bits);
+        let mut factors = Vec3::splat(simd, [E::narrow(1.0); 3]);
+        for (factor, axis) in [&mut factors.x, &mut factors.y, &mut factors.z].into_iter().zip(0..) {
+            let [a, b, c, d] = &self.values;
+            let upper = mixed::<S, E>(load(simd, &a[axis]), load(simd, &b[axis]), across);
+            let lower = mixed::<S, E>(load(simd, &c[axis]), load(simd, &d[axis]), across);
+            let level = mixed::<S, E>(upper, lower, down);
+            *factor = match picture.tint {
+                Some(tint) => (level * constant::<S, E>(simd, tint[axis])).max(one - one).min(one),
+                None => level,
+            };
+        }
+        factors
+    }
+
+    /// Reads the pixels around the places of hits.
+    #[inline(always)]
+    fn read(&mut self, picture: &FacePicture, mut bits: u32) {
+        let opaque = picture.picture.bytes_of_opaque(picture.is_linear);
+        let width = picture.picture.width() as usize;
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize % 16;
+            bits &= bits - 1;
+            let [left, right, first, second] = &self.around;
+            let [left, right] = [left[lane].to_index(), right[lane].to_index()];
+            let [first, second] = [first[lane].to_index(), second[lane].to_index()];
+            let pixels = [(left, first), (right, first), (left, second), (right, second)];
+            for (into, (column, row)) in self.values.iter_mut().zip(pixels) {
+                let [red, green, blue] = into;
+                if let Some((bytes, levels)) = opaque
+                    && let Some(&[r, g, b]) = bytes[3 * (row * width + column)..].first_chunk()
+                {
+                    red[lane] = E::narrow(levels[usize::from(r)]);
+                    green[lane] = E::narrow(levels[usize::from(g)]);
+                    blue[lane] = E::narrow(levels[usize::from(b)]);
+                } else {
+                    let value = picture.value(column as u32, row as u32);
+                    red[lane] = E::narrow(value.x);
+                    green[lane] = E::narrow(value.y);
+                    blue[lane] = E::narrow(value.z);
+                }
+            }
+        }
+    }
+}
+
+/// Returns the two pixels, of so many, whose middles are around places, and the shares of the second.
+#[inline(always)]
+fn neighbours<S: Simd, E: Real>(
+    simd: S,
+    place: Lanes<S, E>,
+    count: u32,
+    wrap: Wrap,
+) -> (Lanes<S, E>, Lanes<S, E>, Lanes<S, E>) {
+    let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| constant::<S, E>(simd, x));
+    let [count, last] = [f64::from(count), f64::from(count - 1)].map(|x| constant::<S, E>(simd, x));
+    let place = (place - place).simd_eq(zero).select(place, zero);
+    let place = match wrap {
+        Wrap::Repeat => place - place.floor(),
+        Wrap::Clamp => place.max(zero).min(one),
+        Wrap::Mirror => {
+            let place = place - two * (half * place).floor();
+            place.simd_gt(one).select(two - place, place)
+        }
+    };
+    let at = place * count - half;
+    let left = at.floor();
+    let right = left + one;
+    let share = at - left;
+    if wrap == Wrap::Repeat {
+        let left = left.simd_lt(zero).select(last, left);
+        let right = right.simd_gt(last).select(right - count, right);
+        // The place may be rounded to 1.
+        (left.min(last), right.max(zero), share)
+    } else {
+        (left.max(zero).min(last), right.max(zero).min(last), share)
+    }
+}
+
+#[inline(always)]
+fn mixed<S: Simd, E: Real>(a: Lanes<S, E>, b: Lanes<S, E>, share: Lanes<S, E>) -> Lanes<S, E> {
+    a + share * (b - a)
+}
+
+#[inline(always)]
+fn load<S: Simd, E: Real>(simd: S, from: &[E; 16]) -> Lanes<S, E> {
+    Lanes::<S, E>::from_slice(simd, &from[..Lanes::<S, E>::LEN])
+}
