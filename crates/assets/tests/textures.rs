@@ -29,7 +29,7 @@ fn read_obj(obj: &str, mtl: &str, name: &str, bytes: Vec<u8>) -> Result<Arc<Mode
 }
 
 fn color(model: &Model, level: DVec3) -> DVec3 {
-    model.color(0, [0.0, 1.0, 0.0], level, false)
+    model.color(model.look(0), model.vertex_colors(0), [0.0, 1.0, 0.0], level, false)
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn factors_multiply_before_they_are_clamped() {
     let model = read_obj(OBJ, "newmtl m\nKd 2 2 2\nmap_Kd a.png", "a.png", png()).unwrap();
     assert_eq!(color(&model, DVec3::splat(0.25)), DVec3::splat(0.5));
     assert_eq!(color(&model, DVec3::splat(0.75)), DVec3::ONE);
-    let half = model.color(0, [1.0, 0.0, 0.0], DVec3::splat(0.1), true);
+    let half = model.color(model.look(0), model.vertex_colors(0), [1.0, 0.0, 0.0], DVec3::splat(0.1), true);
     assert!(half.x > 0.4 && half.x < half.y * 5.0, "factors are decoded, those above 1 too: {half}");
 }
 
@@ -87,7 +87,11 @@ fn what_lacks_its_picture_is_grey_whatever_its_factors() {
     let unnamed = OBJ.replace("usemtl m\n", "");
     let library = Library::new(MemoryFiles::from([("a.obj", unnamed.into())]));
     let model = library.model("a.obj", Smoothing::OfFile).unwrap();
-    assert_eq!(model.color(0, [1.0, 0.0, 0.0], DVec3::ONE, false).y, 0.5, "it has no material");
+    assert_eq!(
+        model.color(model.look(0), model.vertex_colors(0), [1.0, 0.0, 0.0], DVec3::ONE, false).y,
+        0.5,
+        "it has no material"
+    );
 }
 
 #[test]
@@ -241,7 +245,10 @@ fn pictures_of_gltf_are_in_files_addresses_and_buffers() {
         let model = read(&gltf(COLOR, parts)).unwrap_or_else(|error| panic!("{parts}: {error}"));
         assert_eq!(width(&model, Slot::Color), Some(expected), "{parts}");
         assert_eq!(model.warnings(), &[] as &[String]);
-        assert_eq!(model.color(0, [1.0, 0.0, 0.0], DVec3::splat(0.5), true), DVec3::new(0.25, 0.5, 0.5));
+        assert_eq!(
+            model.color(model.look(0), model.vertex_colors(0), [1.0, 0.0, 0.0], DVec3::splat(0.5), true),
+            DVec3::new(0.25, 0.5, 0.5)
+        );
     }
     // In the same buffer as the vertices, as exporters of binary files write it.
     let text =
@@ -297,7 +304,10 @@ fn textures_of_gltf_have_their_coordinates_and_places() {
 fn missing_pictures_of_gltf_are_warnings() {
     let parts = r#","textures":[{"source":0},{}],"images":[{"uri":"lost.png"}]"#;
     let model = read(&gltf(COLOR, parts)).unwrap();
-    assert_eq!(model.color(0, [1.0, 0.0, 0.0], DVec3::ONE, false), DVec3::splat(0.8));
+    assert_eq!(
+        model.color(model.look(0), model.vertex_colors(0), [1.0, 0.0, 0.0], DVec3::ONE, false),
+        DVec3::splat(0.8)
+    );
     assert_eq!(model.warnings(), ["there is no file `lost.png`: what has this picture is grey"]);
     let glow = r#""emissiveFactor":[1,1,1],"emissiveTexture":{"index":1}"#;
     let model = read(&gltf(glow, parts)).unwrap();
