@@ -83,6 +83,13 @@ fn library() -> Library {
         ("my wood.png", png(&levels(5, 3))),
         ("quads.gltf", quads_gltf(r#""baseColorTexture":{"index":0}"#)),
         ("turned.gltf", quads_gltf(TURNED)),
+        ("wood.obj", [&b"mtllib wood.mtl\nusemtl m\n"[..], ONE_LOOK].concat()),
+        ("wood.mtl", b"newmtl m\nKd .9 1 .7\nmap_Kd my wood.png\n".to_vec()),
+        ("bare.obj", ONE_LOOK.to_vec()),
+        (
+            "mirrored.gltf",
+            colorless(quads_gltf(r#""baseColorTexture":{"index":1},"baseColorFactor":[1,.5,.8,1]"#)),
+        ),
         ("leaf.png", leaf()),
         ("leaf.gltf", quads_gltf(LEAF)),
     ]))
@@ -107,6 +114,16 @@ const QUADS: &[u8] = b"mtllib quads.mtl\nv -1 -1 -.4 1 1 .5\nv 1 -1 -.4 .6 1 1\n
 const TURNED: &str = r#""baseColorFactor":[0.9,0.7,0.8,1],"baseColorTexture":{"index":1,"texCoord":1,"extensions":
     {"KHR_texture_transform":{"offset":[0.2,-0.1],"rotation":0.4,"scale":[1.5,-2.5]}}}},"emissiveFactor":[0.2,0.1,0.3],
     "emissiveTexture":{"index":0},"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":2}"#;
+
+/// Two triangles with normals, whose texture coordinates go beyond a picture.
+const ONE_LOOK: &[u8] =
+    b"v -1 -1 .3\nv 1 -1 0\nv 1 1 .1\nv -1 1 0\nvt -.7 -.2\nvt 1.6 .1\nvt 1.2 2.1\nvt -1.1 .9\nvn 0 .1 1\n\
+    vn .3 0 1\nf 1/1/1 2/2/2 3/3/1\nf 1/1/1 3/3/1 4/4/2\n";
+
+/// Returns a model without its colours.
+fn colorless(gltf: Vec<u8>) -> Vec<u8> {
+    String::from_utf8(gltf).unwrap().replace(r#""COLOR_0":3"#, r#""_COLOR":3"#).into_bytes()
+}
 
 /// A material with holes.
 const LEAF: &str = r#""baseColorTexture":{"index":2},"baseColorFactor":[1,1,1,0.9]},"alphaMode":"MASK","alphaCutoff":0.4,"extras":{"#;
@@ -175,7 +192,8 @@ const STAGE: &str = "Screen 80 60\nLook 3 2.5 5 0 .2 0 32\nBackground .9 .95 1 .
                      2 3 2\nMaterial floor ambient .1 .1 .1 diffuse .5 .5 .5\nMaterial red ambient .1 0 0 diffuse .8 .2 .1 shine .4 \
                      .4 .4 30\nMaterial chrome diffuse .1 .1 .1 mirror .8 .8 .8\nMaterial glassy glass .95 .97 1 1.5 shine .5 .5 .5 \
                      60\nMaterial own diffuse 1 1 1 own\nMaterial checks diffuse .9 .9 .9 checker .3 floor\nMaterial mixed own ambient .2 .2 .2 diffuse .9 .8 .7 checker .3 floor \
-                     mirror .2 .2 .2\nPlane 0 -1.05 0 0.02 1 \
+                     mirror .2 .2 .2\nMaterial wooden ambient .3 .2 .2 diffuse .6 .8 .7 image \"my wood.png\" uv\n\
+                     Material leafy diffuse .8 .8 .7 mirror .2 .2 .2 image \"leaf.png\" uv\nPlane 0 -1.05 0 0.02 1 \
                      .01 floor\n";
 
 fn scene(lines: &str) -> Scene {
@@ -272,6 +290,12 @@ fn the_packets_draw_meshes_like_the_reference() {
             "Mesh \"quads.obj\"",
             "Mesh \"quads.obj\" own flat",
             "Mesh \"quads.obj\" red",
+            "Mesh \"wood.obj\"",
+            "Mesh \"wood.obj\" own flat",
+            "Mesh \"wood.obj\" wooden",
+            "Mesh \"bare.obj\" wooden",
+            "Mesh \"bare.obj\" leafy",
+            "Sphere .4 .5 0 .3 red\nMesh \"mirrored.gltf\"\nMesh \"wood.obj\"",
             "Mesh \"quads.gltf\"",
             "Mesh \"turned.gltf\"",
             "Mesh \"turned.gltf\" mixed",

@@ -15,16 +15,17 @@ use crate::pictures::FacePicture;
 pub(super) struct Looked<E> {
     /// Texture coordinates at the corners, by corner and axis.
     coordinates: [[[E; 16]; 2]; 3],
-    /// The columns and rows around the place of a hit: left, right, first, second.
-    around: [[E; 16]; 4],
-    /// The values of the pixels there, by pixel and channel, the first row first.
-    values: [[[E; 16]; 3]; 4],
+    /// The columns and rows around the place of a hit, and the shares of the second of each: left, right, share, first, second,
+    /// share.
+    around: [[E; 16]; 6],
+    /// The values of the picture there.
+    values: [[E; 16]; 3],
 }
 
 impl<E: Real> Looked<E> {
     pub(super) fn new() -> Self {
         let nothing = [E::narrow(0.0); 16];
-        Self { coordinates: [[nothing; 2]; 3], around: [nothing; 4], values: [[nothing; 3]; 4] }
+        Self { coordinates: [[nothing; 2]; 3], around: [nothing; 6], values: [nothing; 3] }
     }
 
     /// Takes the texture coordinates of the face that a lane hits.
@@ -58,16 +59,13 @@ impl<E: Real> Looked<E> {
         let [width, height] = [picture.picture.width(), picture.picture.height()];
         let (left, right, across) = neighbours::<S, E>(simd, u, width, picture.wraps[0]);
         let (first, second, down) = neighbours::<S, E>(simd, v, height, picture.wraps[1]);
-        for (into, place) in self.around.iter_mut().zip([left, right, first, second]) {
+        for (into, place) in self.around.iter_mut().zip([left, right, across, first, second, down]) {
             place.store_slice(&mut into[..Lanes::<S, E>::LEN]);
         }
         self.read(picture, bits);
         let mut factors = Vec3::splat(simd, [E::narrow(1.0); 3]);
         for (factor, axis) in [&mut factors.x, &mut factors.y, &mut factors.z].into_iter().zip(0..) {
-            let [a, b, c, d] = &self.values;
-            let upper = mixed::<S, E>(load(simd, &a[axis]), load(simd, &b[axis]), across);
-            let lower = mixed::<S, E>(load(simd, &c[axis]), load(simd, &d[axis]), across);
-            let level = mixed::<S, E>(upper, lower, down);
+            let level = load::<S, E>(simd, &self.values[axis]);
             *factor = match picture.tint {
                 Some(tint) => (level * constant::<S, E>(simd, tint[axis])).max(one - one).min(one),
                 None => level,
@@ -76,32 +74,33 @@ impl<E: Real> Looked<E> {
         factors
     }
 
-    /// Reads the pixels around the places of hits.
+    /// Reads the pixels around the places of hits, and mixes them.
     #[inline(always)]
     fn read(&mut self, picture: &FacePicture, mut bits: u32) {
         let opaque = picture.picture.bytes_of_opaque(picture.is_linear);
         let width = picture.picture.width() as usize;
+        // The fourth number is none; four are computed at once.
+        let value = |column: usize, row: usize| -> [f64; 4] {
+            if let Some((bytes, levels)) = opaque
+                && let Some(&[r, g, b]) = bytes[3 * (row * width + column)..].first_chunk()
+            {
+                [levels[usize::from(r)], levels[usize::from(g)], levels[usize::from(b)], 0.0]
+            } else {
+                let value = picture.value(column as u32, row as u32);
+                [value.x, value.y, value.z, 0.0]
+            }
+        };
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize % 16;
             bits &= bits - 1;
-            let [left, right, first, second] = &self.around;
+            let [left, right, across, first, second, down] = &self.around;
             let [left, right] = [left[lane].to_index(), right[lane].to_index()];
             let [first, second] = [first[lane].to_index(), second[lane].to_index()];
-            let pixels = [(left, first), (right, first), (left, second), (right, second)];
-            for (into, (column, row)) in self.values.iter_mut().zip(pixels) {
-                let [red, green, blue] = into;
-                if let Some((bytes, levels)) = opaque
-                    && let Some(&[r, g, b]) = bytes[3 * (row * width + column)..].first_chunk()
-                {
-                    red[lane] = E::narrow(levels[usize::from(r)]);
-                    green[lane] = E::narrow(levels[usize::from(g)]);
-                    blue[lane] = E::narrow(levels[usize::from(b)]);
-                } else {
-                    let value = picture.value(column as u32, row as u32);
-                    red[lane] = E::narrow(value.x);
-                    green[lane] = E::narrow(value.y);
-                    blue[lane] = E::narrow(value.z);
-                }
+            let upper = mixed(value(left, first), value(right, first), across[lane].widen());
+            let lower = mixed(value(left, second), value(right, second), across[lane].widen());
+            let level = mixed(upper, lower, down[lane].widen());
+            for (into, value) in self.values.iter_mut().zip(level) {
+                into[lane] = E::narrow(value);
             }
         }
     }
@@ -141,8 +140,12 @@ fn neighbours<S: Simd, E: Real>(
 }
 
 #[inline(always)]
-fn mixed<S: Simd, E: Real>(a: Lanes<S, E>, b: Lanes<S, E>, share: Lanes<S, E>) -> Lanes<S, E> {
-    a + share * (b - a)
+fn mixed(a: [f64; 4], b: [f64; 4], share: f64) -> [f64; 4] {
+    let mut mixed = a;
+    for ((mixed, a), b) in mixed.iter_mut().zip(a).zip(b) {
+        *mixed = a + share * (b - a);
+    }
+    mixed
 }
 
 #[inline(always)]
