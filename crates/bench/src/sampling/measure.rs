@@ -28,13 +28,16 @@ pub struct Args {
     /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
     #[arg(long)]
     pub(super) targets: bool,
-    /// Measure small objects, patterned floors and random scenes instead, for sampling-small.md
+    /// Measure small objects instead, for sampling-small.md
     #[arg(long)]
     pub(super) small: bool,
-    /// The number of floors and of scenes for that page
+    /// The number of patterned floors and of random scenes
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) scenes: u64,
-    /// Only this effect
+    /// The seed of the first of them
+    #[arg(long, default_value_t = 1000)]
+    pub(super) seed: u64,
+    /// Only this effect, or `random`: the floors and scenes
     #[arg(long)]
     pub(super) only: Option<String>,
     /// Print the figures and write nothing

@@ -41,6 +41,9 @@ pub fn run(args: &Args) -> Result<()> {
     if args.small {
         return small::run(args);
     }
+    if args.only.as_deref() == Some("random") {
+        return report::renew_random(args, &small::at_random(args)?);
+    }
     let size = (args.width, args.width * 3 / 4);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let (mut drawn, mut agreements) = (vec![], vec![]);

@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use super::measure::{Agreement, Args, Drawn};
 use super::scenes::EFFECTS;
+use super::small;
 use crate::plot::{Labels, Series, log_log};
 use rayfold_files::OutputFile;
 
@@ -55,11 +56,11 @@ pub(super) fn write(
          thread, processor time of preparing and drawing, the shortest of three runs. An error is the root mean square over pixels \
          and channels, in levels (0..255) before rounding, from the truth: the same picture in `f64` with {truth} samples in every \
          pixel. Pairs of dimensions and independent samples are there for their errors: their points are worked out one by one, so \
-         that their times say little. What is smaller than a pixel, and whether the error that is asked for is met on patterned floors \
-         and random scenes, stands in [a report of its own](sampling-small.md).\n\n"
+         that their times say little.\n\n"
     );
     page.push_str(&slopes(drawn));
     page.push_str(&rays_saved(drawn));
+    page.push_str(&small::at_random(args)?);
     page.push_str(&agreement(agreements, args));
     page.push_str("## Error against time\n\n");
     for effect in &EFFECTS {
@@ -81,6 +82,20 @@ pub(super) fn write(
         writeln!(page, "![{}: {}]({file})\n", effect.name, effect.about)?;
     }
     OutputFile::write(folder.join("sampling.md"), page.trim_end().to_owned() + "\n", false)?;
+    Ok(())
+}
+
+/// Renews the part of the page on floors and scenes drawn at random, and leaves the rest.
+pub(super) fn renew_random(args: &Args, part: &str) -> Result<()> {
+    if args.check {
+        eprint!("{part}");
+        return Ok(());
+    }
+    let path = args.output.join("sampling.md");
+    let page = std::fs::read_to_string(&path)?;
+    let next = page.find("## Against").context("no page to renew")?;
+    let before = page.find(small::HEADING).unwrap_or(next);
+    OutputFile::write(path, format!("{}{part}{}", &page[..before], &page[next..]), false)?;
     Ok(())
 }
 

@@ -1,14 +1,14 @@
-//! Objects smaller than a pixel, patterned floors and random scenes: the light and the error of adaptive pictures.
+//! Objects smaller than a pixel, and patterned floors and random scenes: the light and the error of adaptive pictures.
 
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
 use glam::DVec3;
 use rayfold_scene::{Limits, Samples, Scene, Script, Tone, parse};
-use rayfold_tracer::{Drawing, Exposure, Means, RenderOptions};
+use rayfold_tracer::{Drawing, Exposure, Means, RenderOptions, Sampler};
 
 use super::drawn_at_random::{floor, scene};
-use super::measure::{Args, root_mean_square};
+use super::measure::Args;
 
 /// Widths of a wire, in pixels.
 const WIDTHS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
@@ -21,18 +21,16 @@ const SIZE: (u32, u32) = (120, 90);
 
 /// The most samples per pixel of those pictures, and the errors that they are asked for.
 const MOST: u32 = 1024;
-const ASKED: [f64; 2] = [4.0, 1.0];
+const ASKED: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 
 /// Measures, and writes sampling-small.md.
 pub(super) fn run(args: &Args) -> Result<()> {
-    let mut page = "# Sampling: what is small, and whether the error is met\n\n\
+    let mut page = "# Sampling: what is small\n\n\
                     Written by `rayfold-bench sampling --small`. An adaptive picture asks few samples who needs more. What is \
-                    narrower than a pixel they may miss altogether, and a floor whose cells are smaller than a pixel they may take \
-                    for even. Here stands what of that is left.\n\n"
+                    narrower than a pixel they may miss altogether. Here stands what of that is left.\n\n"
         .to_owned();
     wires(&mut page, args.truth)?;
     others(&mut page, args.truth)?;
-    at_random(&mut page, args)?;
     if args.check {
         eprint!("{page}");
         return Ok(());
@@ -47,9 +45,13 @@ fn script(text: &str) -> Result<Script> {
 
 /// Frame `k` of a script before it becomes levels.
 fn means(script: &Script, k: usize, samples: Samples) -> Result<Means> {
+    means_by(Sampler::default(), script, k, samples)
+}
+
+fn means_by(sampler: Sampler, script: &Script, k: usize, samples: Samples) -> Result<Means> {
     let scene = Scene { samples, ..script.frame(k).context("no such frame")? };
     let after = |frames| script.frame_after(k, frames).unwrap_or_else(|| scene.clone());
-    let options = RenderOptions::default();
+    let options = RenderOptions { sampler, ..RenderOptions::default() };
     let drawing = Drawing::exposed(Exposure::moving(&scene, &after), &options)?;
     drawing.draw_means()?.context("no kernels for this picture")
 }
@@ -154,10 +156,11 @@ fn others(page: &mut String, truth: u32) -> Result<()> {
     for (name, text) in pictures() {
         let script = script(&format!("{text}Trace\n"))?;
         let truth = means(&script, 0, Samples::new(truth, 0.0)?)?;
-        let all = Compared::new(&script, &means(&script, 0, Samples::new(256, 0.0)?)?, &truth)?;
+        let truth = [&truth; 2];
+        let all = Compared::new(&script, &means(&script, 0, Samples::new(256, 0.0)?)?, truth)?;
         for error in [4.0, 1.0, 0.25] {
             let drawn = means(&script, 0, Samples::new(256, error)?)?;
-            let row = Compared::new(&script, &drawn, &truth)?;
+            let row = Compared::new(&script, &drawn, truth)?;
             writeln!(
                 page,
                 "| {name} | {error} | {:.3} | {:.3} | {:.4} | {:.3} | {:.2} |",
@@ -196,28 +199,43 @@ struct Compared {
 }
 
 impl Compared {
-    fn new(script: &Script, drawn: &Means, truth: &Means) -> Result<Self> {
+    /// Of two truths that share no points, the product of the distances from both has a mean without their own errors.
+    fn new(script: &Script, drawn: &Means, truths: [&Means; 2]) -> Result<Self> {
         let scene = script.frame(0).context("no frame")?;
         let shown = |mean: DVec3| match scene.tone {
             Tone::Plain => mean,
             Tone::Srgb => DVec3::from_array(mean.to_array().map(encoded)),
         };
-        let pairs = drawn.means.iter().zip(&truth.means);
-        let errors: Vec<DVec3> = pairs.map(|(a, b)| 255.0 * (shown(*a) - shown(*b))).collect();
         let (width, height) = (scene.screen.width() as usize, scene.screen.height() as usize);
-        let mut blocks = vec![];
-        for top in (0..height / 10).map(|k| 10 * k) {
-            for left in (0..width / 10).map(|k| 10 * k) {
-                let rows =
-                    (top..top + 10).flat_map(|row| &errors[row * width + left..row * width + left + 10]);
-                blocks.push(rows.sum::<DVec3>() / 100.0);
+        let [a, b] = truths.map(|truth| {
+            let pairs = drawn.means.iter().zip(&truth.means);
+            pairs.map(|(a, b)| 255.0 * (shown(*a) - shown(*b))).collect::<Vec<DVec3>>()
+        });
+        let [of_a, of_b] = [&a, &b].map(|errors| {
+            let mut blocks = vec![];
+            for top in (0..height / 10).map(|k| 10 * k) {
+                for left in (0..width / 10).map(|k| 10 * k) {
+                    let rows =
+                        (top..top + 10).flat_map(|row| &errors[row * width + left..row * width + left + 10]);
+                    blocks.push(rows.sum::<DVec3>() / 100.0);
+                }
             }
-        }
+            blocks
+        });
+        let root = |a: &[DVec3], b: &[DVec3]| {
+            let products: f64 = a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum();
+            (products / (3 * a.len().max(1)) as f64).max(0.0).sqrt()
+        };
+        let both = a.iter().chain(&b);
         Ok(Self {
-            error: root_mean_square(&errors),
-            mean: errors.iter().sum::<DVec3>().element_sum() / (3 * errors.len()) as f64,
-            of_blocks: if blocks.is_empty() { 0.0 } else { root_mean_square(&blocks) },
-            worst: blocks.iter().map(|block| block.abs().max_element()).fold(0.0, f64::max),
+            error: root(&a, &b),
+            mean: both.sum::<DVec3>().element_sum() / (6 * a.len()) as f64,
+            of_blocks: root(&of_a, &of_b),
+            worst: of_a
+                .iter()
+                .zip(&of_b)
+                .map(|(a, b)| (0.5 * (*a + *b)).abs().max_element())
+                .fold(0.0, f64::max),
         })
     }
 }
@@ -226,30 +244,44 @@ fn encoded(light: f64) -> f64 {
     if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Floors and scenes whose numbers come from seeds.
-fn at_random(page: &mut String, args: &Args) -> Result<()> {
+pub(super) const HEADING: &str = "## Patterned floors and random scenes";
+
+/// A script of a seed, in a size.
+type Draw = fn(&mut fastrand::Rng, (u32, u32)) -> String;
+
+/// The pictures that are too far off.
+const OVER: f64 = 1.15;
+const MEAN: f64 = 0.05;
+const BLOCKS: f64 = 0.25;
+
+/// Measures floors and scenes whose numbers come from seeds; returns the part of the report on them.
+pub(super) fn at_random(args: &Args) -> Result<String> {
     let (width, height) = SIZE;
-    writeln!(
-        page,
-        "## Patterned floors and random scenes\n\n{} of each, {width} x {height}, at most {MOST} rays a pixel: checkered and striped floors to \
-         the horizon under `Tone srgb`, with lenses and soft light; and scenes of all that the language has. The error is given as a \
-         part of what was asked for, or of the error of {MOST} rays in every pixel where that is larger; the truth has {} rays in every \
-         pixel, whose own error is in it. Blocks are of 10 x 10 pixels.\n\n\
-         | pictures | e | error / e: mean | worst | over 1.15 | mean off by, at most | blocks / e: root mean square, worst picture | worst block | rays a pixel |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-        args.scenes, args.truth
-    )?;
-    type Draw = fn(&mut fastrand::Rng, (u32, u32)) -> String;
+    let truth = args.truth / 2;
+    let mut page = format!(
+        "{HEADING}\n\n{} of each, {width} x {height}, at most {MOST} rays a pixel: checkered and striped \
+         floors to the horizon under `Tone srgb`, with lenses and soft light; and scenes of all that the language has. Their seeds, \
+         from {} on, are not those by which numbers of the rule were chosen. Errors are in levels of the shown picture, as parts of *e*, \
+         or of the error of {MOST} rays in every pixel where that is larger. The truth is two pictures of {truth} rays in every pixel, \
+         whose points neither share with each other nor with the picture: the mean product of the distances from both is the \
+         square of the error without theirs. *Over* counts pictures above {OVER}, *mean off* those whose mean is off by more \
+         than {MEAN} levels, *blocks* those with a block of 10 x 10 pixels, in its worst channel, that is off by more than {BLOCKS} *e*.\n\n\
+         | pictures | e | error / e: mean | worst | over | largest mean | mean off | blocks / e: root mean square, worst picture | \
+         worst block / e | blocks | rays a pixel |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        args.scenes, args.seed
+    );
     for (name, draw) in [("floors", floor as Draw), ("scenes", scene as Draw)] {
         let mut found = vec![];
-        for seed in 0..args.scenes {
+        for seed in args.seed..args.seed + args.scenes {
             let text = draw(&mut fastrand::Rng::with_seed(seed), SIZE);
             let script = script(&text)?;
-            let truth = means(&script, 0, Samples::new(args.truth, 0.0)?)?;
-            let all = Compared::new(&script, &means(&script, 0, Samples::new(MOST, 0.0)?)?, &truth)?;
+            let others = |set| means_by(Sampler::Others(set), &script, 0, Samples::new(truth, 0.0)?);
+            let (a, b) = (others(0)?, others(1)?);
+            let all = Compared::new(&script, &means(&script, 0, Samples::new(MOST, 0.0)?)?, [&a, &b])?;
             for asked in ASKED {
                 let drawn = means(&script, 0, Samples::new(MOST, asked)?)?;
-                let row = Compared::new(&script, &drawn, &truth)?;
+                let row = Compared::new(&script, &drawn, [&a, &b])?;
                 eprintln!(
                     "{name} {seed}, an error of {asked}: {:.3} (everywhere {:.3}), mean {:.3}, blocks {:.3}, worst {:.3}, {:.1} rays",
                     row.error,
@@ -267,20 +299,45 @@ fn at_random(page: &mut String, args: &Args) -> Result<()> {
             let count = rows.len() as f64;
             let largest =
                 |of: &dyn Fn(&Compared) -> f64| rows.iter().map(|(.., row, _)| of(row)).fold(0.0, f64::max);
+            let beyond = |is: &dyn Fn(&Compared) -> bool| rows.iter().filter(|(.., row, _)| is(row)).count();
             let parts: Vec<f64> = rows.iter().map(|(_, allowed, row, _)| row.error / allowed).collect();
             writeln!(
                 page,
-                "| {name} | {asked} | {:.2} | {:.2} | {} | {:.3} | {:.3} | {:.2} | {:.1} |",
+                "| {name} | {asked} | {:.2} | {:.2} | {} | {:.3} | {} | {:.2} | {:.2} | {} | {:.1} |",
                 parts.iter().sum::<f64>() / count,
                 parts.iter().copied().fold(0.0, f64::max),
-                parts.iter().filter(|part| **part > 1.15).count(),
+                parts.iter().filter(|part| **part > OVER).count(),
                 largest(&|row| row.mean.abs()),
+                beyond(&|row| row.mean.abs() > MEAN),
                 largest(&|row| row.of_blocks) / asked,
-                largest(&|row| row.worst),
+                largest(&|row| row.worst) / asked,
+                beyond(&|row| row.worst > BLOCKS * asked),
                 rows.iter().map(|(.., rays)| rays).sum::<f64>() / count,
             )?;
         }
     }
     page.push('\n');
-    Ok(())
+    Ok(page)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pictures of the seeds that missed it when variation was counted in 32 columns and 33 rows, from three times the error on.
+    #[test]
+    fn the_error_that_is_asked_for_is_held() {
+        for (draw, seed, asked) in
+            [(scene as Draw, 38, 2.0), (scene, 2, 1.0), (floor, 0, 4.0), (floor, 1, 4.0)]
+        {
+            let script = script(&draw(&mut fastrand::Rng::with_seed(seed), SIZE)).unwrap();
+            let truth =
+                |set| means_by(Sampler::Others(set), &script, 0, Samples::new(256, 0.0).unwrap()).unwrap();
+            let drawn = means(&script, 0, Samples::new(256, asked).unwrap()).unwrap();
+            let Compared { error, mean, .. } =
+                Compared::new(&script, &drawn, [&truth(0), &truth(1)]).unwrap();
+            println!("{seed}, an error of {asked}: {error:.3}, mean {mean:.3}");
+            assert!(error <= OVER * asked && mean.abs() <= MEAN, "{seed}, {asked}: {error}, {mean}");
+        }
+    }
 }

@@ -113,6 +113,18 @@ pub enum Sampler {
     Pairs,
     /// Each for itself.
     Independent,
+    /// The default, with points of other pixels: a truth that shares none with a picture.
+    Others(u8),
+}
+
+impl Sampler {
+    /// Added to the column of a pixel, whose points it has then.
+    const fn aside(self) -> u32 {
+        match self {
+            Self::Sobol | Self::Pairs | Self::Independent => 0,
+            Self::Others(set) => 0x8000_0000 | (set as u32) << 16,
+        }
+    }
 }
 
 /// Samples whose coordinates are asked for at once, at most.
@@ -122,6 +134,8 @@ pub(crate) const BATCH: usize = 256;
 #[derive(Debug)]
 pub(crate) struct Points {
     sampler: Sampler,
+    /// Of the pixels whose points are taken: so many columns.
+    aside: u32,
     first: u32,
     /// A row for each dimension.
     rows: Vec<Vec<u32>>,
@@ -132,14 +146,20 @@ impl Points {
     pub(crate) fn new(dimensions: &Dimensions, sampler: Sampler, first: u32, end: u32) -> Self {
         let own = dimensions.count.min(sobol::OWN);
         let row = |dimension| (first..end).map(|sample| sobol::reversed(sample, dimension)).collect();
-        Self { sampler, first, rows: (0..own).map(row).collect() }
+        Self { sampler, aside: sampler.aside(), first, rows: (0..own).map(row).collect() }
+    }
+
+    /// What the points of a pixel are made from.
+    #[inline(always)]
+    pub(crate) const fn pixel_seed(&self, column: u32, row: u32) -> u32 {
+        pixel_seed(column.wrapping_add(self.aside), row)
     }
 
     /// The coordinate of a sample of a pixel along a dimension.
     #[inline(always)]
     pub(crate) fn coordinate(&self, dimension: usize, pixel_seed: u32, sample: u32) -> f64 {
         match self.sampler {
-            Sampler::Sobol => coordinate(pixel_seed, sample, dimension),
+            Sampler::Sobol | Sampler::Others(_) => coordinate(pixel_seed, sample, dimension),
             Sampler::Pairs => in_pairs(pixel_seed, sample, dimension),
             Sampler::Independent => independent(pixel_seed, sample, dimension),
         }
@@ -154,7 +174,8 @@ impl Points {
         samples: &[u32],
         into: &mut [f64],
     ) {
-        match self.rows.get(dimension).filter(|_| self.sampler == Sampler::Sobol) {
+        let is_sobol = matches!(self.sampler, Sampler::Sobol | Sampler::Others(_));
+        match self.rows.get(dimension).filter(|_| is_sobol) {
             Some(row) => {
                 // In two loops, of which the second has no branch and is done in packets.
                 let mut points = [0; BATCH];

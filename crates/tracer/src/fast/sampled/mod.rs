@@ -297,7 +297,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         image((width, rows.end - rows.start), |bytes| {
             bytes.par_chunks_exact_mut(CHANNELS * width as usize).enumerate().for_each(|(row, bytes)| {
                 let mut bytes = bytes.chunks_exact_mut(CHANNELS);
-                film.each_of_row(first + row, |color| {
+                film.each_shown_of_row(first + row, |color| {
                     let levels = match tone {
                         Tone::Plain => color.levels(),
                         Tone::Srgb => crate::fast::film::tone::levels(color.unit(), tone),
@@ -387,12 +387,8 @@ impl<E: Real> Job<'_, E> {
                     };
                     if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
                         let cover = band.cover.as_mut().map(|cover| cover.of_tile(column));
-                        let drawn = Drawn {
-                            pixels,
-                            first: band.first.as_mut(),
-                            cover,
-                            unsettled: &mut band.unsettled,
-                        };
+                        let drawn =
+                            Drawn { pixels, first: band.first.as_mut(), cover, judged: &mut band.judged };
                         tile::draw::<S, E, N>(simd, &pass, &tile, drawn, workspace);
                     }
                 }

@@ -21,9 +21,9 @@ use crate::fast::transport::paths::PathNumbers;
 use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
 use crate::parts;
-use crate::sampling::film::{BitRows, CoverTile, FirstRows, PassTargets, Pixel, quantised};
+use crate::sampling::film::{CoverTile, FirstRows, Judged, PassTargets, Pixel, quantised};
 use crate::sampling::places::on_disc;
-use crate::sampling::{BATCH, Dimensions, Points, pixel_seed};
+use crate::sampling::{BATCH, Dimensions, Points};
 
 /// Where a pixel shows no object.
 const NOTHING: u32 = u32::MAX;
@@ -115,8 +115,8 @@ pub(super) struct Drawn<'a, 'b> {
     pub(super) first: Option<&'a mut FirstRows<'b>>,
     /// The sums and the first samples of the cover, in scenes without background.
     pub(super) cover: Option<CoverTile<'a, 'b>>,
-    /// Who needs more samples in its row of tiles.
-    pub(super) unsettled: &'a mut BitRows<'b>,
+    /// What is known of the pixels of its row of tiles.
+    pub(super) judged: &'a mut Judged<'b>,
 }
 
 /// Draws the samples that a tile's pixels lack.
@@ -125,7 +125,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    Drawn { pixels, mut first, mut cover, unsettled }: Drawn,
+    Drawn { pixels, mut first, mut cover, judged }: Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
@@ -194,11 +194,9 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
         tile.each_wanted_pixel(pass.wanted, |at| {
             let (column, row) = (tile.left + at.0 as usize, at.1 as usize);
             let place = (column, tile.top + row);
-            let is_unsettled = pass.wanted.is_unsettled(&pixels[tile.in_tile(at)], place)
-                || cover
-                    .as_ref()
-                    .is_some_and(|cover| pass.wanted.is_unsettled(&cover.pixels[tile.in_tile(at)], place));
-            unsettled.set(column, row, is_unsettled);
+            let verdict = |pixels: &[Pixel]| pass.wanted.verdict(&pixels[tile.in_tile(at)], place);
+            let of_cover = cover.as_ref().map(|cover| verdict(cover.pixels));
+            judged.set(column, row, &verdict(pixels), of_cover.as_ref());
         });
     }
 }
@@ -339,7 +337,7 @@ fn set_moments<E: Real>(
         let (mut seeds, mut samples) = ([0; ROOM], [0; ROOM]);
         for (k, item) in batch.iter().enumerate() {
             let (column, row) = tile.in_image(item.pixel);
-            seeds[k] = pixel_seed(column, row);
+            seeds[k] = pass.points.pixel_seed(column, row);
             samples[k] = item.sample;
         }
         let rays = batch.len();
@@ -557,7 +555,7 @@ fn place<S: Simd, E: Real>(
                 let (column, row) = (pixels[0][k], pixels[1][k]);
                 (columns[k], rows[k]) =
                     (f64::from(column) - anchor.0, f64::from(pass.height - 1 - row) - anchor.1);
-                seeds[k] = pixel_seed(column, row);
+                seeds[k] = pass.points.pixel_seed(column, row);
             }
             let (seeds, samples) = (&seeds[..count], &samples[..count]);
             let [u, v, _] = coordinates;

@@ -31,13 +31,6 @@ impl Bits {
         Some(Self { words: zeroed(self.words.len())?, ..*self })
     }
 
-    /// The same pixels once more.
-    pub(super) fn copied(&self) -> Option<Self> {
-        let mut copy = self.empty()?;
-        copy.add(self);
-        Some(copy)
-    }
-
     pub(crate) fn rows(&self) -> usize {
         self.words.len() / self.stride
     }

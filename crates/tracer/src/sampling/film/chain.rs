@@ -18,7 +18,10 @@ const SLOPE_OF_PATHS: f64 = -0.5;
 
 /// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary
 /// ([`super::density`]), the fewer others there are that have less.
-pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 1.0];
+pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 0.9];
+
+/// A pixel varies if its error after [`SECOND`] samples is estimated at more than so many times the one that is asked for.
+pub(super) const VARYING: f64 = 1.5;
 
 /// Moments of the first samples.
 const FEW_MOMENTS: u32 = 16;
@@ -34,18 +37,28 @@ pub(super) struct SampleSchedule {
     /// The largest variance of the samples of a settled pixel, by how much varies around it and by the logarithm of their
     /// number to the base 2.
     limits: [[f64; u32::BITS as usize]; SPARED.len()],
+    /// The largest variance of the [`SECOND`] samples of a pixel that does not vary.
+    still: f64,
+}
+
+/// What the samples of a pixel say.
+pub(crate) struct Verdict {
+    /// Whether it needs more of them.
+    pub(crate) is_unsettled: bool,
+    /// Whether it counts as varying where that is counted.
+    pub(crate) is_varying: bool,
 }
 
 impl SampleSchedule {
     pub(super) fn new(samples: Samples, tone: Tone, step: u32, is_unclamped: bool) -> Self {
-        let slope = if is_unclamped { SLOPE_OF_PATHS } else { SLOPE };
-        let limits = SPARED.map(|spared| {
-            core::array::from_fn(|at| {
-                let limit = spared * samples.error() * libm::pow(f64::from(1_u32 << at), -slope);
-                limit * limit
-            })
-        });
-        Self { samples, step, tone, is_unclamped, limits }
+        // Where light goes round all pixels vary.
+        let (slope, spared) = if is_unclamped { (SLOPE_OF_PATHS, [1.0; _]) } else { (SLOPE, SPARED) };
+        let limit = |spared: f64, count: u32| {
+            let limit = spared * samples.error() * libm::pow(f64::from(count), -slope);
+            limit * limit
+        };
+        let limits = spared.map(|spared| core::array::from_fn(|at| limit(spared, 1 << at)));
+        Self { samples, step, tone, is_unclamped, limits, still: limit(VARYING, SECOND) }
     }
 
     /// Whether samples are not clamped.
@@ -103,14 +116,16 @@ impl SampleSchedule {
         }
     }
 
-    /// Whether a pixel needs more samples, by its own, where so much varies around it; nothing is said of what is under way
-    /// between two numbers.
+    /// What the samples of a pixel say where so much varies around it; nothing of what is under way between two numbers.
     #[inline(never)]
-    pub(super) fn is_unsettled(&self, pixel: &Pixel, density: usize) -> bool {
+    pub(super) fn verdict(&self, pixel: &Pixel, density: usize) -> Verdict {
         let count = pixel.count();
-        count < self.most()
-            && count.is_power_of_two()
-            && self.variance(pixel) > self.limits[density][count.trailing_zeros() as usize]
+        let is_asked = count < self.most() && count.is_power_of_two();
+        let variance = if is_asked { self.variance(pixel) } else { 0.0 };
+        Verdict {
+            is_unsettled: is_asked && variance > self.limits[density][count.trailing_zeros() as usize],
+            is_varying: variance > self.still,
+        }
     }
 
     #[inline(always)]

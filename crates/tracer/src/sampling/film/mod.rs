@@ -18,7 +18,6 @@ mod plan;
 use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
-pub(crate) use self::bits::BitRows;
 use self::chain::SampleSchedule;
 pub(crate) use self::cover::CoverTile;
 use self::cover::{CoverRows, Layer};
@@ -27,7 +26,7 @@ pub(crate) use self::floors::{Difference, Floors};
 use self::pixel::ONE;
 pub(crate) use self::pixel::{Pixel, quantised};
 use self::plan::Plan;
-pub(crate) use self::plan::{PassTargets, Work};
+pub(crate) use self::plan::{Judged, PassTargets, Work};
 use crate::parallel::CHANNELS;
 
 /// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
@@ -60,8 +59,8 @@ pub(crate) struct Band<'a> {
     pub(crate) first: Option<FirstRows<'a>>,
     /// The cover, in scenes without background.
     pub(crate) cover: Option<CoverRows<'a>>,
-    /// Who needs more samples; told by whoever adds some.
-    pub(crate) unsettled: BitRows<'a>,
+    /// What is known of its pixels, noted by what adds samples.
+    pub(crate) judged: Judged<'a>,
 }
 
 impl Film {
@@ -125,16 +124,14 @@ impl Film {
 
     /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
     pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, PassTargets<'_>) {
-        let (wanted, unsettled) = self.plan.split(self.side.1);
+        let (wanted, judged) = self.plan.split(self.side.1);
         let columns = self.size.0.div_ceil(self.side.0);
-        let tiles = self.tiles.chunks_mut(columns).zip(unsettled);
+        let tiles = self.tiles.chunks_mut(columns).zip(judged);
         let mut bands: Vec<Band<'_>> = match &mut self.first {
-            None => {
-                tiles.map(|(tiles, unsettled)| Band { tiles, first: None, cover: None, unsettled }).collect()
-            }
+            None => tiles.map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged }).collect(),
             Some(first) => {
                 let first = first.bands(self.size.0 * self.side.1).map(Some);
-                let band = |((tiles, unsettled), first)| Band { tiles, first, cover: None, unsettled };
+                let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged };
                 tiles.zip(first).map(band).collect()
             }
         };
@@ -158,13 +155,23 @@ impl Film {
     /// The colours of a row so far, from the left.
     #[inline(always)]
     pub(crate) fn each_of_row(&self, row: usize, each: impl FnMut(Color)) {
-        self.each_in_row((self.first.as_ref(), &self.tiles), row, each);
+        self.each_in_row((self.first.as_ref(), &self.tiles), row, Pixel::mean, each);
+    }
+
+    /// The same as they are shown, before the sRGB curve where there is one.
+    #[inline(always)]
+    pub(crate) fn each_shown_of_row(&self, row: usize, each: impl FnMut(Color)) {
+        if self.first.is_some() && self.plan.shows_raised() {
+            self.each_in_row((self.first.as_ref(), &self.tiles), row, Pixel::mean_before_curve, each);
+        } else {
+            self.each_of_row(row, each);
+        }
     }
 
     /// The covers of a row so far, from the left, in each channel of a colour; none where all is covered.
     pub(crate) fn each_cover_of_row(&self, row: usize, each: impl FnMut(Color)) {
         if let Some(Layer { first, tiles }) = &self.cover {
-            self.each_in_row((first.as_ref(), tiles), row, each);
+            self.each_in_row((first.as_ref(), tiles), row, Pixel::mean, each);
         }
     }
 
@@ -173,6 +180,7 @@ impl Film {
         &self,
         (first, tiles): (Option<&First>, &[Vec<Pixel>]),
         row: usize,
+        mean: impl Fn(&Pixel) -> DVec3,
         mut each: impl FnMut(Color),
     ) {
         let (columns, (across, down)) = (self.size.0, self.side);
@@ -182,25 +190,25 @@ impl Film {
             let samples = first.map(|first| first.run(row * columns + left..row * columns + right));
             let sums = if tile.is_empty() { &[] } else { &tile[row % down * across..][..right - left] };
             match samples {
-                None => sums.iter().for_each(|pixel| each(Color::Mean(pixel.mean()))),
+                None => sums.iter().for_each(|pixel| each(Color::Mean(mean(pixel)))),
                 Some(samples) if sums.is_empty() => samples.for_each(|sample| each(Color::Sample(sample))),
                 Some(samples) => {
                     for ((column, sample), pixel) in (left..).zip(samples).zip(sums) {
                         let has_many = self.plan.has_many(column, row);
-                        each(if has_many { Color::Mean(pixel.mean()) } else { Color::Sample(sample) });
+                        each(if has_many { Color::Mean(mean(pixel)) } else { Color::Sample(sample) });
                     }
                 }
             }
         }
     }
 
-    /// The means of the pixels, and how many samples each has.
+    /// The means of the pixels as they are shown, and how many samples each has.
     #[cfg(any(test, feature = "accuracy"))]
     pub(crate) fn means(&self) -> impl Iterator<Item = (DVec3, u32)> {
         let ((width, height), (across, down)) = (self.size, self.side);
         (0..height).flat_map(move |row| {
             let mut of_row = Vec::with_capacity(width);
-            self.each_of_row(row, |color| {
+            self.each_shown_of_row(row, |color| {
                 let column = of_row.len();
                 let tile = row / down * width.div_ceil(across) + column / across;
                 let count = match color {
@@ -244,7 +252,8 @@ impl Color {
 
 #[cfg(test)]
 mod tests {
-    use super::chain::{SLOPE, SPARED};
+    use super::chain::{SLOPE, SPARED, VARYING};
+    use super::density;
     use super::plan::{CONTRAST, MAX_ROUNDS};
     use super::*;
     use crate::reference::encoded;
@@ -291,8 +300,8 @@ mod tests {
                             let level = [draw(sample)];
                             pixel.add([&level; 3]);
                         }
-                        let is_unsettled = wanted.is_unsettled(pixel, (column, row));
-                        of_band.unsettled.set(at.0, at.1, is_unsettled);
+                        let verdict = wanted.verdict(pixel, (column, row));
+                        of_band.judged.set(at.0, at.1, &verdict, None);
                     }
                 }
             }
@@ -392,7 +401,7 @@ mod tests {
     fn who_goes_on_is_as_the_rule_says() {
         for seed in 0..200 {
             let mut dice = fastrand::Rng::with_seed(seed);
-            let size = (dice.u32(1..140), dice.u32(1..20));
+            let size = (dice.u32(1..140), dice.u32(1..40));
             let side = (dice.u32(1..40), dice.u32(1..20));
             let (most, tone) = (dice.u32(2..70), [Tone::Plain, Tone::Srgb][dice.usize(..2)]);
             let samples = Samples::new(most, 1.0).unwrap();
@@ -428,21 +437,23 @@ mod tests {
                     around(place).any(|other| (shown(other) - shown(place)).abs() > CONTRAST / 255.0)
                 })
                 .collect();
-            // Of columns in halves of words, and of as many rows above and below.
+            // Of columns in parts of words, and of as many rows above and below.
             let share = |varying: &[bool], place: usize| {
-                let (left, row) = (place % width / 32 * 32, place / width);
-                let rows = row.saturating_sub(16)..(row + 17).min(size.1 as usize);
+                let (columns, beside) = (density::COLUMNS, density::ROWS);
+                let (left, row) = (place % width / columns * columns, place / width);
+                let rows = row.saturating_sub(beside)..(row + beside + 1).min(size.1 as usize);
                 let around =
-                    rows.flat_map(|row| (left..(left + 32).min(width)).map(move |x| row * width + x));
+                    rows.flat_map(|row| (left..(left + columns).min(width)).map(move |x| row * width + x));
                 let (varying, all) =
                     around.fold((0, 0), |(v, all), at| (v + u32::from(varying[at]), all + 1));
                 usize::from(3 * varying >= all) * usize::from(varying > 0)
                     + usize::from(3 * varying >= 2 * all)
             };
             let mut density = vec![0; counts.len()];
+            let mut varying = vec![false; counts.len()];
             for round in 0..MAX_ROUNDS {
                 if round == 1 {
-                    density = (0..counts.len()).map(|place| share(&unsettled, place)).collect();
+                    density = (0..counts.len()).map(|place| share(&varying, place)).collect();
                 }
                 let next: Vec<u32> = (0..counts.len())
                     .map(|place| {
@@ -467,7 +478,10 @@ mod tests {
                     if next[place] > counts[place] {
                         let count = next[place];
                         let limit = SPARED[density[place]] * f64::from(count).powf(-SLOPE);
-                        unsettled[place] = count < most && pixel(place, count).variance(tone) > limit * limit;
+                        let variance = pixel(place, count).variance(tone);
+                        unsettled[place] = count < most && variance > limit * limit;
+                        let still = VARYING * f64::from(count).powf(-SLOPE);
+                        varying[place] = count < most && variance > still * still;
                     }
                 }
                 counts = next;
@@ -491,6 +505,36 @@ mod tests {
         equal.add_equal([0.5, 2.0, -1.0].map(quantised), 7);
         assert_eq!(equal.variance(Tone::Srgb), 0.0);
         assert!((equal.mean() - DVec3::new(0.5, 1.0, 0.0)).abs().max_element() < 1e-5);
+    }
+
+    /// Pixels with an edge through them, and a sample in each quarter.
+    #[test]
+    fn few_samples_are_hardly_darker_than_many_under_the_curve() {
+        const PIXELS: u32 = 20_000;
+        for (dark, bright) in [(0.0, 0.8), (0.1, 0.9)] {
+            let mut dice = fastrand::Rng::with_seed(5);
+            let (mut plain, mut raised) = (0.0, 0.0);
+            for _ in 0..PIXELS {
+                let (angle, aside) = (dice.f64() * core::f64::consts::TAU, dice.f64() - 0.5);
+                let color = |x: f64, y: f64| {
+                    let is_bright = (x - 0.5) * angle.cos() + (y - 0.5) * angle.sin() > aside;
+                    if is_bright { bright } else { dark }
+                };
+                let middles = (0..256)
+                    .map(|k| color((f64::from(k % 16) + 0.5) / 16.0, (f64::from(k / 16) + 0.5) / 16.0));
+                let exact = encoded(middles.sum::<f64>() / 256.0);
+                let mut pixel = Pixel::default();
+                for quarter in 0..4 {
+                    let (x, y) = (f64::from(quarter % 2) + dice.f64(), f64::from(quarter / 2) + dice.f64());
+                    pixel.add([&[quantised(color(0.5 * x, 0.5 * y))]; 3]);
+                }
+                plain += encoded(pixel.mean().x) - exact;
+                raised += encoded(pixel.mean_before_curve().x) - exact;
+            }
+            let [plain, raised] = [plain, raised].map(|sum| 255.0 * sum / f64::from(PIXELS));
+            println!("{dark} and {bright}: {plain:.3} and {raised:.3} levels");
+            assert!(plain < -1.0 && raised.abs() < 0.6 * plain.abs(), "{dark} {bright}: {plain} {raised}");
+        }
     }
 
     #[test]

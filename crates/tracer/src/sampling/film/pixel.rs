@@ -20,6 +20,10 @@ pub(crate) struct Pixel {
     count: u32,
 }
 
+/// The sRGB curve is a line up to here, and a power beyond it; by so much the power differs from 1.
+const LINEAR: f64 = 0.003_130_8;
+const BENT: f64 = 1.0 - 1.0 / 2.4;
+
 /// The brightest sample that is not clamped, in parts of [`ONE`].
 const BRIGHTEST: f64 = (1u64 << 46) as f64;
 
@@ -84,6 +88,30 @@ impl Pixel {
         mean.clamp(DVec3::ZERO, DVec3::ONE)
     }
 
+    /// The mean as it goes through the sRGB curve. Of means that err, the curve shows one that is too dark: it is raised by the
+    /// second-order term of that.
+    pub(crate) fn mean_before_curve(&self) -> DVec3 {
+        let (count, mean) = (f64::from(self.count), self.mean());
+        // The variance of a mean of n is that of its samples times about n^(-5/4).
+        let of_mean = 1.0 / (count * count.sqrt().sqrt() * (ONE * ONE));
+        let raised = core::array::from_fn(|channel| {
+            let light = mean[channel];
+            if light < LINEAR || self.count < 2 {
+                return light;
+            }
+            (light + BENT * of_mean * self.spread(channel) / (2.0 * light)).min(1.0)
+        });
+        DVec3::from_array(raised)
+    }
+
+    /// The variance of the samples of a channel, in squares of parts.
+    #[inline(always)]
+    fn spread(&self, channel: usize) -> f64 {
+        let mean = self.sum[channel] as f64 * (1.0 / f64::from(self.count));
+        let spread = (self.squares[channel] as f64 - self.sum[channel] as f64 * mean).max(0.0);
+        spread / (f64::from(self.count) - 1.0)
+    }
+
     /// The variance of samples that are not clamped, in squares of levels: the mean over the channels. Where the mean is
     /// far beyond black or white, the samples make no difference.
     pub(super) fn unclamped_variance(&self, tone: Tone) -> f64 {
@@ -113,8 +141,7 @@ impl Pixel {
         let mut sum = 0.0;
         for channel in 0..CHANNELS {
             let mean = self.sum[channel] as f64 * of_count;
-            let spread = (self.squares[channel] as f64 - self.sum[channel] as f64 * mean).max(0.0);
-            let spread = spread / (f64::from(self.count) - 1.0);
+            let spread = self.spread(channel);
             let slope = match tone {
                 Tone::Plain => 1.0,
                 Tone::Srgb => slope(mean / ONE, spread.sqrt() / ONE),

@@ -8,10 +8,11 @@
 //! What is smaller than a pixel may be missed by all first samples of all pixels that it is in. Where it can be is known
 //! beforehand ([`Floors`]): those pixels go on to a number that does not depend on what their samples show.
 
+use rayfold_scene::Tone;
 use rayon::prelude::*;
 
 use super::bits::{BitRows, Bits, widened};
-use super::chain::SampleSchedule;
+use super::chain::{SampleSchedule, Verdict};
 use super::density::Density;
 use super::first::First;
 use super::floors::Floors;
@@ -59,11 +60,11 @@ impl PassTargets<'_> {
         self.chain.moments(sample, all)
     }
 
-    /// Whether the pixel of a column and row needs more samples once it has got what it is given, by its own; of no
-    /// consequence between two numbers of the chain.
+    /// What the samples of the pixel of a column and row say once it has got what it is given; of no consequence between two
+    /// numbers of the chain.
     #[inline(always)]
-    pub(crate) fn is_unsettled(&self, pixel: &Pixel, (column, row): (usize, usize)) -> bool {
-        self.chain.is_unsettled(pixel, self.density.map_or(0, |density| density.at(column, row)))
+    pub(crate) fn verdict(&self, pixel: &Pixel, (column, row): (usize, usize)) -> Verdict {
+        self.chain.verdict(pixel, self.density.map_or(0, |density| density.at(column, row)))
     }
 }
 
@@ -76,11 +77,32 @@ pub(crate) struct Work {
     pub(crate) ahead: u64,
 }
 
+/// What is known of the pixels of some rows once they have got their samples.
+pub(crate) struct Judged<'a> {
+    unsettled: BitRows<'a>,
+    /// While it counts.
+    varying: Option<BitRows<'a>>,
+}
+
+impl Judged<'_> {
+    /// Notes what the samples of a pixel say, and those of its cover.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, column: usize, row: usize, verdict: &Verdict, of_cover: Option<&Verdict>) {
+        let any = |of: fn(&Verdict) -> bool| of(verdict) || of_cover.is_some_and(of);
+        self.unsettled.set(column, row, any(|verdict| verdict.is_unsettled));
+        if let Some(varying) = &mut self.varying {
+            varying.set(column, row, any(|verdict| verdict.is_varying));
+        }
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Plan {
     chain: SampleSchedule,
     /// Whose error is too large.
     unsettled: Bits,
+    /// Who counts as varying; empty once that was counted.
+    varying: Bits,
     /// Who gets some number of samples in any case.
     pub(super) floors: Floors,
     /// How much varies around each pixel, once those that differ from a neighbour have the second number of the chain.
@@ -113,6 +135,7 @@ impl Plan {
         Some(Self {
             chain,
             unsettled: none()?,
+            varying: none()?,
             floors: Floors::default(),
             density: None,
             at_least: vec![],
@@ -132,6 +155,11 @@ impl Plan {
         Some(())
     }
 
+    /// Whether means are raised before they are shown.
+    pub(super) fn shows_raised(&self) -> bool {
+        self.chain.tone() == Tone::Srgb && !self.chain.is_unclamped()
+    }
+
     /// Whether a pixel has the second number of the chain.
     #[inline(always)]
     pub(super) fn has_many(&self, column: usize, row: usize) -> bool {
@@ -139,11 +167,13 @@ impl Plan {
     }
 
     /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
-    pub(super) fn split(&mut self, rows: usize) -> (PassTargets<'_>, impl Iterator<Item = BitRows<'_>>) {
+    pub(super) fn split(&mut self, rows: usize) -> (PassTargets<'_>, impl Iterator<Item = Judged<'_>>) {
         let is_first_look = self.stage == Stage::First && self.chain.has_error();
         let density = self.density.as_ref();
         let wanted = PassTargets { chain: &self.chain, density, pixels: &self.wanted, is_first_look };
-        (wanted, self.unsettled.bands(rows))
+        let mut varying = self.varying.bands(rows);
+        let judged = move |unsettled| Judged { unsettled, varying: varying.next() };
+        (wanted, self.unsettled.bands(rows).map(judged))
     }
 
     /// The numbers of samples from and to which pixels of a place of the chain go in this pass, if they do.
@@ -221,7 +251,8 @@ impl Plan {
         } else {
             self.count()?;
             if self.density.is_none() {
-                self.density = Some(Density::of(self.unsettled.copied()?, &self.floors)?);
+                let varying = core::mem::replace(&mut self.varying, Bits::none((1, 0))?);
+                self.density = Some(Density::of(varying, &self.floors)?);
             }
         }
         self.stage = Stage::Later;
