@@ -1,6 +1,6 @@
 // Messages between the page, the worker of its session, and the workers that draw.
 
-import type { File } from "./module";
+import type { File, Program } from "./module";
 
 /** What a page opens. */
 export type Place =
@@ -40,5 +40,5 @@ export type ToPage =
 
 /** To a worker that draws, encodes, or draws frames. */
 export type ToWorker =
-  | { readonly is: "start"; readonly module: WebAssembly.Module }
+  | { readonly is: "start"; readonly program: Program }
   | { readonly is: "call"; readonly what: number; readonly number: number; readonly bytes: Uint8Array; readonly answers: boolean };
