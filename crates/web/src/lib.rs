@@ -134,7 +134,12 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
         21 => return reel.as_ref().ok_or("nothing is rendered")?.draw(number as usize).map_err(message),
         22 => reel.as_mut().ok_or("nothing is rendered")?.push(&bytes).map_err(message)?,
         23 => return reel.take().ok_or("nothing is rendered")?.finish().map_err(message),
-        30 => return unzipped(&bytes).map(|files| packed(&files)).map_err(message),
+        30 => {
+            // The names of files that are left out come first, as a list in a file without name.
+            let (mut files, left_out) = unzipped(&bytes).map_err(message)?;
+            files.insert(0, (String::new(), left_out.join(", ").into()));
+            return Ok(packed(&files));
+        }
         31 => return zipped(&unpacked(&bytes)?).map_err(message),
         40 => provide_font(bytes),
         _ => return Err(format!("there is no call {what}")),

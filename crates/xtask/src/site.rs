@@ -79,6 +79,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
 fn module(root: &Path, features: &str) -> anyhow::Result<PathBuf> {
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--locked", "--profile", "web", "--package", "rayfold-web", "--target", TARGET]);
+    cargo.arg("--target-dir").arg(root.join("target"));
     // Messages of panics name the sources of dependencies, without the folder where this machine has them.
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;

@@ -89,7 +89,7 @@ export class Session {
     else {
       const answer = await fetch(place.address);
       if (!answer.ok) throw new Error(`there is no example ${place.name}`);
-      files = this.#unzip(new Uint8Array(await answer.arrayBuffer()));
+      files = this.#unzip(new Uint8Array(await answer.arrayBuffer())).slice(1);
     }
     const name = await keep(place.name, files);
     this.#folder = await project(name);
@@ -121,6 +121,7 @@ export class Session {
     setInterval(() => void look().catch(() => undefined), DISK);
   }
 
+  /** The names of files that are left out, as the content of a file without name, and the files. */
   #unzip(zip: Uint8Array): File[] {
     return unpacked(this.#call(Call.unzip, 0, zip));
   }

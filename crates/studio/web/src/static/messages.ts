@@ -18,6 +18,7 @@ export type Question =
   | { readonly is: "projects" }
   | { readonly is: "remove"; readonly name: string }
   | { readonly is: "zip" }
+  /** The names of files that are left out, as the content of a file without name, and the files of a zip file. */
   | { readonly is: "unzip"; readonly content: Uint8Array }
   /** The name of a new project of these files. */
   | { readonly is: "import"; readonly name: string; readonly files: readonly File[] }
