@@ -73,7 +73,7 @@ fn note(text: &str) {
     writeln!(std::io::stderr(), "studio: {text}").expect("standard error");
 }
 
-/// Builds the page without a server, and returns its folder, or what is missing.
+/// Builds a draft of the page without a server, and returns its folder, or what is missing.
 fn site() -> Result<PathBuf, String> {
     const TARGET: &str = "wasm32-unknown-unknown";
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -84,9 +84,13 @@ fn site() -> Result<PathBuf, String> {
         return Err(format!("its target is not installed: `rustup target add {TARGET}`"));
     }
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-    let status = Command::new(cargo).args(["xtask", "site"]).current_dir(&root).stdin(Stdio::null()).status();
-    assert!(status.is_ok_and(|status| status.success()), "`cargo xtask site` fails: see above");
-    Ok(root.join("target/site"))
+    let status = Command::new(cargo)
+        .args(["xtask", "site", "--draft"])
+        .current_dir(&root)
+        .stdin(Stdio::null())
+        .status();
+    assert!(status.is_ok_and(|status| status.success()), "`cargo xtask site --draft` fails: see above");
+    Ok(root.join("target/site-draft"))
 }
 
 /// Returns the browser, or the missing tool.

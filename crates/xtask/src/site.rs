@@ -19,8 +19,7 @@ use crate::toolchain::{self, say};
 const TARGET: &str = "wasm32-unknown-unknown";
 
 /// The variants of the module, and the instructions of each: `src/static/variant.ts` chooses.
-const MODULES: [(&str, &str); 2] =
-    [("relaxed.wasm", "+simd128,+relaxed-simd"), ("rayfold.wasm", "+simd128")];
+const MODULES: [(&str, &str); 2] = [("relaxed.wasm", "+simd128,+relaxed-simd"), ("rayfold.wasm", "+simd128")];
 
 /// The font of letters that name none, which the module lacks.
 const FONT: &str = "font.ttf";
@@ -31,18 +30,21 @@ const LARGEST: u64 = 3 << 19;
 /// The page of the studio, as the start page names it.
 const STUDIO: &str = "studio.html";
 
-/// Builds the site.
-pub(crate) fn run() -> anyhow::Result<()> {
+/// Builds the site. A draft is for tests: both modules are the one that every browser runs, and nothing is compressed.
+pub(crate) fn run(draft: bool) -> anyhow::Result<()> {
     let root = root()?;
-    let (web, site) = (root.join("crates/studio/web"), root.join("target/site"));
+    let web = root.join("crates/studio/web");
+    let site = root.join(if draft { "target/site-draft" } else { "target/site" });
     ensure!(
         web.join("node_modules").is_dir(),
         "the page's packages are not installed: `npm ci` in crates/studio/web"
     );
     let mut npm = Command::new("npm");
-    toolchain::run(npm.args(["run", "site"]).current_dir(&web))?;
+    toolchain::run(npm.args(["run", "site", "--", "--outDir"]).arg(&site).current_dir(&web))?;
     for (file, features) in MODULES {
-        fs::copy(module(&root, features)?, site.join(file)).with_context(|| format!("cannot copy {file}"))?;
+        let features = if draft { MODULES[1].1 } else { features };
+        let built = module(&root, features, draft)?;
+        fs::copy(built, site.join(file)).with_context(|| format!("cannot copy {file}"))?;
     }
 
     fs::write(site.join(FONT), notosans::BOLD_TTF)?;
@@ -64,6 +66,9 @@ pub(crate) fn run() -> anyhow::Result<()> {
     let (names, version) = kept(&site)?;
     let offline = read("offline.js")?.replace("@VERSION@", &version).replace("\"@FILES@\"", &names);
     fs::write(site.join("offline.js"), offline)?;
+    if draft {
+        return Ok(());
+    }
     let mut node = Command::new("node");
     toolchain::run(node.arg("compress.mjs").arg(&site).current_dir(&web))?;
     for (file, _) in MODULES {
@@ -76,16 +81,20 @@ pub(crate) fn run() -> anyhow::Result<()> {
 }
 
 /// Builds the module with these features of WebAssembly, and returns its path.
-fn module(root: &Path, features: &str) -> anyhow::Result<PathBuf> {
+fn module(root: &Path, features: &str, draft: bool) -> anyhow::Result<PathBuf> {
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--locked", "--profile", "web", "--package", "rayfold-web", "--target", TARGET]);
     cargo.arg("--target-dir").arg(root.join("target"));
     // Messages of panics name the sources of dependencies, without the folder where this machine has them.
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
+    let home =
+        home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
     let flags = [format!("-Ctarget-feature={features}"), format!("--remap-path-prefix={}=", home.display())];
     // Beside those of `.cargo/config.toml`.
     cargo.arg("--config").arg(format!("target.{TARGET}.rustflags={flags:?}"));
+    if draft {
+        cargo.args(["--config", "profile.web.lto=false"]);
+    }
     toolchain::run(cargo.current_dir(root))
         .with_context(|| format!("`rustup target add {TARGET}` is needed once"))?;
     Ok(root.join("target").join(TARGET).join("web/rayfold_web.wasm"))
@@ -132,7 +141,8 @@ fn kept(site: &Path) -> anyhow::Result<(String, String)> {
     for (folder, prefix) in [(site.to_owned(), ""), (site.join("examples"), "examples/")] {
         for entry in fs::read_dir(folder)? {
             let name = entry?.file_name().to_string_lossy().into_owned();
-            let is_app = prefix.is_empty() && ["js", "css", "html", "ttf"].iter().any(|end| name.ends_with(end));
+            let is_app =
+                prefix.is_empty() && ["js", "css", "html", "ttf"].iter().any(|end| name.ends_with(end));
             if (is_app && !["offline.js", "index.html"].contains(&name.as_str())) || name.ends_with(".zip") {
                 names.push(format!("{prefix}{name}"));
             }
@@ -140,7 +150,9 @@ fn kept(site: &Path) -> anyhow::Result<(String, String)> {
     }
     names.sort();
     let mut hasher = DefaultHasher::new();
-    for name in names.iter().map(String::as_str).chain(MODULES.map(|(file, _)| file)).filter(|name| *name != "./") {
+    for name in
+        names.iter().map(String::as_str).chain(MODULES.map(|(file, _)| file)).filter(|name| *name != "./")
+    {
         (name, fs::read(site.join(name))?).hash(&mut hasher);
     }
     let list: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();

@@ -13,16 +13,12 @@ use rayfold_scene::Screen;
 
 use super::drawer::{Rows, Sketch};
 use crate::clock::Instant;
-use crate::pace::{Effort, FEW, GROWTH, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller};
+use crate::pace::{Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller};
 use crate::packing::{Packer, Picture, Quality};
 use crate::wanted::Wanted;
 
 /// The time for the rows that a worker draws at once, in seconds.
 const PIECE: f64 = 0.1;
-
-/// The largest number of pictures that the page has not shown yet while something moves: while it shows one, workers draw
-/// the next.
-const MOVING_UNDER_WAY: u32 = 2;
 
 /// The rows of a tile of the tracer.
 const TILE: u32 = 16;

@@ -41,7 +41,7 @@ async function open(t, where) {
 
 async function gif(page) {
   await page.click("::-p-aria(Render GIF)");
-  await (await page.waitForSelector("::-p-aria(Download GIF)", { timeout: 120_000 })).click();
+  await (await page.waitForSelector(".result a.button", { timeout: 120_000 })).click();
   await page.waitForFunction(() => globalThis.saved);
   const text = await page.evaluate(async () => {
     const bytes = new Uint8Array(await globalThis.saved.arrayBuffer());

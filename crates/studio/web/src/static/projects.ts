@@ -97,7 +97,8 @@ export async function keep(name: string, files: readonly File[]): Promise<string
   return own;
 }
 
-async function nameFor(name: string, files: readonly File[]): Promise<string> {
+/** Returns a name for a project of these files: this one, unless a project of this name has other files. */
+export async function nameFor(name: string, files: readonly File[]): Promise<string> {
   const plain = name.replace(/[^\p{L}\p{N} ._-]/gu, "-").replace(/^\.+/, "").slice(0, 80) || "scene";
   const known = new Set(await projects());
   for (let number = 1; ; number += 1) {
