@@ -6,7 +6,7 @@ import { Film } from "./film";
 import { Helper } from "./helper";
 import type { Place, Question, ToDesk, ToPage } from "./messages";
 import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File, type Program } from "./module";
-import { Folder, keep, nameFor, project, projects, remove } from "./projects";
+import { Folder, keep, project, projects, remove } from "./projects";
 
 /** The milliseconds between two looks at the files. */
 const TICK = 250;
@@ -91,10 +91,8 @@ export class Session {
       if (!answer.ok) throw new Error(`there is no example ${place.name}`);
       files = this.#unzip(new Uint8Array(await answer.arrayBuffer())).slice(1);
     }
-    const name = await nameFor(place.name, files);
+    const name = await keep(place.name, files);
     this.#folder = await project(name);
-    // The picture does not wait for the browser's storage.
-    for (const file of files) void this.#write(file);
     return { name, files };
   }
 
