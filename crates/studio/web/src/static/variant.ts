@@ -1,5 +1,5 @@
 // The variants of the module. `relaxed.wasm` multiplies and adds in one instruction, and may run only where that rounds once: then
-// it draws the same pictures as `rayfold.wasm`, which computes them from plain instructions, ten times as slowly.
+// it draws the same pictures as `rayfold.wasm`, which computes them from plain instructions, several times as slowly.
 
 /** A module with a function of x and y: whether x² + c, with relaxed instructions, keeps the bits that rounding x² would lose. */
 const TEST = "AGFzbQEAAAABBwFgAn18AX8DAgEABwQBAAAACkMBQQAgAP0TIAD9E0MAEIC//RP9hQL9HwBDAAAAAFwgAf0UIAH9FEQAAAAEAADwv/0U/YcC/SEARAAAAAAAAAAAYnEL";
