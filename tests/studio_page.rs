@@ -30,28 +30,34 @@ const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 /// The first version of Node with all features that the tests use.
 const NODE: u32 = 20;
 
+/// The tests of the page without a server.
+const OF_THE_SITE: &str = "tests/site.mjs";
+const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
+
 #[test]
 fn the_page_does_in_a_browser_what_it_promises() {
     let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studio/web");
     let browser = match tools(&web) {
         Ok(browser) => browser,
-        Err(missing) => {
-            // `eprintln!` would print nothing in a test that passes.
-            writeln!(std::io::stderr(), "studio: the page was NOT TESTED: {missing}")
-                .expect("standard error");
-            return;
-        }
+        Err(missing) => return note(&format!("the page was NOT TESTED: {missing}")),
     };
     let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
     let mut node = Command::new("node");
     // One after the other, because each uses all cores.
     node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
-    match found(&FIREFOX) {
-        Ok(firefox) => drop(node.arg(IN_FIREFOX).env("FIREFOX", firefox)),
+    let site = match site() {
+        Ok(site) => Some(node.arg(OF_THE_SITE).env("SITE", site)).is_some(),
         Err(missing) => {
-            writeln!(std::io::stderr(), "studio: the page was NOT TESTED in Firefox: {missing}")
-                .expect("standard error");
+            note(&format!("the page without a server was NOT TESTED: {missing}"));
+            false
         }
+    };
+    match found(&FIREFOX) {
+        Ok(firefox) => {
+            node.arg(IN_FIREFOX).env("FIREFOX", firefox);
+            node.args(site.then_some(OF_THE_SITE_IN_FIREFOX));
+        }
+        Err(missing) => note(&format!("the page was NOT TESTED in Firefox: {missing}")),
     }
     if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
         // The functions were built with this test. Without them `rayfold dev` builds them itself.
@@ -60,6 +66,31 @@ fn the_page_does_in_a_browser_what_it_promises() {
     node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", browser).stdin(Stdio::null());
     let status = node.status().expect("node runs");
     assert!(status.success(), "see above which of the page's tests failed");
+}
+
+/// Prints a line; `eprintln!` would print nothing in a test that passes.
+fn note(text: &str) {
+    writeln!(std::io::stderr(), "studio: {text}").expect("standard error");
+}
+
+/// Builds a draft of the page without a server, and returns its folder, or what is missing.
+fn site() -> Result<PathBuf, String> {
+    const TARGET: &str = "wasm32-unknown-unknown";
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
+    let libraries = Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]).output();
+    let libraries = libraries.map_err(|error| format!("there is no rustc: {error}"))?;
+    if !Path::new(String::from_utf8_lossy(&libraries.stdout).trim()).is_dir() {
+        return Err(format!("its target is not installed: `rustup target add {TARGET}`"));
+    }
+    let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
+    let status = Command::new(cargo)
+        .args(["xtask", "site", "--draft"])
+        .current_dir(&root)
+        .stdin(Stdio::null())
+        .status();
+    assert!(status.is_ok_and(|status| status.success()), "`cargo xtask site --draft` fails: see above");
+    Ok(root.join("target/site-draft"))
 }
 
 /// Returns the browser, or the missing tool.

@@ -41,6 +41,8 @@ pub use closure::Closure;
 pub use decode::decode;
 pub use error::AssetError;
 pub use files::{FileInfo, Files, MemoryFiles, NameFault, NoFiles, file_name, same_but_for_case};
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+pub use letters::provide_font;
 pub use letters::{Align, LetterError, Lettering};
 pub use library::{Library, Purpose};
 pub use model::{Colors, Look, Model, Smoothing};

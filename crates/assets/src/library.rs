@@ -234,7 +234,7 @@ impl Library {
             return Ok(font.clone());
         }
         let font = match file {
-            None => Font::built_in(),
+            None => Font::built_in().map_err(|fault| fault.of_font("NotoSans-Bold.ttf"))?,
             Some((name, _)) => {
                 Font::read(content(&*self.files, name)?).map_err(|fault| fault.of_font(name))?
             }

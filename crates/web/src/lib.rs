@@ -82,11 +82,15 @@ pub extern "C" fn call(what: u32, number: u32, time: f64) -> usize {
 }
 
 #[cfg(target_arch = "wasm32")]
-use rayfold_studio::browser::set_time;
+use rayfold_studio::browser::{provide_font, set_time};
 
-/// Elsewhere the system tells the time.
+/// Elsewhere the system knows the time.
 #[cfg(not(target_arch = "wasm32"))]
 fn set_time(_: u64) {}
+
+/// Elsewhere the font is a part of the program.
+#[cfg(not(target_arch = "wasm32"))]
+fn provide_font(_: Vec<u8>) {}
 
 /// Runs a call. The numbers are those of `Call` in `module.ts`.
 fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<u8>, String> {
@@ -96,7 +100,7 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
             // The first one is the project, and its name is all of it.
             let mut files = unpacked(&bytes)?.into_iter();
             let (name, _) = files.next().ok_or("a project has a name")?;
-            let opened = Desk::open(&name, files.collect(), number as usize).map_err(told)?;
+            let opened = Desk::open(&name, files.collect(), number as usize).map_err(message)?;
             return Ok(written(desk.insert(opened).effects()));
         }
         1..=7 => {
@@ -119,19 +123,25 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
             let drawer = drawer.get_or_insert_default();
             unpacked(&bytes)?.into_iter().for_each(|(name, content)| drawer.put(&name, content));
         }
-        11 => return drawer.get_or_insert_default().draw(&text(bytes)?).map_err(told),
+        11 => return drawer.get_or_insert_default().draw(&text(bytes)?).map_err(message),
         20 => {
             // The first one is the format.
             let mut files = unpacked(&bytes)?.into_iter();
             let (format, _) = files.next().ok_or("a file has a format")?;
-            let begun = Reel::new(files.collect(), &format).map_err(told)?;
+            let begun = Reel::new(files.collect(), &format).map_err(message)?;
             return Ok((reel.insert(begun).count() as u32).to_le_bytes().into());
         }
-        21 => return reel.as_ref().ok_or("nothing is rendered")?.draw(number as usize).map_err(told),
-        22 => reel.as_mut().ok_or("nothing is rendered")?.push(&bytes).map_err(told)?,
-        23 => return reel.take().ok_or("nothing is rendered")?.finish().map_err(told),
-        30 => return unzipped(&bytes).map(|files| packed(&files)).map_err(told),
-        31 => return zipped(&unpacked(&bytes)?).map_err(told),
+        21 => return reel.as_ref().ok_or("nothing is rendered")?.draw(number as usize).map_err(message),
+        22 => reel.as_mut().ok_or("nothing is rendered")?.push(&bytes).map_err(message)?,
+        23 => return reel.take().ok_or("nothing is rendered")?.finish().map_err(message),
+        30 => {
+            // The names of files that are left out come first, as a list in a file without name.
+            let (mut files, left_out) = unzipped(&bytes).map_err(message)?;
+            files.insert(0, (String::new(), left_out.join(", ").into()));
+            return Ok(packed(&files));
+        }
+        31 => return zipped(&unpacked(&bytes)?).map_err(message),
+        40 => provide_font(bytes),
         _ => return Err(format!("there is no call {what}")),
     }
     Ok(Vec::new())
@@ -171,9 +181,9 @@ fn packed(files: &[File]) -> Vec<u8> {
 }
 
 fn text(bytes: Vec<u8>) -> Result<String, String> {
-    String::from_utf8(bytes).map_err(told)
+    String::from_utf8(bytes).map_err(message)
 }
 
-fn told(error: impl Display) -> String {
+fn message(error: impl Display) -> String {
     error.to_string()
 }

@@ -36,7 +36,11 @@ enum Chore {
     /// Draw the pictures of docs/language.md from the scripts in it, into docs/images/language
     Pictures(pictures::Args),
     /// Build the studio as a static site: target/site, a folder for any host of files
-    Site,
+    Site {
+        /// Build one variant of the module, larger and sooner, for tests: target/site-draft
+        #[arg(long)]
+        draft: bool,
+    },
 }
 
 fn main() -> anyhow::Result<()> {
@@ -45,6 +49,6 @@ fn main() -> anyhow::Result<()> {
         Chore::Dist(args) => dist::run(&args),
         Chore::Wheel => wheel::run(),
         Chore::Pictures(args) => pictures::run(&args),
-        Chore::Site => site::run(),
+        Chore::Site { draft } => site::run(draft),
     }
 }

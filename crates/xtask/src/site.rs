@@ -1,7 +1,8 @@
 //! Builds the studio as a static site: target/site, a folder for any host of files.
 //!
-//! It holds the page and its workers (by Node, from `crates/studio/web`), the module that they run (`crates/web`), a start
-//! page with the examples, and each example as a zip file. Nothing of it asks a server for more than these files.
+//! It holds the page and its workers (by Node, from `crates/studio/web`), the two variants of the module that they run
+//! (`crates/web`), a start page with the examples, and each example as a zip file. Beside each file that is text or a module
+//! is one that Brotli has compressed, for hosts that send those. Nothing asks a server for more than these files.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,27 +18,36 @@ use crate::toolchain::{self, say};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
+/// The variants of the module, and the instructions of each: `src/static/variant.ts` chooses.
+const MODULES: [(&str, &str); 2] = [("relaxed.wasm", "+simd128,+relaxed-simd"), ("rayfold.wasm", "+simd128")];
+
+/// The font of letters that name none, which the module lacks.
+const FONT: &str = "font.ttf";
+
+/// The largest module, compressed.
+const LARGEST: u64 = 3 << 19;
+
 /// The page of the studio, as the start page names it.
 const STUDIO: &str = "studio.html";
 
-/// Builds the site.
-pub(crate) fn run() -> anyhow::Result<()> {
+/// Builds the site. A draft is for tests: both modules are the one that every browser runs, and nothing is compressed.
+pub(crate) fn run(draft: bool) -> anyhow::Result<()> {
     let root = root()?;
-    let (web, site) = (root.join("crates/studio/web"), root.join("target/site"));
+    let web = root.join("crates/studio/web");
+    let site = root.join(if draft { "target/site-draft" } else { "target/site" });
     ensure!(
         web.join("node_modules").is_dir(),
         "the page's packages are not installed: `npm ci` in crates/studio/web"
     );
     let mut npm = Command::new("npm");
-    toolchain::run(npm.args(["run", "site"]).current_dir(&web))?;
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--locked", "--profile", "web", "--package", "rayfold-web", "--target", TARGET]);
-    toolchain::run(cargo.current_dir(&root))
-        .with_context(|| format!("`rustup target add {TARGET}` is needed once"))?;
-    let module = root.join("target").join(TARGET).join("web/rayfold_web.wasm");
-    fs::copy(&module, site.join("rayfold.wasm"))
-        .with_context(|| format!("cannot copy {}", module.display()))?;
+    toolchain::run(npm.args(["run", "site", "--", "--outDir"]).arg(&site).current_dir(&web))?;
+    for (file, features) in MODULES {
+        let features = if draft { MODULES[1].1 } else { features };
+        let built = module(&root, features, draft)?;
+        fs::copy(built, site.join(file)).with_context(|| format!("cannot copy {file}"))?;
+    }
 
+    fs::write(site.join(FONT), notosans::BOLD_TTF)?;
     let examples = site.join("examples");
     fs::create_dir_all(&examples)?;
     let mut cards = String::new();
@@ -56,8 +66,38 @@ pub(crate) fn run() -> anyhow::Result<()> {
     let (names, version) = kept(&site)?;
     let offline = read("offline.js")?.replace("@VERSION@", &version).replace("\"@FILES@\"", &names);
     fs::write(site.join("offline.js"), offline)?;
+    if draft {
+        return Ok(());
+    }
+    let mut node = Command::new("node");
+    toolchain::run(node.arg("compress.mjs").arg(&site).current_dir(&web))?;
+    for (file, _) in MODULES {
+        let size = fs::metadata(site.join(format!("{file}.br")))?.len();
+        say(&format!("{file}: {size} bytes with Brotli"));
+        ensure!(size <= LARGEST, "{file} is larger than {LARGEST} bytes");
+    }
     say(&format!("target/site, version {version}: serve it by any host of files"));
     Ok(())
+}
+
+/// Builds the module with these features of WebAssembly, and returns its path.
+fn module(root: &Path, features: &str, draft: bool) -> anyhow::Result<PathBuf> {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--locked", "--profile", "web", "--package", "rayfold-web", "--target", TARGET]);
+    cargo.arg("--target-dir").arg(root.join("target"));
+    // Messages of panics name the sources of dependencies, without the folder where this machine has them.
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home =
+        home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("there is no home folder")?;
+    let flags = [format!("-Ctarget-feature={features}"), format!("--remap-path-prefix={}=", home.display())];
+    // Beside those of `.cargo/config.toml`.
+    cargo.arg("--config").arg(format!("target.{TARGET}.rustflags={flags:?}"));
+    if draft {
+        cargo.args(["--config", "profile.web.lto=false"]);
+    }
+    toolchain::run(cargo.current_dir(root))
+        .with_context(|| format!("`rustup target add {TARGET}` is needed once"))?;
+    Ok(root.join("target").join(TARGET).join("web/rayfold_web.wasm"))
 }
 
 /// Returns the name of each example and its files: scripts, settings, and what the scripts name.
@@ -94,14 +134,15 @@ fn card(root: &Path, examples: &Path, name: &str) -> anyhow::Result<String> {
 }
 
 /// Returns the names of the files that the browser keeps from the start, as the items of a list in JavaScript, and a version
-/// that changes with their content. Pictures of examples are kept when they are shown.
+/// that changes with their content and with the modules, of which a browser keeps one. Pictures of examples are kept when
+/// they are shown.
 fn kept(site: &Path) -> anyhow::Result<(String, String)> {
     let mut names = vec!["index.html".to_owned(), "./".to_owned()];
     for (folder, prefix) in [(site.to_owned(), ""), (site.join("examples"), "examples/")] {
         for entry in fs::read_dir(folder)? {
             let name = entry?.file_name().to_string_lossy().into_owned();
             let is_app =
-                prefix.is_empty() && ["js", "css", "html", "wasm"].iter().any(|end| name.ends_with(end));
+                prefix.is_empty() && ["js", "css", "html", "ttf"].iter().any(|end| name.ends_with(end));
             if (is_app && !["offline.js", "index.html"].contains(&name.as_str())) || name.ends_with(".zip") {
                 names.push(format!("{prefix}{name}"));
             }
@@ -109,7 +150,9 @@ fn kept(site: &Path) -> anyhow::Result<(String, String)> {
     }
     names.sort();
     let mut hasher = DefaultHasher::new();
-    for name in names.iter().filter(|name| *name != "./") {
+    for name in
+        names.iter().map(String::as_str).chain(MODULES.map(|(file, _)| file)).filter(|name| *name != "./")
+    {
         (name, fs::read(site.join(name))?).hash(&mut hasher);
     }
     let list: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
@@ -139,15 +182,18 @@ mod tests {
     fn the_version_changes_with_any_file_that_is_kept() {
         let site = tempfile::tempdir().unwrap();
         fs::create_dir(site.path().join("examples")).unwrap();
-        for (name, text) in
-            [("index.html", "a"), ("studio.js", "b"), ("examples/x.zip", "c"), ("examples/x.gif", "d")]
+        for name in
+            ["index.html", "studio.js", "examples/x.zip", "examples/x.gif", "rayfold.wasm", "relaxed.wasm"]
         {
-            fs::write(site.path().join(name), text).unwrap();
+            fs::write(site.path().join(name), "a").unwrap();
         }
         let (names, version) = kept(site.path()).unwrap();
         assert_eq!(names, r#""./", "examples/x.zip", "index.html", "studio.js""#);
         assert_eq!(kept(site.path()).unwrap().1, version);
-        fs::write(site.path().join("examples/x.zip"), "e").unwrap();
-        assert_ne!(kept(site.path()).unwrap().1, version);
+        for name in ["examples/x.zip", "relaxed.wasm"] {
+            let before = kept(site.path()).unwrap().1;
+            fs::write(site.path().join(name), "b").unwrap();
+            assert_ne!(kept(site.path()).unwrap().1, before, "{name}");
+        }
     }
 }

@@ -95,6 +95,28 @@ fn named(letter: char) -> String {
     }
 }
 
+/// The font of letters that name none.
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
+#[expect(clippy::unnecessary_wraps, reason = "a page may lack it")]
+fn bold() -> Option<&'static [u8]> {
+    Some(notosans::BOLD_TTF)
+}
+
+/// A page loads it beside the module, which is a tenth smaller without.
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+static BOLD: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+fn bold() -> Option<&'static [u8]> {
+    BOLD.get().map(Vec::as_slice)
+}
+
+/// Provides the font of letters that name none, once: in a browser it is no part of the program.
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+pub fn provide_font(bytes: Vec<u8>) {
+    let _ = BOLD.set(bytes);
+}
+
 /// A font, ready for shaping.
 #[derive(Clone)]
 pub(crate) struct Font {
@@ -110,10 +132,9 @@ const FINENESS: i64 = 1 << 15;
 
 impl Font {
     /// Returns the font that comes with the program.
-    pub(crate) fn built_in() -> Self {
-        let font = harfrust::Font::new(notosans::BOLD_TTF, 0);
-        let font = font.unwrap_or_else(|| unreachable!("the font is in order"));
-        Self::of(font).unwrap_or_else(|_| unreachable!("the font is in order"))
+    pub(crate) fn built_in() -> Result<Self, Fault> {
+        let font = bold().and_then(|bytes| harfrust::Font::new(bytes, 0));
+        Self::of(font.ok_or_else(|| Fault::new("the font that comes with rayfold was not loaded"))?)
     }
 
     /// Reads a TrueType or OpenType font; of a collection the first one.

@@ -37,6 +37,8 @@ pub(super) enum Machine {
     Aarch64,
     /// WebAssembly, by Node
     Wasm32,
+    /// WebAssembly with relaxed instructions, by Node on a machine that has a fused multiply-add
+    Wasm32Relaxed,
 }
 
 /// The fingerprints of pictures by the names of their scripts.
@@ -192,6 +194,7 @@ impl Machine {
         match self {
             Self::Aarch64 => "aarch64",
             Self::Wasm32 => "wasm32",
+            Self::Wasm32Relaxed => "wasm32-relaxed",
         }
     }
 
@@ -200,6 +203,7 @@ impl Machine {
         match self {
             Self::Aarch64 => ("aarch64-unknown-linux-gnu", ""),
             Self::Wasm32 => ("wasm32-wasip1", "-Ctarget-feature=+simd128"),
+            Self::Wasm32Relaxed => ("wasm32-wasip1", "-Ctarget-feature=+simd128,+relaxed-simd"),
         }
     }
 
@@ -226,7 +230,7 @@ impl Machine {
                 run.args(["-L", "/usr/aarch64-linux-gnu"]);
                 run
             }
-            Self::Wasm32 => {
+            Self::Wasm32 | Self::Wasm32Relaxed => {
                 let mut run = Command::new("node");
                 run.args(["--no-warnings", "--input-type=module", "--eval", WASI]);
                 run
@@ -298,15 +302,17 @@ impl Machine {
             .status()
             .context("cargo")?;
         ensure!(status.success(), "{}: cargo build: {status}", self.name());
-        let file = if self == Self::Wasm32 { "fingerprints.wasm" } else { "fingerprints" };
+        let file = if self == Self::Aarch64 { "fingerprints" } else { "fingerprints.wasm" };
         Ok(folder.join(target).join("release/examples").join(file))
     }
 }
 
-/// Runs a program of WebAssembly in Node.
+/// Runs a program of WebAssembly in Node. Version 20 has relaxed instructions only if a flag asks for them.
 const WASI: &str = "
 import { readFileSync } from 'node:fs';
+import { setFlagsFromString } from 'node:v8';
 import { WASI } from 'node:wasi';
+setFlagsFromString('--experimental-wasm-relaxed-simd');
 const wasi = new WASI({ version: 'preview1', returnOnExit: true });
 const { instance } = await WebAssembly.instantiate(readFileSync(process.argv[1]), wasi.getImportObject());
 process.exitCode = wasi.start(instance);

@@ -25,21 +25,23 @@ pub fn zipped(files: &[File]) -> Result<Vec<u8>, Error> {
     Ok(zip.finish().map_err(|error| refused(&error))?.into_inner())
 }
 
-/// Returns the files of a zip file. Folders in it are left out, except one that holds everything.
+/// Returns the files of a zip file, and the names of those that are left out, because they are in folders. One folder that
+/// holds everything does not count.
 ///
 /// # Errors
 /// Fails if it is no zip file, or if its files are more than the studio holds.
-pub fn unzipped(bytes: &[u8]) -> Result<Vec<File>, Error> {
+pub fn unzipped(bytes: &[u8]) -> Result<(Vec<File>, Vec<String>), Error> {
     let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| refused(&error))?;
     let name_at = |at| Some(zip.name_for_index(at)?.ok()?.into_owned());
     let names: Vec<String> = (0..zip.len()).filter_map(name_at).collect();
     let first = names.first().and_then(|name| name.split_once('/')).map(|(folder, _)| format!("{folder}/"));
     let folder = first.filter(|folder| names.iter().all(|name| name.starts_with(folder))).unwrap_or_default();
     let mut room = TEXT;
-    let mut files = Vec::new();
+    let (mut files, mut left_out) = (Vec::new(), Vec::new());
     for name in names {
         let own = &name[folder.len()..];
         if !is_plain(own) {
+            left_out.extend((!own.is_empty() && !own.ends_with('/')).then(|| own.to_owned()));
             continue;
         }
         let entry = zip.by_name(&name).map_err(|error| refused(&error))?;
@@ -53,7 +55,7 @@ pub fn unzipped(bytes: &[u8]) -> Result<Vec<File>, Error> {
             return Err(too_large());
         }
     }
-    Ok(files)
+    Ok((files, left_out))
 }
 
 /// Returns whether a name is that of a file, and of no hidden one, in this very folder.
@@ -72,14 +74,15 @@ mod tests {
     #[test]
     fn a_zip_file_has_its_files_and_none_of_other_places() {
         let files = vec![("a.txt".to_owned(), b"Trace\n".to_vec()), ("m.obj".to_owned(), vec![0; 9])];
-        assert_eq!(unzipped(&zipped(&files).unwrap()).unwrap(), files);
+        assert_eq!(unzipped(&zipped(&files).unwrap()).unwrap(), (files.clone(), vec![]));
         let nested: Vec<_> =
             files.iter().map(|(name, content)| (format!("film/{name}"), content.clone())).collect();
         let own = unzipped(&zipped(&nested).unwrap()).unwrap();
-        assert_eq!(own, files, "one folder that holds everything");
+        assert_eq!(own, (files.clone(), vec![]), "one folder that holds everything");
         let mut astray = files.clone();
         astray.extend([("../b.txt".into(), vec![1]), ("c/d.txt".into(), vec![2])]);
-        assert_eq!(unzipped(&zipped(&astray).unwrap()).unwrap(), files);
+        let left_out = vec!["../b.txt".to_owned(), "c/d.txt".to_owned()];
+        assert_eq!(unzipped(&zipped(&astray).unwrap()).unwrap(), (files, left_out));
         assert!(unzipped(b"no zip file").unwrap_err().to_string().contains("cannot be used"));
     }
 }

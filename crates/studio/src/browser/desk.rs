@@ -399,7 +399,7 @@ mod tests {
         stage.settle();
         let is_png = |number| stage.answers[&number].starts_with(b"\x89PNG");
         assert!(is_png(0) && is_png(1) && is_png(2));
-        assert_eq!(super::super::unzipped(&stage.answers[&3]).unwrap()[0].0, "b9.txt", "natural order");
+        assert_eq!(super::super::unzipped(&stage.answers[&3]).unwrap().0[0].0, "b9.txt", "natural order");
         assert_eq!(stage.answers[&4], TEXT.as_bytes());
         assert!(stage.answers[&9].is_empty());
         let (name, files) = stage.desk.files();

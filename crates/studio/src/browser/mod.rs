@@ -18,6 +18,10 @@ pub use drawer::Drawer;
 pub use packet::{File, files_of, packet};
 pub use reel::Reel;
 
+/// Provides the font of letters that name none.
+#[cfg(target_arch = "wasm32")]
+pub use rayfold_scene::assets::provide_font;
+
 /// Sets the time since an arbitrary moment. A browser's workers have no clock of their own.
 #[cfg(target_arch = "wasm32")]
 pub fn set_time(micros: u64) {

@@ -1,8 +1,8 @@
 // Keeps the site in the browser, so that it works without a network after the first load. `cargo xtask site` puts the
-// names of the files here, and a version that changes with them.
+// names of the files here, and a version that changes with them. The page says in the query which module this machine runs.
 
 const VERSION = "@VERSION@";
-const FILES = ["@FILES@"];
+const FILES = ["@FILES@", location.search.slice(1)];
 
 addEventListener("install", (event) => {
   // Not from the browser's cache, which may hold files of an older version.

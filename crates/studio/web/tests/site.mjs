@@ -1,21 +1,16 @@
 // The studio without a server, as `cargo xtask site` has built it: `node --test`, with RAYFOLD (the program), CHROMIUM and
-// SITE (the folder).
+// SITE (the folder). With EXAMPLES=all it opens every example.
 
 import assert from "node:assert/strict";
-import { spawnSync } from "node:child_process";
-import { createReadStream, existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
-import { createServer } from "node:http";
-import { tmpdir } from "node:os";
-import { extname, join } from "node:path";
+import { readFileSync, readdirSync } from "node:fs";
+import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { deflateRawSync } from "node:zlib";
 
 import { chromium } from "playwright-core";
 
-const { RAYFOLD: program, CHROMIUM: executablePath, SITE: site } = process.env;
-const KINDS = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
-const film =
-  "Screen 160 120\nSamples 4\nFrames 6\nLook 0 2 8  0 1 0  40\nIlight 1 1 1  1 -2 -1\nSphere 1  (1:-2 6:2) 1 0  .1 .1 .1  .5 .6 .7  .4 .4 .4\nTrace\n";
+import { expected, film, linked, many, serve } from "./host.mjs";
+
+const { CHROMIUM: executablePath, EXAMPLES, SITE: site } = process.env;
 
 /** What goes before the workers' program in the address with `faulty`: drawing a second frame ends the module, as a panic does. */
 const FAULTY = `{
@@ -37,20 +32,11 @@ const FAULTY = `{
 let browser, host, address;
 before(async () => {
   browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
-  host = createServer((request, response) => {
-    const asked = new URL(request.url, "http://host").pathname.replace(/\/$/, "/index.html");
-    const path = join(site, asked.replace("/faulty/", "/"));
-    if (!existsSync(path)) return response.writeHead(404).end();
-    response.writeHead(200, { "content-type": KINDS[extname(path)] ?? "application/octet-stream" });
-    if (asked === "/faulty/worker.js") response.end(FAULTY + readFileSync(path));
-    else createReadStream(path).pipe(response);
-  });
-  await new Promise((done) => host.listen(0, "127.0.0.1", done));
-  address = `http://127.0.0.1:${host.address().port}/`;
+  host = await serve(FAULTY);
+  ({ address } = host);
 });
 after(async () => {
   await browser?.close();
-  host?.closeAllConnections();
   host?.close();
 });
 
@@ -69,38 +55,17 @@ async function open(t, where) {
   return { page, context, drawn, check: () => assert.deepEqual(faults, []) };
 }
 
-/** The fragment of a link, as the page makes it. */
-function linked(name, files) {
-  const parts = [[name, ""], ...files].flat().map((part) => Buffer.from(part));
-  const bytes = Buffer.concat(parts.flatMap((part) => [Buffer.from(Uint32Array.of(part.length).buffer), part]));
-  return `#scene=${deflateRawSync(bytes).toString("base64url")}`;
-}
-
 async function gif(page) {
   await page.getByRole("button", { name: "Render GIF" }).click();
   const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: /Download GIF/ }).click()]);
   return readFileSync(await download.path());
 }
 
-function expected(t, files) {
-  const folder = mkdtempSync(join(tmpdir(), "rayfold-site-"));
-  t.after(() => rmSync(folder, { recursive: true, force: true }));
-  for (const [name, text] of files) writeFileSync(join(folder, name), text);
-  const out = join(folder, "out.gif");
-  const run = spawnSync(program, ["render", folder, "-o", out]);
-  assert.equal(run.status, 0, String(run.stderr));
-  return readFileSync(out);
-}
-
 test("a link with 200 scripts opens, is kept, and becomes the command's GIF", async (t) => {
-  const files = Array.from({ length: 200 }, (_, at) => [
-    `f${at + 1}.txt`,
-    `Screen 48 32\nLook 0 1 6  0 0 0  50\nIlight 1 1 1  1 -1 -1\nSphere 1  ${(at - 100) / 100} 0 0  0.2 0.1 0.1  0.7 0.5 0.3\nTrace\n`,
-  ]);
-  const { page, drawn, check } = await open(t, `studio.html${linked("many", files)}`);
+  const { page, drawn, check } = await open(t, `studio.html${linked("many", many)}`);
   await drawn();
   await page.locator("output", { hasText: "frame 1 of 200" }).waitFor();
-  assert.ok((await gif(page)).equals(expected(t, files)), "the same bytes");
+  assert.ok((await gif(page)).equals(expected(t, many)), "the same bytes");
   assert.equal(new URL(page.url()).hash, "#project=many");
   await page.reload();
   await page.locator("output", { hasText: "frame 1 of 200" }).waitFor();
@@ -146,9 +111,11 @@ test("the page says that a worker failed, and a new one draws", async (t) => {
   check();
 });
 
-for (const file of readdirSync(join(site, "examples")).filter((file) => file.endsWith(".zip"))) {
-  test(`a picture of the example ${file} appears`, async (t) => {
-    const { page, check } = await open(t, `studio.html#example=${file.replace(".zip", "")}`);
+const all = readdirSync(join(site, "examples")).filter((file) => file.endsWith(".zip")).map((file) => file.replace(".zip", ""));
+// One of plain objects, one with a model, and one with letters and samples.
+for (const example of EXAMPLES === "all" ? all : ["hello", "chess", "logo"]) {
+  test(`a picture of the example ${example} appears`, async (t) => {
+    const { page, check } = await open(t, `studio.html#example=${example}`);
     // Slow ones are refined for minutes: a first picture is enough.
     const isPicture = () => {
       const canvas = document.querySelector("canvas");

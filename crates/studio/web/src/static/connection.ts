@@ -6,6 +6,7 @@ import type { Listener, Send } from "../connection/listener";
 import { place, opened as remember } from "./address";
 import type { Question, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
+import { moduleFile } from "./variant";
 
 /** The name of the open project. */
 export const project = signal("");
@@ -67,7 +68,7 @@ export function open({ opened, told, shown, closed }: Listener): Send {
       opened();
     }
   };
-  const module = new URL("rayfold.wasm", location.href).href;
+  const module = new URL(moduleFile, location.href).href;
   place().then(
     (place) => post({ is: "open", module, place }),
     (error: unknown) => end(error instanceof Error ? error.message : String(error)),

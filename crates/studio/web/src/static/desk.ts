@@ -5,7 +5,7 @@ import type { OutputState, ServerMessage } from "../protocol";
 import { Film } from "./film";
 import { Helper } from "./helper";
 import type { Place, Question, ToDesk, ToPage } from "./messages";
-import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File } from "./module";
+import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File, type Program } from "./module";
 import { Folder, keep, project, projects, remove } from "./projects";
 
 /** The milliseconds between two looks at the files. */
@@ -28,7 +28,7 @@ export class Session {
   readonly #post: Post;
   /** Messages that came before the session was open. */
   #early: ToDesk[] | null = [];
-  #compiled: WebAssembly.Module | null = null;
+  #program: Program | null = null;
   #module: Module | null = null;
   #drawers: Helper[] = [];
   #folder = new Folder(null);
@@ -53,13 +53,13 @@ export class Session {
   }
 
   async #open(address: string, place: Place): Promise<void> {
-    const compiled = await compile(address);
-    this.#compiled = compiled;
-    const module = new Module(compiled);
-    this.#module = module;
+    const [compiled, font] = await Promise.all([compile(address), load(new URL("font.ttf", address).href)]);
+    const program = { module: compiled, font: new Uint8Array(await font.arrayBuffer()) };
+    this.#program = program;
+    this.#module = new Module(program);
     const { name, files } = await this.#files(place);
     const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
-    this.#drawers = Array.from({ length: workers }, () => new Helper(compiled));
+    this.#drawers = Array.from({ length: workers }, () => new Helper(program));
     this.#alone(name);
     this.#post({ is: "opened", project: name, folder: place.is === "folder" });
     this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
@@ -89,7 +89,7 @@ export class Session {
     else {
       const answer = await fetch(place.address);
       if (!answer.ok) throw new Error(`there is no example ${place.name}`);
-      files = this.#unzip(new Uint8Array(await answer.arrayBuffer()));
+      files = this.#unzip(new Uint8Array(await answer.arrayBuffer())).slice(1);
     }
     const name = await keep(place.name, files);
     this.#folder = await project(name);
@@ -121,6 +121,7 @@ export class Session {
     setInterval(() => void look().catch(() => undefined), DISK);
   }
 
+  /** The names of files that are left out, as the content of a file without name, and the files. */
   #unzip(zip: Uint8Array): File[] {
     return unpacked(this.#call(Call.unzip, 0, zip));
   }
@@ -177,10 +178,10 @@ export class Session {
 
   /** Starts a new worker in place of one that has failed. */
   #replace(number: number, fault: Fault): void {
-    if (!this.#module || !this.#compiled) return;
+    if (!this.#module || !this.#program) return;
     this.#tell({ notice: `This cannot be drawn, because the tracer has failed: ${fault.message}` });
     this.#drawers[number]?.end();
-    this.#drawers[number] = new Helper(this.#compiled);
+    this.#drawers[number] = new Helper(this.#program);
     this.#do(Call.lost, number);
   }
 
@@ -213,8 +214,8 @@ export class Session {
   }
 
   #newFilm(): Film {
-    if (!this.#compiled) throw new Error("no project is open");
-    return new Film(this.#compiled, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
+    if (!this.#program) throw new Error("no project is open");
+    return new Film(this.#program, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
   }
 
   /** The files of the project, after one whose name is the format of an animation. */
@@ -260,10 +261,15 @@ export class Session {
   }
 }
 
-/** Compiles the module, also from a host that does not know its media type. */
-async function compile(address: string): Promise<WebAssembly.Module> {
+async function load(address: string): Promise<Response> {
   const answer = await fetch(address);
   if (!answer.ok) throw new Error(`${address} cannot be loaded`);
+  return answer;
+}
+
+/** Compiles the module, also from a host that does not know its media type. */
+async function compile(address: string): Promise<WebAssembly.Module> {
+  const answer = await load(address);
   if (answer.headers.get("content-type") === "application/wasm") return WebAssembly.compileStreaming(answer);
   return WebAssembly.compile(await answer.arrayBuffer());
 }

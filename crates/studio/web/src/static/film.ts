@@ -1,7 +1,7 @@
 // An animation: some workers draw its frames, ahead of the one that encodes them in order.
 
 import { Helper } from "./helper";
-import { Call } from "./module";
+import { Call, type Program } from "./module";
 
 const NONE = (): Uint8Array => new Uint8Array();
 
@@ -10,9 +10,9 @@ export class Film {
   readonly #drawers: Helper[];
   #isCancelled = false;
 
-  constructor(module: WebAssembly.Module, drawers: number) {
-    this.#encoder = new Helper(module);
-    this.#drawers = Array.from({ length: drawers }, () => new Helper(module));
+  constructor(program: Program, drawers: number) {
+    this.#encoder = new Helper(program);
+    this.#drawers = Array.from({ length: drawers }, () => new Helper(program));
   }
 
   get isCancelled(): boolean {

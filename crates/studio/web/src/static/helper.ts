@@ -1,7 +1,7 @@
 // A worker that the session's worker starts: it draws, encodes or draws frames, one call after the other.
 
 import type { ToWorker } from "./messages";
-import { Fault } from "./module";
+import { Fault, type Program } from "./module";
 
 interface Answer {
   readonly result?: Uint8Array;
@@ -13,7 +13,7 @@ export class Helper {
   readonly #worker: Worker;
   readonly #waiting: { readonly done: (result: Uint8Array) => void; readonly failed: (error: Error) => void }[] = [];
 
-  constructor(module: WebAssembly.Module) {
+  constructor(program: Program) {
     // The program of this very worker.
     this.#worker = new Worker(self.location.href, { type: "module" });
     this.#worker.onmessage = ({ data }: MessageEvent<Answer>) => {
@@ -21,7 +21,7 @@ export class Helper {
       if (data.result) next?.done(data.result);
       else next?.failed(data.isFault ? new Fault(data.why) : new Error(data.why));
     };
-    this.#post({ is: "start", module });
+    this.#post({ is: "start", program });
   }
 
   /** Makes a call whose result is of no interest. */

@@ -1,6 +1,6 @@
 // Messages between the page, the worker of its session, and the workers that draw.
 
-import type { File } from "./module";
+import type { File, Program } from "./module";
 
 /** What a page opens. */
 export type Place =
@@ -18,6 +18,7 @@ export type Question =
   | { readonly is: "projects" }
   | { readonly is: "remove"; readonly name: string }
   | { readonly is: "zip" }
+  /** The names of files that are left out, as the content of a file without name, and the files of a zip file. */
   | { readonly is: "unzip"; readonly content: Uint8Array }
   /** The name of a new project of these files. */
   | { readonly is: "import"; readonly name: string; readonly files: readonly File[] }
@@ -40,5 +41,5 @@ export type ToPage =
 
 /** To a worker that draws, encodes, or draws frames. */
 export type ToWorker =
-  | { readonly is: "start"; readonly module: WebAssembly.Module }
+  | { readonly is: "start"; readonly program: Program }
   | { readonly is: "call"; readonly what: number; readonly number: number; readonly bytes: Uint8Array; readonly answers: boolean };

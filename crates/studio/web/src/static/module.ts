@@ -6,6 +6,7 @@ export const Call = {
   put: 10, draw: 11,
   begin: 20, frame: 21, push: 22, finish: 23,
   unzip: 30, zip: 31,
+  font: 40,
 } as const;
 
 export interface File {
@@ -41,11 +42,18 @@ function imports(module: WebAssembly.Module): WebAssembly.Imports {
   return all;
 }
 
+/** The module, and the font of letters that name none. */
+export interface Program {
+  readonly module: WebAssembly.Module;
+  readonly font: Uint8Array;
+}
+
 export class Module {
   readonly #exports: Exports;
 
-  constructor(module: WebAssembly.Module) {
+  constructor({ module, font }: Program) {
     this.#exports = new WebAssembly.Instance(module, imports(module)).exports as unknown as Exports;
+    this.call(Call.font, 0, font);
   }
 
   /** Does what `what` names. The result is valid until the next call. */

@@ -10,7 +10,7 @@ import { addressOf } from "./address";
 import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
 import { hasDisk, openFolder } from "./disk";
 import { linked } from "./link";
-import type { File } from "./module";
+import { textOf, type File } from "./module";
 import { save } from "./save";
 
 const names = signal<readonly string[]>([]);
@@ -29,7 +29,11 @@ async function openFiles(chosen: FileList | null): Promise<void> {
     const content = new Uint8Array(await file.arrayBuffer());
     name ||= file.name.replace(/\.(zip|txt)$/i, "");
     if (!/\.zip$/i.test(file.name)) files.push({ name: file.name, content });
-    else files.push(...((await unzip(content)) ?? []));
+    else {
+      const [leftOut, ...held] = (await unzip(content)) ?? [];
+      if (leftOut?.content.length && !confirm(`Files in folders of ${file.name} are left out: ${textOf(leftOut.content)}`)) return;
+      files.push(...held);
+    }
   }
   if (files.length === 0) return;
   const own = await importProject(name, files);

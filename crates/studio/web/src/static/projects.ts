@@ -53,16 +53,16 @@ export class Folder {
     return new Uint8Array((await file?.arrayBuffer()) ?? new ArrayBuffer());
   }
 
-  /** Writes a file, whole or not at all. */
-  write({ name, content }: File): Promise<void> {
+  /** Writes files of different names at the same time, each whole or not at all. */
+  write(...files: readonly File[]): Promise<void> {
     const handle = this.#handle;
-    const written = this.#writing.then(async () => {
-      if (!handle) return;
-      const file = await handle.getFileHandle(name, { create: true });
-      const stream = await file.createWritable();
-      await stream.write(content as Uint8Array<ArrayBuffer>);
-      await stream.close();
-    });
+    const write = async ({ name, content }: File): Promise<void> => {
+      const file = await handle?.getFileHandle(name, { create: true });
+      const stream = await file?.createWritable();
+      await stream?.write(content as Uint8Array<ArrayBuffer>);
+      await stream?.close();
+    };
+    const written = this.#writing.then(async () => void (await Promise.all(files.map(write))));
     this.#writing = written.catch(() => undefined);
     return written;
   }
@@ -93,7 +93,7 @@ export async function project(name: string): Promise<Folder> {
 export async function keep(name: string, files: readonly File[]): Promise<string> {
   const own = await nameFor(name, files);
   const folder = await project(own);
-  for (const file of files) await folder.write(file);
+  await folder.write(...files);
   return own;
 }
 

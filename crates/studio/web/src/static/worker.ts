@@ -12,7 +12,7 @@ const scope = globalThis as unknown as { postMessage: (message: unknown, transfe
 /** Calls the module, and answers with the result, or with nothing if there is none. */
 function serve(message: ToWorker): void {
   if (message.is === "start") {
-    module = new Module(message.module);
+    module = new Module(message.program);
     return;
   }
   try {

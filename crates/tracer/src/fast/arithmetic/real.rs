@@ -121,10 +121,11 @@ pub(crate) trait Fused<S: Simd>: SimdFloat<S> {
 
 impl<S: Simd, T: SimdFloat<S>> Fused<S> for T {}
 
-/// Returns whether the instruction set has a fused multiply-add. With packets of 128 bits that of Arm alone has one.
+/// Returns whether the instruction set has a fused multiply-add. With packets of 128 bits that of Arm has one, and the relaxed one
+/// of WebAssembly, on machines where a test has shown that it is fused.
 #[inline(always)]
 fn has_fused<S: Simd, T: SimdFloat<S>>() -> bool {
-    cfg!(target_arch = "aarch64") || size_of::<T>() > 16
+    cfg!(any(target_arch = "aarch64", target_feature = "relaxed-simd")) || size_of::<T>() > 16
 }
 
 // Out of line: it takes some forty instructions.

@@ -1,0 +1,84 @@
+// The studio without a server in Firefox, driven by WebDriver BiDi: as `site.mjs`, with FIREFOX.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+
+import puppeteer from "puppeteer-core";
+
+import { expected, film, linked, many, serve } from "./host.mjs";
+
+let browser, host;
+before(async () => {
+  browser = await puppeteer.launch({ browser: "firefox", executablePath: process.env.FIREFOX, headless: true });
+  host = await serve();
+});
+after(async () => {
+  await browser?.close();
+  host?.close();
+});
+
+async function open(t, where) {
+  const context = await browser.createBrowserContext();
+  const page = await context.newPage();
+  await page.setViewport({ width: 1400, height: 900 });
+  // Keeps what the page saves.
+  await page.evaluateOnNewDocument(() => {
+    const { createObjectURL } = URL;
+    URL.createObjectURL = (blob) => {
+      if (blob.type === "") globalThis.saved = blob;
+      return createObjectURL(blob);
+    };
+  });
+  const faults = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  t.after(() => context.close());
+  await page.goto(host.address + where);
+  const drawn = () => page.waitForSelector("canvas[data-final=true]", { timeout: 120_000 });
+  await drawn();
+  return { page, drawn, check: () => assert.deepEqual(faults, []) };
+}
+
+async function gif(page) {
+  await page.click("::-p-aria(Render GIF)");
+  await (await page.waitForSelector(".result a.button", { timeout: 120_000 })).click();
+  await page.waitForFunction(() => globalThis.saved);
+  const text = await page.evaluate(async () => {
+    const bytes = new Uint8Array(await globalThis.saved.arrayBuffer());
+    return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  });
+  return Buffer.from(text, "base64");
+}
+
+test("in Firefox a link with 200 scripts becomes the command's GIF, and is kept", async (t) => {
+  const { page, drawn, check } = await open(t, `studio.html${linked("many", many)}`);
+  assert.ok((await gif(page)).equals(expected(t, many)), "the same bytes");
+  assert.equal(new URL(page.url()).hash, "#project=many");
+  await page.reload();
+  await drawn();
+  await page.waitForSelector("::-p-text(frame 1 of 200)");
+  check();
+});
+
+test("in Firefox curves and samples become the command's GIF, and an object is dragged", async (t) => {
+  const { page, check } = await open(t, `studio.html${linked("film", [["film.txt", film]])}`);
+  assert.ok((await gif(page)).equals(expected(t, [["film.txt", film]])), "the same bytes");
+  const text = () => page.$eval(">>> .cm-content", (content) => content.textContent);
+  const before = await text();
+  const box = await (await page.$("canvas")).boundingBox();
+  await page.mouse.move(box.x + box.width * 0.2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.4, box.y + box.height / 2, { steps: 8 });
+  await page.mouse.up();
+  assert.notEqual(await text(), before);
+  check();
+});
+
+test("in Firefox the studio draws after the host has gone", async (t) => {
+  const { page, drawn, check } = await open(t, "studio.html");
+  await page.evaluate(async () => void (await navigator.serviceWorker.ready));
+  host.close();
+  await page.reload();
+  await drawn();
+  check();
+});
