@@ -17,6 +17,7 @@
 
 use rayon::prelude::*;
 
+use crate::ahead::{Ahead, Choices};
 use crate::block::{self, Area, Block};
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
@@ -24,10 +25,12 @@ use crate::lzw::{Part, Writer};
 use crate::nearest::Nearest;
 use crate::palette::Palette;
 use crate::refine_budget::Redrawn;
-use crate::update_map::PixelUpdate;
+use crate::update_map::{PixelUpdate, SEEN_RIGHT_AGAIN};
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
-const TOLERANCE: f32 = 5.85;
+const TOLERANCE: f32 = 4.0;
+/// The least tolerance of a pixel that the next frame changes: its error is seen for one frame only.
+const TOLERANCE_IF_SOON_GONE: f32 = 20.0;
 /// The tolerance if no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
 const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
 const FEW_LEVELS: u8 = 2;
@@ -147,6 +150,7 @@ pub(crate) struct Stripe<'a> {
     tolerances: [f32; 2],
     /// The residual that each pixel of the row above diffuses down.
     from_above: Vec<[f32; 3]>,
+    ahead: Ahead,
 }
 
 /// A part of a row of a frame: its pixels, their updates, and the canvas.
@@ -154,6 +158,8 @@ pub(crate) struct Row<'a> {
     pub(crate) pixels: &'a [[u8; 3]],
     /// The pixels of the frame in the row above.
     pub(crate) above: &'a [[u8; 3]],
+    /// The pixels of the frame after it.
+    pub(crate) next: Option<&'a [[u8; 3]]>,
     pub(crate) updates: &'a [PixelUpdate],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
@@ -173,6 +179,7 @@ impl<'a> Stripe<'a> {
             corrected: CORRECTED * part.max(LEAST_PART),
             tolerances: [tolerance, tolerance + TOLERANCE_IF_ROUGH * soon_gone],
             from_above: Vec::new(),
+            ahead: Ahead::default(),
         }
     }
 
@@ -187,11 +194,13 @@ impl<'a> Stripe<'a> {
         let mut last = ([0; 3], None);
         self.from_above.resize(row.pixels.len(), [0.0; 3]);
         let mut diffused = [0.0; 3];
+        self.ahead.start_row();
         for k in 0..row.pixels.len() {
             let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
             let above = self.from_above[k];
             let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
             diffused = [0.0; 3];
+            let planned = self.planned(&row, k);
             let index = match update {
                 PixelUpdate::Keep => {
                     let transparent = transparent.unwrap_or(0);
@@ -212,12 +221,12 @@ impl<'a> Stripe<'a> {
                             levels[1] + part * residual[1],
                             levels[2] + part * residual[2],
                         ];
-                        let index = self.drawn(&row, k, target, entry, NEW_STRING);
+                        let index = self.drawn(&row, k, target, entry, NEW_STRING, planned);
                         let shown = if Some(index) == transparent { seen } else { self.colour(index) };
                         diffused = diffuse(residual, levels, colour::levels(shown));
                         index
                     } else {
-                        self.drawn(&row, k, levels, entry, f32::INFINITY)
+                        self.drawn(&row, k, levels, entry, f32::INFINITY, planned)
                     }
                 }
             };
@@ -254,20 +263,74 @@ impl<'a> Stripe<'a> {
         index
     }
 
+    /// Returns the index of a pixel in the string that costs least.
+    fn planned(&mut self, row: &Row<'_>, k: usize) -> Option<u8> {
+        if !self.ahead.is_planned() && row.updates[k] == PixelUpdate::Draw {
+            let mut ahead = std::mem::take(&mut self.ahead);
+            ahead.plan(self.writer, k, row.pixels.len(), |k| self.choices(row, k));
+            self.ahead = ahead;
+        }
+        self.ahead.take()
+    }
+
+    /// Returns the indices that a pixel may have.
+    fn choices(&self, row: &Row<'_>, k: usize) -> Choices {
+        let (now, seen, mut choices) = (row.pixels[k], row.seen[k], Choices::default());
+        let over = self.colours.over();
+        match row.updates[k] {
+            PixelUpdate::Keep | PixelUpdate::Either => choices.add(self.colours.transparent.unwrap_or(0), 0.0),
+            PixelUpdate::Refine => {}
+            PixelUpdate::Draw => {
+                let (entry, form, levels) = (self.nearest(now), self.metric.around(now), colour::levels(now));
+                let tolerance = self.tolerance(row, k, entry);
+                let nearest = form.error(levels, colour::levels(self.colour(entry.index)));
+                choices.add(entry.index, 0.0);
+                let mut add = |index: u8, shown: [u8; 3], levels_shown: [f32; 3]| {
+                    let more = form.error(levels, levels_shown) - nearest;
+                    if more <= tolerance && self.is_within(now, shown) {
+                        choices.add(index, more.max(0.0) / tolerance);
+                    }
+                };
+                let others = &self.colours.palette.alternatives[usize::from(entry.index)];
+                for (&index, &levels) in others.indices.iter().zip(&others.levels) {
+                    add(index, self.colour(index), levels);
+                }
+                if let Some(transparent) = over {
+                    add(transparent, seen, colour::levels(seen));
+                }
+            }
+        }
+        choices
+    }
+
     /// Returns the error above that of the best index that is accepted to make the file smaller.
     fn tolerance(&self, row: &Row<'_>, k: usize, entry: Nearest) -> f32 {
         let [smooth, rough] = self.tolerances;
-        if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth }
+        let change = row.next.map_or(0, |next| colour::level_error(row.pixels[k], next[k]));
+        if change as f32 <= SEEN_RIGHT_AGAIN {
+            return smooth;
+        }
+        let tolerance = if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth };
+        tolerance.max(TOLERANCE_IF_SOON_GONE)
     }
 
     /// Writes the index of a pixel that is drawn, and returns it.
     ///
     /// `target`: the levels of the pixel plus the corrected part of the residual. `entry`: the palette entry nearest
     /// to the pixel itself. `new_string`: the error that another index must save to begin a new string.
-    fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, new_string: f32) -> u8 {
+    fn drawn(
+        &mut self,
+        row: &Row<'_>,
+        k: usize,
+        target: [f32; 3],
+        entry: Nearest,
+        new_string: f32,
+        planned: Option<u8>,
+    ) -> u8 {
         let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
         // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
         if entry.error == 0.0
+            && planned.is_none_or(|planned| planned == entry.index)
             && (self.colours.over().is_none() || now != seen)
             && self.writer.extend(entry.index)
         {
@@ -275,6 +338,14 @@ impl<'a> Stripe<'a> {
         }
         let form = self.metric.around(now);
         let nearest = form.error(target, colour::levels(self.colour(entry.index)));
+        if let Some(index) = planned {
+            let shown = if Some(index) == self.colours.over() { seen } else { self.colour(index) };
+            if form.error(target, colour::levels(shown)) <= nearest + self.tolerance(row, k, entry) {
+                self.writer.put(index);
+                return index;
+            }
+            self.ahead.drop_plan();
+        }
         if let Some(transparent) = self.colours.over()
             && self.is_within(now, seen)
         {
@@ -285,7 +356,6 @@ impl<'a> Stripe<'a> {
                 return transparent;
             }
             if update != PixelUpdate::Refine
-                && shown <= nearest + self.tolerances[1]
                 && shown <= nearest + self.tolerance(row, k, entry)
                 && self.writer.extend(transparent)
             {
@@ -411,7 +481,7 @@ mod tests {
         let mut seen = vec![[0; 3]; SIDE * SIDE];
         for seen in seen.chunks_mut(SIDE) {
             let (pixels, updates) = ([rgb; SIDE], [PixelUpdate::Draw; SIDE]);
-            stripe.draw(Row { pixels: &pixels, above: &pixels, updates: &updates, seen });
+            stripe.draw(Row { pixels: &pixels, above: &pixels, next: None, updates: &updates, seen });
         }
         seen
     }

@@ -1,0 +1,136 @@
+//! Looks ahead in a row of pixels for the string of indices that costs least.
+//!
+//! LZW writes a string that it knows as one code. Several indices may be good enough for a pixel, and the best of them can
+//! lead to a string that soon ends. So the strings of the code table that fit the next pixels are searched, depth first. The
+//! cost of a string is one code and the errors of its pixels, divided by their number.
+
+use crate::lzw::Writer;
+
+/// The largest number of indices that a pixel may have.
+const MOST: usize = 10;
+/// The cost of a code, in tolerances of a pixel.
+const CODE: f32 = 4.0;
+/// The number of strings that are tried for each string written. More take time, and make the file larger: strings that
+/// are worse but longer teach the code table less.
+const TRIED: usize = 16;
+/// Pixels whose choices are kept; a power of two above `TRIED`.
+const KEPT: usize = 32;
+
+/// The indices that a pixel may have, best first, and their errors in parts of the tolerance.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Choices {
+    count: usize,
+    indices: [u8; MOST],
+    errors: [f32; MOST],
+}
+
+impl Choices {
+    /// Adds an index.
+    pub(crate) fn add(&mut self, index: u8, error: f32) {
+        if self.count < MOST {
+            (self.indices[self.count], self.errors[self.count]) = (index, error);
+            self.count += 1;
+        }
+    }
+}
+
+/// The string that is being written in a row.
+#[derive(Debug, Default)]
+pub(crate) struct Ahead {
+    /// The choices of the pixels before column `known`, at their column modulo `KEPT`.
+    choices: Vec<Choices>,
+    known: usize,
+    /// The indices that are not written yet, last first.
+    planned: Vec<u8>,
+}
+
+impl Ahead {
+    /// Starts a row.
+    pub(crate) fn start_row(&mut self) {
+        self.choices.resize(KEPT, Choices::default());
+        self.known = 0;
+        self.planned.clear();
+    }
+
+    /// Returns whether an index is planned for the next pixel.
+    pub(crate) fn is_planned(&self) -> bool {
+        !self.planned.is_empty()
+    }
+
+    /// Takes the index that is planned for the next pixel.
+    pub(crate) fn take(&mut self) -> Option<u8> {
+        self.planned.pop()
+    }
+
+    /// Drops the plan.
+    pub(crate) fn drop_plan(&mut self) {
+        self.planned.clear();
+    }
+
+    /// Plans the pixels from a column on: those that continue the writer's string, or else those of a new one. `end`: the
+    /// column after the last. `choices` returns the choices of a column.
+    pub(crate) fn plan(
+        &mut self,
+        writer: &Writer,
+        column: usize,
+        end: usize,
+        choices: impl Fn(usize) -> Choices,
+    ) {
+        self.known = self.known.max(column);
+        if writer.is_known() {
+            self.search(writer, writer.string(), column, end, &choices);
+        }
+        if self.planned.is_empty() {
+            self.search(writer, None, column, end, &choices);
+        }
+    }
+
+    fn search(
+        &mut self,
+        writer: &Writer,
+        string: Option<u16>,
+        column: usize,
+        end: usize,
+        choices: &impl Fn(usize) -> Choices,
+    ) {
+        // Of the string of each length: its code, its error, and the number of choices tried to continue it.
+        let mut path = [(string, 0.0_f32, 0_usize); TRIED + 1];
+        let mut indices = [0; TRIED];
+        let (mut length, mut tried, mut least) = (0, 0, f32::INFINITY);
+        while tried < TRIED {
+            let at = column + length;
+            if at == self.known && at < end {
+                self.choices[at % KEPT] = choices(at);
+                self.known += 1;
+            }
+            let (string, error, next) = &mut path[length];
+            let found = if at < end {
+                let Choices { count, indices, errors } = &self.choices[at % KEPT];
+                let longer = (*next..*count).find_map(|k| Some((k, writer.longer(*string, indices[k])?)));
+                longer.map(|(k, longer)| {
+                    *next = k + 1;
+                    (indices[k], longer, *error + errors[k])
+                })
+            } else {
+                None
+            };
+            let Some((index, longer, error)) = found else {
+                if length == 0 {
+                    break;
+                }
+                length -= 1;
+                continue;
+            };
+            indices[length] = index;
+            length += 1;
+            tried += 1;
+            path[length] = (Some(longer), error, 0);
+            let cost = (CODE + error) / length as f32;
+            if cost < least {
+                least = cost;
+                self.planned.clear();
+                self.planned.extend(indices[..length].iter().rev());
+            }
+        }
+    }
+}
