@@ -5,6 +5,7 @@
 //! cost of a string is one code and the errors of its pixels, divided by their number.
 
 use crate::lzw::Writer;
+use crate::nearest::Nearest;
 
 /// The largest number of indices that a pixel may have.
 const MOST: usize = 10;
@@ -19,6 +20,8 @@ const KEPT: usize = 32;
 /// The indices that a pixel may have, best first, and their errors in parts of the tolerance.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Choices {
+    /// The palette entry nearest to the pixel, if it is drawn.
+    pub(crate) nearest: Option<Nearest>,
     count: usize,
     indices: [u8; MOST],
     errors: [f32; MOST],
@@ -57,9 +60,9 @@ impl Ahead {
         !self.planned.is_empty()
     }
 
-    /// Takes the index that is planned for the next pixel.
-    pub(crate) fn take(&mut self) -> Option<u8> {
-        self.planned.pop()
+    /// Takes the index that is planned for the next pixel, which is in this column, and the palette entry nearest to it.
+    pub(crate) fn take(&mut self, column: usize) -> Option<(u8, Option<Nearest>)> {
+        self.planned.pop().map(|index| (index, self.choices[column % KEPT].nearest))
     }
 
     /// Drops the plan.
@@ -94,8 +97,9 @@ impl Ahead {
         choices: &impl Fn(usize) -> Choices,
     ) {
         // Of the string of each length: its code, its error, and the number of choices tried to continue it.
-        let mut path = [(string, 0.0_f32, 0_usize); TRIED + 1];
-        let mut indices = [0; TRIED];
+        let (mut strings, mut errors, mut next) =
+            ([string; TRIED + 1], [0.0_f32; TRIED + 1], [0_usize; TRIED + 1]);
+        let (mut indices, mut best, mut best_length) = ([0; TRIED], [0; TRIED], 0);
         let (mut length, mut tried, mut least) = (0, 0, f32::INFINITY);
         while tried < TRIED {
             let at = column + length;
@@ -103,34 +107,28 @@ impl Ahead {
                 self.choices[at % KEPT] = choices(at);
                 self.known += 1;
             }
-            let (string, error, next) = &mut path[length];
-            let found = if at < end {
-                let Choices { count, indices, errors } = &self.choices[at % KEPT];
-                let longer = (*next..*count).find_map(|k| Some((k, writer.longer(*string, indices[k])?)));
-                longer.map(|(k, longer)| {
-                    *next = k + 1;
-                    (indices[k], longer, *error + errors[k])
-                })
-            } else {
-                None
-            };
-            let Some((index, longer, error)) = found else {
+            let of = &self.choices[at % KEPT];
+            let count = if at < end { of.count } else { 0 };
+            let found = (next[length]..count)
+                .find_map(|k| Some((k, writer.longer(strings[length], of.indices[k])?)));
+            let Some((k, longer)) = found else {
                 if length == 0 {
                     break;
                 }
                 length -= 1;
                 continue;
             };
-            indices[length] = index;
+            next[length] = k + 1;
+            indices[length] = of.indices[k];
+            let error = errors[length] + of.errors[k];
             length += 1;
             tried += 1;
-            path[length] = (Some(longer), error, 0);
+            (strings[length], errors[length], next[length]) = (Some(longer), error, 0);
             let cost = (CODE + error) / length as f32;
             if cost < least {
-                least = cost;
-                self.planned.clear();
-                self.planned.extend(indices[..length].iter().rev());
+                (least, best, best_length) = (cost, indices, length);
             }
         }
+        self.planned.extend(best[..best_length].iter().rev());
     }
 }

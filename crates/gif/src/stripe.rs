@@ -191,7 +191,6 @@ impl<'a> Stripe<'a> {
     pub(crate) fn draw(&mut self, row: Row<'_>) {
         let transparent = self.colours.transparent;
         let mut previous = None;
-        let mut last = ([0; 3], None);
         self.from_above.resize(row.pixels.len(), [0.0; 3]);
         let mut diffused = [0.0; 3];
         self.ahead.start_row();
@@ -200,7 +199,7 @@ impl<'a> Stripe<'a> {
             let above = self.from_above[k];
             let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
             diffused = [0.0; 3];
-            let planned = self.planned(&row, k);
+            let (planned, entry) = self.planned(&row, k).unzip();
             let index = match update {
                 PixelUpdate::Keep => {
                     let transparent = transparent.unwrap_or(0);
@@ -209,10 +208,7 @@ impl<'a> Stripe<'a> {
                 }
                 PixelUpdate::Either => self.kept_or_repeated(now, seen, previous),
                 PixelUpdate::Refine | PixelUpdate::Draw => {
-                    if last.0 != now || last.1.is_none() {
-                        last = (now, Some(self.nearest(now)));
-                    }
-                    let Some(entry) = last.1 else { continue };
+                    let entry = entry.flatten().unwrap_or_else(|| self.nearest(now));
                     let levels = colour::levels(now);
                     if entry.error > SMALL && row.is_smooth(k, entry.error) {
                         let part = ((entry.error - SMALL) * self.corrected).min(MAX_CORRECTED);
@@ -221,12 +217,20 @@ impl<'a> Stripe<'a> {
                             levels[1] + part * residual[1],
                             levels[2] + part * residual[2],
                         ];
-                        let index = self.drawn(&row, k, target, entry, NEW_STRING, planned);
+                        let index = match planned.filter(|&index| self.suits(&row, k, target, entry, index)) {
+                            Some(index) => self.put(index),
+                            None => {
+                                self.ahead.drop_plan();
+                                self.drawn(&row, k, target, entry, NEW_STRING)
+                            }
+                        };
                         let shown = if Some(index) == transparent { seen } else { self.colour(index) };
                         diffused = diffuse(residual, levels, colour::levels(shown));
                         index
+                    } else if let Some(index) = planned {
+                        self.put(index)
                     } else {
-                        self.drawn(&row, k, levels, entry, f32::INFINITY, planned)
+                        self.drawn(&row, k, levels, entry, f32::INFINITY)
                     }
                 }
             };
@@ -264,13 +268,13 @@ impl<'a> Stripe<'a> {
     }
 
     /// Returns the index of a pixel in the string that costs least.
-    fn planned(&mut self, row: &Row<'_>, k: usize) -> Option<u8> {
+    fn planned(&mut self, row: &Row<'_>, k: usize) -> Option<(u8, Option<Nearest>)> {
         if !self.ahead.is_planned() && row.updates[k] == PixelUpdate::Draw {
             let mut ahead = std::mem::take(&mut self.ahead);
             ahead.plan(self.writer, k, row.pixels.len(), |k| self.choices(row, k));
             self.ahead = ahead;
         }
-        self.ahead.take()
+        self.ahead.take(k)
     }
 
     /// Returns the indices that a pixel may have.
@@ -284,6 +288,7 @@ impl<'a> Stripe<'a> {
                 let (entry, form, levels) = (self.nearest(now), self.metric.around(now), colour::levels(now));
                 let tolerance = self.tolerance(row, k, entry);
                 let nearest = form.error(levels, colour::levels(self.colour(entry.index)));
+                choices.nearest = Some(entry);
                 choices.add(entry.index, 0.0);
                 let mut add = |index: u8, shown: [u8; 3], levels_shown: [f32; 3]| {
                     let more = form.error(levels, levels_shown) - nearest;
@@ -292,7 +297,10 @@ impl<'a> Stripe<'a> {
                     }
                 };
                 let others = &self.colours.palette.alternatives[usize::from(entry.index)];
-                for (&index, &levels) in others.indices.iter().zip(&others.levels) {
+                // By the triangle inequality, those after it are too far off.
+                let apart = entry.error.sqrt() + (nearest + tolerance).sqrt();
+                let count = others.apart.iter().take_while(|&&other| other <= apart * apart).count();
+                for (&index, &levels) in others.indices[..count].iter().zip(&others.levels) {
                     add(index, self.colour(index), levels);
                 }
                 if let Some(transparent) = over {
@@ -301,6 +309,20 @@ impl<'a> Stripe<'a> {
             }
         }
         choices
+    }
+
+    /// Returns whether a planned index suits a pixel whose target is not its own colour.
+    fn suits(&self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, index: u8) -> bool {
+        let form = self.metric.around(row.pixels[k]);
+        let nearest = form.error(target, colour::levels(self.colour(entry.index)));
+        let shown = if Some(index) == self.colours.over() { row.seen[k] } else { self.colour(index) };
+        nearest <= NEW_STRING
+            && form.error(target, colour::levels(shown)) <= nearest + self.tolerance(row, k, entry)
+    }
+
+    fn put(&mut self, index: u8) -> u8 {
+        self.writer.put(index);
+        index
     }
 
     /// Returns the error above that of the best index that is accepted to make the file smaller.
@@ -318,19 +340,10 @@ impl<'a> Stripe<'a> {
     ///
     /// `target`: the levels of the pixel plus the corrected part of the residual. `entry`: the palette entry nearest
     /// to the pixel itself. `new_string`: the error that another index must save to begin a new string.
-    fn drawn(
-        &mut self,
-        row: &Row<'_>,
-        k: usize,
-        target: [f32; 3],
-        entry: Nearest,
-        new_string: f32,
-        planned: Option<u8>,
-    ) -> u8 {
+    fn drawn(&mut self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, new_string: f32) -> u8 {
         let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
         // No error and no bytes. A pixel that is seen right may also be left, which is tried below.
         if entry.error == 0.0
-            && planned.is_none_or(|planned| planned == entry.index)
             && (self.colours.over().is_none() || now != seen)
             && self.writer.extend(entry.index)
         {
@@ -338,14 +351,6 @@ impl<'a> Stripe<'a> {
         }
         let form = self.metric.around(now);
         let nearest = form.error(target, colour::levels(self.colour(entry.index)));
-        if let Some(index) = planned {
-            let shown = if Some(index) == self.colours.over() { seen } else { self.colour(index) };
-            if form.error(target, colour::levels(shown)) <= nearest + self.tolerance(row, k, entry) {
-                self.writer.put(index);
-                return index;
-            }
-            self.ahead.drop_plan();
-        }
         if let Some(transparent) = self.colours.over()
             && self.is_within(now, seen)
         {
