@@ -109,8 +109,8 @@ impl Ahead {
             }
             let of = &self.choices[at % KEPT];
             let count = if at < end { of.count } else { 0 };
-            let found = (next[length]..count)
-                .find_map(|k| Some((k, writer.longer(strings[length], of.indices[k])?)));
+            let found =
+                (next[length]..count).find_map(|k| Some((k, writer.longer(strings[length], of.indices[k])?)));
             let Some((k, longer)) = found else {
                 if length == 0 {
                     break;
@@ -130,5 +130,40 @@ impl Ahead {
             }
         }
         self.planned.extend(best[..best_length].iter().rev());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns what is planned after the indices 1, 2, 7 for pixels with these choices.
+    fn planned(of: &[&[(u8, f32)]]) -> Vec<u8> {
+        let mut writer = Writer::new(8);
+        [1, 2, 7].iter().for_each(|&index| writer.put(index));
+        let mut ahead = Ahead::default();
+        ahead.start_row();
+        ahead.plan(&writer, 0, of.len(), |column| {
+            let mut choices = Choices::default();
+            of[column].iter().for_each(|&(index, error)| choices.add(index, error));
+            choices
+        });
+        (0..of.len()).map_while(|column| ahead.take(column)).map(|(index, _)| index).collect()
+    }
+
+    #[test]
+    fn an_index_that_leads_to_a_longer_string_is_planned_in_place_of_the_best() {
+        assert_eq!(planned(&[&[(5, 0.0), (1, 0.5)], &[(2, 0.0)], &[(3, 0.0)]]), [1, 2]);
+        assert_eq!(planned(&[&[(5, 0.0), (3, 0.5)], &[(2, 0.0)]]), [5]);
+    }
+
+    #[test]
+    fn a_string_ends_where_another_pixel_would_cost_more_than_it_saves() {
+        assert_eq!(planned(&[&[(1, 0.0)], &[(2, 9.0)]]), [1]);
+    }
+
+    #[test]
+    fn nothing_is_planned_for_a_pixel_without_choices() {
+        assert!(planned(&[&[], &[(2, 0.0)]]).is_empty());
     }
 }

@@ -160,7 +160,10 @@ impl Quantiser {
             ),
             Some(previous) => {
                 let compared = preparation.compare(seen);
-                rayon::join(|| preparation.plan(compared), || Some(previous.draw(seen, of_file, Some(pixels_of(&frame)))))
+                rayon::join(
+                    || preparation.plan(compared),
+                    || Some(previous.draw(seen, of_file, Some(pixels_of(&frame)))),
+                )
             }
         };
         if let Plan::Lossy(LossyPlan { area: Some(_), level_error, .. }) = plan {
@@ -504,6 +507,18 @@ mod tests {
         let block = quantiser.finish().unwrap();
         assert_eq!(block.delay_cs, 6);
         assert!(block.transparent.is_some());
+    }
+
+    #[test]
+    fn what_the_next_frame_changes_takes_fewer_bytes() {
+        let bytes = |next: RgbImage| {
+            let mut quantiser = Quantiser::new(false, None);
+            quantiser.push(frame(64, 0), 5);
+            quantiser.push(frame(0, 100), 5);
+            quantiser.push(next, 5).unwrap().data.len()
+        };
+        let (gone, stays) = (bytes(frame(64, 0)), bytes(frame(0, 100)));
+        assert!(gone < stays, "{gone} bytes, {stays} if it stays");
     }
 
     #[test]

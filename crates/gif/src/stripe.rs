@@ -1,7 +1,8 @@
 //! Chooses the palette index of each pixel while LZW compresses the indices.
 //!
 //! LZW writes a string of indices that is in its code table as one code. So if the best index would end the string,
-//! an index that is nearly as good and continues it is used instead.
+//! an index that is nearly as good and continues it is used instead. Strings of pixels that are drawn are
+//! [sought ahead](crate::ahead). An index may be worse where the next frame changes the pixel, for its error is seen once.
 //!
 //! Error diffusion spreads the palette's error: the residual of a pixel, its intended minus its shown colour, is
 //! divided between the pixels to the right and below. Three rules keep the file small:
@@ -30,7 +31,7 @@ use crate::update_map::{PixelUpdate, SEEN_RIGHT_AGAIN};
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
 const TOLERANCE: f32 = 4.0;
 /// The least tolerance of a pixel that the next frame changes: its error is seen for one frame only.
-const TOLERANCE_IF_SOON_GONE: f32 = 20.0;
+const TOLERANCE_IF_SOON_GONE: f32 = 40.0;
 /// The tolerance if no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
 const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
 const FEW_LEVELS: u8 = 2;
@@ -150,6 +151,7 @@ pub(crate) struct Stripe<'a> {
     tolerances: [f32; 2],
     /// The residual that each pixel of the row above diffuses down.
     from_above: Vec<[f32; 3]>,
+    /// The string that is being written.
     ahead: Ahead,
 }
 
@@ -282,7 +284,9 @@ impl<'a> Stripe<'a> {
         let (now, seen, mut choices) = (row.pixels[k], row.seen[k], Choices::default());
         let over = self.colours.over();
         match row.updates[k] {
-            PixelUpdate::Keep | PixelUpdate::Either => choices.add(self.colours.transparent.unwrap_or(0), 0.0),
+            PixelUpdate::Keep | PixelUpdate::Either => {
+                choices.add(self.colours.transparent.unwrap_or(0), 0.0)
+            }
             PixelUpdate::Refine => {}
             PixelUpdate::Draw => {
                 let (entry, form, levels) = (self.nearest(now), self.metric.around(now), colour::levels(now));
