@@ -168,7 +168,7 @@ fn draw_nearly(
         bound: bound::NONE,
     };
     let mut canvas = vec![[0; 3]; pixels.len()];
-    quantise::draw(pixels, width, area, &updates.pixels, &mut canvas, colours, delay_cs).0
+    quantise::draw((pixels, None), width, area, &updates.pixels, &mut canvas, colours, delay_cs).0
 }
 
 #[cfg(test)]

@@ -40,6 +40,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod ahead;
 mod alone;
 mod block;
 mod bound;

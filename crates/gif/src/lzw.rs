@@ -68,6 +68,16 @@ impl Writer {
         Self { bits, table, string: None, width: u32::from(bits) + 1, codes: Codes::default() }
     }
 
+    /// Returns the code of the current string.
+    pub(crate) fn string(&self) -> Option<u16> {
+        self.string
+    }
+
+    /// Returns the code of a string followed by an index, if it is known. `None` is the empty string.
+    pub(crate) fn longer(&self, string: Option<u16>, index: u8) -> Option<u16> {
+        string.map_or(Some(u16::from(index)), |string| self.table.code(string, index))
+    }
+
     /// Returns whether some index may continue the current string.
     pub(crate) fn is_known(&self) -> bool {
         self.string.is_none_or(|string| self.table.continued[usize::from(string)] != 0)
@@ -90,10 +100,7 @@ impl Writer {
 
     /// Writes the index if it continues the current string. Returns whether it did.
     pub(crate) fn extend(&mut self, index: u8) -> bool {
-        let longer = match self.string {
-            Some(string) => self.table.code(string, index),
-            None => Some(u16::from(index)),
-        };
+        let longer = self.longer(self.string, index);
         if longer.is_some() {
             self.string = longer;
         }

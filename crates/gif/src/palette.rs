@@ -59,13 +59,20 @@ pub(crate) struct Alternatives {
     pub(crate) indices: [u8; ALTERNATIVES],
     /// If there are fewer entries, the rest have levels that are far from every colour.
     pub(crate) levels: [[f32; 3]; ALTERNATIVES],
+    /// Their squared distances from the entry, the least first.
+    pub(crate) apart: [f32; ALTERNATIVES],
 }
 
 impl Alternatives {
     fn of(near: &[Neighbour], colours: &[[u8; 3]]) -> Self {
-        let mut alternatives = Self { indices: [0; ALTERNATIVES], levels: [[1e9; 3]; ALTERNATIVES] };
+        let mut alternatives = Self {
+            indices: [0; ALTERNATIVES],
+            levels: [[1e9; 3]; ALTERNATIVES],
+            apart: [f32::INFINITY; ALTERNATIVES],
+        };
         for (at, neighbour) in near.iter().take(ALTERNATIVES).enumerate() {
             alternatives.indices[at] = neighbour.index;
+            alternatives.apart[at] = neighbour.apart;
             alternatives.levels[at] = colour::levels(colours[usize::from(neighbour.index)]);
         }
         alternatives

@@ -156,11 +156,14 @@ impl Quantiser {
                     let compared = preparation.compare(&previous.frame);
                     preparation.plan(compared)
                 },
-                || Some(previous.draw(seen, of_file)),
+                || Some(previous.draw(seen, of_file, Some(pixels_of(&frame)))),
             ),
             Some(previous) => {
                 let compared = preparation.compare(seen);
-                rayon::join(|| preparation.plan(compared), || Some(previous.draw(seen, of_file)))
+                rayon::join(
+                    || preparation.plan(compared),
+                    || Some(previous.draw(seen, of_file, Some(pixels_of(&frame)))),
+                )
             }
         };
         if let Plan::Lossy(LossyPlan { area: Some(_), level_error, .. }) = plan {
@@ -202,7 +205,7 @@ impl Quantiser {
     pub(crate) fn finish(&mut self) -> Option<Block> {
         rayon::scope(|_| self.settle());
         let last = self.prepared.take()?;
-        rayon::scope(|_| Some(last.draw(&mut self.seen, self.of_file.as_ref()).0))
+        rayon::scope(|_| Some(last.draw(&mut self.seen, self.of_file.as_ref(), None).0))
     }
 }
 
@@ -380,8 +383,13 @@ impl Prepared {
         }
     }
 
-    /// Draws the frame. Returns the block, and the static pixels that were redrawn.
-    fn draw(&self, seen: &mut RgbImage, of_file: Option<&FewColours>) -> (Block, Vec<Redrawn>) {
+    /// Draws the frame. Returns the block, and the static pixels that were redrawn. `next`: the pixels of the frame after it.
+    fn draw(
+        &self,
+        seen: &mut RgbImage,
+        of_file: Option<&FewColours>,
+        next: Option<&[[u8; 3]]>,
+    ) -> (Block, Vec<Redrawn>) {
         let (width, pixels) = (self.frame.width() as usize, pixels_of(&self.frame));
         let seen = seen.as_chunks_mut::<3>().0;
         match &self.plan {
@@ -398,7 +406,10 @@ impl Prepared {
                 let is_alone = false;
                 let colours =
                     Colours { palette, nearest, histogram, transparent, is_alone, changed, error, bound };
-                draw(pixels, width, *area, &self.buffers.updates.pixels, seen, colours, self.delay_cs)
+                // A frame that is encoded as if it were alone knows no other.
+                let next = next.filter(|_| reservation.is_some());
+                let updates = &self.buffers.updates.pixels;
+                draw((pixels, next), width, *area, updates, seen, colours, self.delay_cs)
             }
         }
     }
@@ -418,9 +429,9 @@ fn least_stripes(changed: f64, colours: usize) -> usize {
     }
 }
 
-/// Draws an area of a frame with the colours of a palette. Returns the block, and the static pixels that were redrawn.
+/// Draws an area of a frame with the colours of a palette. `next`: the pixels of the frame after it. Returns the block, and the static pixels that were redrawn.
 pub(crate) fn draw(
-    pixels: &[[u8; 3]],
+    (pixels, next): (&[[u8; 3]], Option<&[[u8; 3]]>),
     width: usize,
     area: Area,
     updates: &[PixelUpdate],
@@ -444,6 +455,7 @@ pub(crate) fn draw(
             stripe.draw(Row {
                 pixels: &pixels[part.clone()],
                 above: &pixels[above],
+                next: next.map(|next| &next[part.clone()]),
                 updates: &updates[part],
                 seen: &mut seen[area.left..area.right],
             });
@@ -495,6 +507,18 @@ mod tests {
         let block = quantiser.finish().unwrap();
         assert_eq!(block.delay_cs, 6);
         assert!(block.transparent.is_some());
+    }
+
+    #[test]
+    fn what_the_next_frame_changes_takes_fewer_bytes() {
+        let bytes = |next: RgbImage| {
+            let mut quantiser = Quantiser::new(false, None);
+            quantiser.push(frame(64, 0), 5);
+            quantiser.push(frame(0, 100), 5);
+            quantiser.push(next, 5).unwrap().data.len()
+        };
+        let (gone, stays) = (bytes(frame(64, 0)), bytes(frame(0, 100)));
+        assert!(gone < stays, "{gone} bytes, {stays} if it stays");
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Chooses the palette index of each pixel while LZW compresses the indices.
 //!
 //! LZW writes a string of indices that is in its code table as one code. So if the best index would end the string,
-//! an index that is nearly as good and continues it is used instead.
+//! an index that is nearly as good and continues it is used instead. Strings of pixels that are drawn are
+//! [sought ahead](crate::ahead). An index may be worse where the next frame changes the pixel, for its error is seen once.
 //!
 //! Error diffusion spreads the palette's error: the residual of a pixel, its intended minus its shown colour, is
 //! divided between the pixels to the right and below. Three rules keep the file small:
@@ -17,6 +18,7 @@
 
 use rayon::prelude::*;
 
+use crate::ahead::{Ahead, Choices};
 use crate::block::{self, Area, Block};
 use crate::colour::{self, LocalMetric};
 use crate::histogram::Histogram;
@@ -24,10 +26,12 @@ use crate::lzw::{Part, Writer};
 use crate::nearest::Nearest;
 use crate::palette::Palette;
 use crate::refine_budget::Redrawn;
-use crate::update_map::PixelUpdate;
+use crate::update_map::{PixelUpdate, SEEN_RIGHT_AGAIN};
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
-const TOLERANCE: f32 = 5.85;
+const TOLERANCE: f32 = 4.0;
+/// The least tolerance of a pixel that the next frame changes: its error is seen for one frame only.
+const TOLERANCE_IF_SOON_GONE: f32 = 40.0;
 /// The tolerance if no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
 const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
 const FEW_LEVELS: u8 = 2;
@@ -147,6 +151,8 @@ pub(crate) struct Stripe<'a> {
     tolerances: [f32; 2],
     /// The residual that each pixel of the row above diffuses down.
     from_above: Vec<[f32; 3]>,
+    /// The string that is being written.
+    ahead: Ahead,
 }
 
 /// A part of a row of a frame: its pixels, their updates, and the canvas.
@@ -154,6 +160,8 @@ pub(crate) struct Row<'a> {
     pub(crate) pixels: &'a [[u8; 3]],
     /// The pixels of the frame in the row above.
     pub(crate) above: &'a [[u8; 3]],
+    /// The pixels of the frame after it.
+    pub(crate) next: Option<&'a [[u8; 3]]>,
     pub(crate) updates: &'a [PixelUpdate],
     pub(crate) seen: &'a mut [[u8; 3]],
 }
@@ -173,6 +181,7 @@ impl<'a> Stripe<'a> {
             corrected: CORRECTED * part.max(LEAST_PART),
             tolerances: [tolerance, tolerance + TOLERANCE_IF_ROUGH * soon_gone],
             from_above: Vec::new(),
+            ahead: Ahead::default(),
         }
     }
 
@@ -184,14 +193,15 @@ impl<'a> Stripe<'a> {
     pub(crate) fn draw(&mut self, row: Row<'_>) {
         let transparent = self.colours.transparent;
         let mut previous = None;
-        let mut last = ([0; 3], None);
         self.from_above.resize(row.pixels.len(), [0.0; 3]);
         let mut diffused = [0.0; 3];
+        self.ahead.start_row();
         for k in 0..row.pixels.len() {
             let (now, update, seen) = (row.pixels[k], row.updates[k], row.seen[k]);
             let above = self.from_above[k];
             let residual = [diffused[0] + above[0], diffused[1] + above[1], diffused[2] + above[2]];
             diffused = [0.0; 3];
+            let (planned, entry) = self.planned(&row, k).unzip();
             let index = match update {
                 PixelUpdate::Keep => {
                     let transparent = transparent.unwrap_or(0);
@@ -200,10 +210,7 @@ impl<'a> Stripe<'a> {
                 }
                 PixelUpdate::Either => self.kept_or_repeated(now, seen, previous),
                 PixelUpdate::Refine | PixelUpdate::Draw => {
-                    if last.0 != now || last.1.is_none() {
-                        last = (now, Some(self.nearest(now)));
-                    }
-                    let Some(entry) = last.1 else { continue };
+                    let entry = entry.flatten().unwrap_or_else(|| self.nearest(now));
                     let levels = colour::levels(now);
                     if entry.error > SMALL && row.is_smooth(k, entry.error) {
                         let part = ((entry.error - SMALL) * self.corrected).min(MAX_CORRECTED);
@@ -212,10 +219,18 @@ impl<'a> Stripe<'a> {
                             levels[1] + part * residual[1],
                             levels[2] + part * residual[2],
                         ];
-                        let index = self.drawn(&row, k, target, entry, NEW_STRING);
+                        let index = match planned.filter(|&index| self.suits(&row, k, target, entry, index)) {
+                            Some(index) => self.put(index),
+                            None => {
+                                self.ahead.drop_plan();
+                                self.drawn(&row, k, target, entry, NEW_STRING)
+                            }
+                        };
                         let shown = if Some(index) == transparent { seen } else { self.colour(index) };
                         diffused = diffuse(residual, levels, colour::levels(shown));
                         index
+                    } else if let Some(index) = planned {
+                        self.put(index)
                     } else {
                         self.drawn(&row, k, levels, entry, f32::INFINITY)
                     }
@@ -254,10 +269,75 @@ impl<'a> Stripe<'a> {
         index
     }
 
+    /// Returns the index of a pixel in the string that costs least.
+    fn planned(&mut self, row: &Row<'_>, k: usize) -> Option<(u8, Option<Nearest>)> {
+        if !self.ahead.is_planned() && row.updates[k] == PixelUpdate::Draw {
+            let mut ahead = std::mem::take(&mut self.ahead);
+            ahead.plan(self.writer, k, row.pixels.len(), |k| self.choices(row, k));
+            self.ahead = ahead;
+        }
+        self.ahead.take(k)
+    }
+
+    /// Returns the indices that a pixel may have.
+    fn choices(&self, row: &Row<'_>, k: usize) -> Choices {
+        let (now, seen, mut choices) = (row.pixels[k], row.seen[k], Choices::default());
+        let over = self.colours.over();
+        match row.updates[k] {
+            PixelUpdate::Keep | PixelUpdate::Either => {
+                choices.add(self.colours.transparent.unwrap_or(0), 0.0)
+            }
+            PixelUpdate::Refine => {}
+            PixelUpdate::Draw => {
+                let (entry, form, levels) = (self.nearest(now), self.metric.around(now), colour::levels(now));
+                let tolerance = self.tolerance(row, k, entry);
+                let nearest = form.error(levels, colour::levels(self.colour(entry.index)));
+                choices.nearest = Some(entry);
+                choices.add(entry.index, 0.0);
+                let mut add = |index: u8, shown: [u8; 3], levels_shown: [f32; 3]| {
+                    let more = form.error(levels, levels_shown) - nearest;
+                    if more <= tolerance && self.is_within(now, shown) {
+                        choices.add(index, more.max(0.0) / tolerance);
+                    }
+                };
+                let others = &self.colours.palette.alternatives[usize::from(entry.index)];
+                // By the triangle inequality, those after it are too far off.
+                let apart = entry.error.sqrt() + (nearest + tolerance).sqrt();
+                let count = others.apart.iter().take_while(|&&other| other <= apart * apart).count();
+                for (&index, &levels) in others.indices[..count].iter().zip(&others.levels) {
+                    add(index, self.colour(index), levels);
+                }
+                if let Some(transparent) = over {
+                    add(transparent, seen, colour::levels(seen));
+                }
+            }
+        }
+        choices
+    }
+
+    /// Returns whether a planned index suits a pixel whose target is not its own colour.
+    fn suits(&self, row: &Row<'_>, k: usize, target: [f32; 3], entry: Nearest, index: u8) -> bool {
+        let form = self.metric.around(row.pixels[k]);
+        let nearest = form.error(target, colour::levels(self.colour(entry.index)));
+        let shown = if Some(index) == self.colours.over() { row.seen[k] } else { self.colour(index) };
+        nearest <= NEW_STRING
+            && form.error(target, colour::levels(shown)) <= nearest + self.tolerance(row, k, entry)
+    }
+
+    fn put(&mut self, index: u8) -> u8 {
+        self.writer.put(index);
+        index
+    }
+
     /// Returns the error above that of the best index that is accepted to make the file smaller.
     fn tolerance(&self, row: &Row<'_>, k: usize, entry: Nearest) -> f32 {
         let [smooth, rough] = self.tolerances;
-        if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth }
+        let change = row.next.map_or(0, |next| colour::level_error(row.pixels[k], next[k]));
+        if change as f32 <= SEEN_RIGHT_AGAIN {
+            return smooth;
+        }
+        let tolerance = if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth };
+        tolerance.max(TOLERANCE_IF_SOON_GONE)
     }
 
     /// Writes the index of a pixel that is drawn, and returns it.
@@ -285,7 +365,6 @@ impl<'a> Stripe<'a> {
                 return transparent;
             }
             if update != PixelUpdate::Refine
-                && shown <= nearest + self.tolerances[1]
                 && shown <= nearest + self.tolerance(row, k, entry)
                 && self.writer.extend(transparent)
             {
@@ -411,7 +490,7 @@ mod tests {
         let mut seen = vec![[0; 3]; SIDE * SIDE];
         for seen in seen.chunks_mut(SIDE) {
             let (pixels, updates) = ([rgb; SIDE], [PixelUpdate::Draw; SIDE]);
-            stripe.draw(Row { pixels: &pixels, above: &pixels, updates: &updates, seen });
+            stripe.draw(Row { pixels: &pixels, above: &pixels, next: None, updates: &updates, seen });
         }
         seen
     }

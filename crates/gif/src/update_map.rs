@@ -30,7 +30,7 @@ pub(crate) const MAX_SKIPPED_ERROR: f32 = 50.0;
 /// The level error up to which a pixel that changes may be left in a tile that is drawn.
 const SEEN_RIGHT: f32 = 2.0;
 /// The same limit for a pixel that could be left in the frame before: one level in each channel.
-const SEEN_RIGHT_AGAIN: f32 = 6.0;
+pub(crate) const SEEN_RIGHT_AGAIN: f32 = 6.0;
 /// The squared error (see [`colour`]) above which a static pixel needs a better colour.
 const SEEN_WRONG: f32 = 1.5;
 /// Pixels are refined from this part of the tile's mean error on: only the worst of a tile are worth the flicker.
