@@ -13,9 +13,9 @@ const MOST: usize = 10;
 const CODE: f32 = 4.0;
 /// The number of strings that are tried for each string written. More take time, and make the file larger: strings that
 /// are worse but longer teach the code table less.
-const TRIED: usize = 16;
+const TRIED: usize = 8;
 /// Pixels whose choices are kept; a power of two above `TRIED`.
-const KEPT: usize = 32;
+const KEPT: usize = 16;
 
 /// The indices that a pixel may have, best first, and their errors in parts of the tolerance.
 #[derive(Debug, Clone, Copy, Default)]

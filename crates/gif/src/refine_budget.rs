@@ -23,7 +23,7 @@ struct BudgetShare {
 /// The budget at the start. With the later additions, the mean difference stays below 0.05 over the first 11 frames.
 const AT_FIRST: BudgetShare = BudgetShare { pixels: 0.1, difference: 0.13 };
 /// The addition per frame if a fair part of it changes.
-const EACH_FRAME: BudgetShare = BudgetShare { pixels: 0.2, difference: 0.016 };
+const EACH_FRAME: BudgetShare = BudgetShare { pixels: 0.2, difference: 0.024 };
 /// A frame adds the full amount if at least one in this many of its pixels changes, else proportionally less.
 const FOR_CHANGES: f64 = 8.0;
 /// A reservation may exceed the remaining budget by this factor, because only a part of it is used. One large

@@ -30,8 +30,9 @@ use crate::update_map::{PixelUpdate, SEEN_RIGHT_AGAIN};
 
 /// The additional squared error (see [`colour`]) that an index may have if it makes the file smaller.
 const TOLERANCE: f32 = 4.0;
-/// The least tolerance of a pixel that the next frame changes: its error is seen for one frame only.
-const TOLERANCE_IF_SOON_GONE: f32 = 40.0;
+/// The least tolerances of a pixel that the next frame changes, in smooth and in other surroundings: its error is seen
+/// for one frame only, and more in smooth ones.
+const TOLERANCES_IF_SOON_GONE: [f32; 2] = [6.0, 14.0];
 /// The tolerance if no pixel may be off by more than `FEW_LEVELS`: there a larger error is not seen either.
 const TOLERANCE_IF_FEW_LEVELS: f32 = 9.0;
 const FEW_LEVELS: u8 = 2;
@@ -147,8 +148,9 @@ pub(crate) struct Stripe<'a> {
     metric: LocalMetric,
     /// The part of the residual that a pixel corrects per unit of error.
     corrected: f32,
-    /// The tolerances in smooth and in other surroundings.
-    tolerances: [f32; 2],
+    tolerance: f32,
+    /// The tolerances of a pixel that the next frame changes, in smooth and in other surroundings.
+    if_soon_gone: [f32; 2],
     /// The residual that each pixel of the row above diffuses down.
     from_above: Vec<[f32; 3]>,
     /// The string that is being written.
@@ -173,13 +175,15 @@ impl<'a> Stripe<'a> {
         let soon_gone = if colours.over().is_some() { part } else { 0.0 };
         let least = if colours.bound <= FEW_LEVELS { TOLERANCE_IF_FEW_LEVELS } else { TOLERANCE };
         let tolerance = least.max(TOLERANCE_BY_ERROR * colours.error * soon_gone);
+        let [smooth, rough] = TOLERANCES_IF_SOON_GONE;
         Self {
             colours,
             writer,
             redrawn: Redrawn::default(),
             metric: LocalMetric::new(),
             corrected: CORRECTED * part.max(LEAST_PART),
-            tolerances: [tolerance, tolerance + TOLERANCE_IF_ROUGH * soon_gone],
+            tolerance,
+            if_soon_gone: [smooth.max(tolerance), rough.max(tolerance + TOLERANCE_IF_ROUGH * soon_gone)],
             from_above: Vec::new(),
             ahead: Ahead::default(),
         }
@@ -331,13 +335,11 @@ impl<'a> Stripe<'a> {
 
     /// Returns the error above that of the best index that is accepted to make the file smaller.
     fn tolerance(&self, row: &Row<'_>, k: usize, entry: Nearest) -> f32 {
-        let [smooth, rough] = self.tolerances;
         let change = row.next.map_or(0, |next| colour::level_error(row.pixels[k], next[k]));
         if change as f32 <= SEEN_RIGHT_AGAIN {
-            return smooth;
+            return self.tolerance;
         }
-        let tolerance = if rough > smooth && !row.is_smooth(k, entry.error) { rough } else { smooth };
-        tolerance.max(TOLERANCE_IF_SOON_GONE)
+        self.if_soon_gone[usize::from(!row.is_smooth(k, entry.error))]
     }
 
     /// Writes the index of a pixel that is drawn, and returns it.
