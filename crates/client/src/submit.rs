@@ -410,11 +410,13 @@ mod tests {
         assert!(submission.unwrap_err().to_string().contains("longer than 900 bytes"));
     }
 
-    #[test]
-    fn settings_say_how_many_frames_there_are() {
-        let settings = AnimationSettings::new(None, 25.0, 3).unwrap();
+    #[tokio::test]
+    async fn settings_say_how_many_frames_there_are() {
+        let (world, settings) = (World::new(), AnimationSettings::new(None, 25.0, 3).unwrap());
         let file = settings_with_frames(&settings, 7).unwrap();
-        let parsed = rayfold_scene::parse_settings("animation.json", &file.read("k").unwrap());
+        file.send(&world.store, "k").await.unwrap();
+        let sent = world.store.get("k").await.unwrap();
+        let parsed = rayfold_scene::parse_settings("animation.json", &sent.body);
         assert_eq!(parsed.settings, AnimationSettings::new(Some(7), 25.0, 3).ok());
         assert!(matches!(settings_with_frames(&settings, 0), Err(Error::Settings(_))));
     }
