@@ -528,7 +528,7 @@ impl Run {
             && let Some(image) = material.finish().and_then(|finish| finish.image.as_ref())
             && let Some(uvs) = corners.uvs
         {
-            let place = self.from_top(mixed(uvs, weights)).into();
+            let place = self.place_from_top(mixed(uvs, weights)).into();
             color *= factor_at(image.file().picture(), place, true, self.is_linear);
         }
         if self.glows && glows_apart(&self.model, look()) {
@@ -594,12 +594,12 @@ impl Run {
             true => self.model.own_uvs(k, slot),
             false => corners.uvs.unwrap_or_default(),
         };
-        self.from_top(texture.transformed(mixed(uvs, weights)))
+        self.place_from_top(texture.transformed(mixed(uvs, weights)))
     }
 
     /// Returns the place of texture coordinates, from the upper left corner of a picture.
     #[inline(always)]
-    fn from_top(&self, DVec2 { x, y }: DVec2) -> DVec2 {
+    fn place_from_top(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
 }

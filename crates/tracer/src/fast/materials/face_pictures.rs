@@ -47,7 +47,7 @@ impl<E: Real> Looked<E> {
         [a, b, c]: [Lanes<S, E>; 3],
         bits: u32,
     ) -> Vec3<S, E> {
-        let one = constant::<S, E>(simd, 1.0);
+        let [zero, one] = [0.0, 1.0].map(|x| constant::<S, E>(simd, x));
         let [mut u, mut v] = [one; 2];
         for (place, axis) in [&mut u, &mut v].into_iter().zip(0..) {
             let [first, second, third] = &self.coordinates;
@@ -67,7 +67,7 @@ impl<E: Real> Looked<E> {
         for (factor, axis) in [&mut factors.x, &mut factors.y, &mut factors.z].into_iter().zip(0..) {
             let level = load::<S, E>(simd, &self.values[axis]);
             *factor = match picture.tint {
-                Some(tint) => (level * constant::<S, E>(simd, tint[axis])).max(one - one).min(one),
+                Some(tint) => (level * constant::<S, E>(simd, tint[axis])).max(zero).min(one),
                 None => level,
             };
         }
@@ -116,7 +116,8 @@ fn neighbours<S: Simd, E: Real>(
 ) -> (Lanes<S, E>, Lanes<S, E>, Lanes<S, E>) {
     let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| constant::<S, E>(simd, x));
     let [count, last] = [f64::from(count), f64::from(count - 1)].map(|x| constant::<S, E>(simd, x));
-    let place = (place - place).simd_eq(zero).select(place, zero);
+    let is_finite = place.abs().simd_lt(constant::<S, E>(simd, f64::INFINITY));
+    let place = is_finite.select(place, zero);
     let place = match wrap {
         Wrap::Repeat => place - place.floor(),
         Wrap::Clamp => place.max(zero).min(one),
