@@ -122,7 +122,7 @@ struct Goal {
     unit: &'static str,
 }
 
-/// What the vertices of a file have beside their positions.
+/// The data that the vertices of a file have beside their positions.
 #[derive(Clone, Copy, Default)]
 struct Extras {
     normals: bool,

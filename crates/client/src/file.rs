@@ -5,7 +5,7 @@
 //! object's metadata is compared.
 
 use std::io::{Cursor, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
 use md5::{Digest, Md5};
@@ -124,21 +124,22 @@ impl File {
 
 impl Content {
     fn pieces(&self) -> Result<Pieces<'_>> {
-        let reader: Box<dyn Read + Send> = match self {
-            Self::Bytes(bytes) => Box::new(Cursor::new(bytes.clone())),
+        let (reader, path): (Box<dyn Read + Send>, _) = match self {
+            Self::Bytes(bytes) => (Box::new(Cursor::new(bytes.clone())), Path::new("")),
             Self::Path(path) => match std::fs::File::open(path) {
-                Ok(file) => Box::new(file),
+                Ok(file) => (Box::new(file), path.as_path()),
                 Err(source) => return Err(Error::Read { path: path.clone(), source }),
             },
         };
-        Ok(Pieces { reader, content: self, md5: Md5::new() })
+        Ok(Pieces { reader, path, md5: Md5::new() })
     }
 }
 
 /// The bytes of a content, piece by piece.
 struct Pieces<'a> {
     reader: Box<dyn Read + Send>,
-    content: &'a Content,
+    /// The path of the file; empty for bytes in memory, whose reading does not fail.
+    path: &'a Path,
     md5: Md5,
 }
 
@@ -151,10 +152,7 @@ impl Pieces<'_> {
                 self.md5.update(&piece);
                 Ok(Some(piece.into()))
             }
-            Err(source) => {
-                let path = if let Content::Path(path) = self.content { path.clone() } else { PathBuf::new() };
-                Err(Error::Read { path, source })
-            }
+            Err(source) => Err(Error::Read { path: self.path.to_owned(), source }),
         }
     }
 

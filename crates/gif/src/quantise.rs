@@ -429,7 +429,8 @@ fn least_stripes(changed: f64, colours: usize) -> usize {
     }
 }
 
-/// Draws an area of a frame with the colours of a palette. `next`: the pixels of the frame after it. Returns the block, and the static pixels that were redrawn.
+/// Draws an area of a frame with the colours of a palette. `next`: the pixels of the frame after it. Returns the block, and
+/// the static pixels that were redrawn.
 pub(crate) fn draw(
     (pixels, next): (&[[u8; 3]], Option<&[[u8; 3]]>),
     width: usize,

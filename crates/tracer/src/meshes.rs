@@ -115,7 +115,7 @@ pub(crate) struct Shading {
     pub(crate) within: bool,
 }
 
-/// What a face has at its corners for its colours, as its model has it.
+/// The data at the corners of a face that its colours need, as its model has them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceCorners {
     /// Texture coordinates.
@@ -503,7 +503,7 @@ impl Run {
         })
     }
 
-    /// Returns what a face has at its corners for its colours.
+    /// Returns the data at the corners of a face that its colours need.
     pub(crate) fn face_corners(&self, k: usize) -> FaceCorners {
         FaceCorners { uvs: self.model.uvs(k), colors: self.model.vertex_colors(k) }
     }

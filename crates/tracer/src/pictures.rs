@@ -146,7 +146,7 @@ fn interpolated(
 }
 
 /// Returns the two pixels, of so many, whose middles are around a place, and the share of the second.
-fn neighbours(place: f64, count: u32, wrap: Wrap) -> ([u32; 2], f64) {
+pub(crate) fn neighbours(place: f64, count: u32, wrap: Wrap) -> ([u32; 2], f64) {
     // A place that is no number, of an object at the end of all numbers, is the corner.
     let place = if place.is_finite() { place } else { 0.0 };
     let repeats = wrap == Wrap::Repeat;

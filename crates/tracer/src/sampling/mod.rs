@@ -149,7 +149,7 @@ impl Points {
         Self { sampler, aside: sampler.aside(), first, rows: (0..own).map(row).collect() }
     }
 
-    /// What the points of a pixel are made from.
+    /// Returns the number from which the points of a pixel are made.
     #[inline(always)]
     pub(crate) const fn pixel_seed(&self, column: u32, row: u32) -> u32 {
         pixel_seed(column.wrapping_add(self.aside), row)

@@ -425,7 +425,7 @@ impl<E: Real> ModelFaces<E> {
         (facet, normals)
     }
 
-    /// Returns what a triangle has at its corners for its colours.
+    /// Returns the data at the corners of a triangle that its colours need.
     #[inline(always)]
     pub(in crate::fast) fn face_corners(&self, number: usize) -> FaceCorners {
         let ModelTree { index, uvs, colors, .. } = &*self.tree;
@@ -439,7 +439,7 @@ impl<E: Real> ModelFaces<E> {
         self.tree.uvs.get(self.tree.index[number] as usize).copied().unwrap_or_default()
     }
 
-    /// Reads from what a triangle has at its corners, and returns any of the bits.
+    /// Reads from the data at the corners of a triangle, and returns any of the bits.
     #[inline(always)]
     pub(in crate::fast) fn fetch(&self, number: usize) -> u32 {
         let ModelTree { index, normals, uvs, colors, .. } = &*self.tree;

@@ -153,3 +153,40 @@ fn mixed(a: [f64; 4], b: [f64; 4], share: f64) -> [f64; 4] {
 fn load<S: Simd, E: Real>(simd: S, from: &[E; 16]) -> Lanes<S, E> {
     Lanes::<S, E>::from_slice(simd, &from[..Lanes::<S, E>::LEN])
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::pictures;
+
+    /// Checks that the pixels around places, one in each lane, are those that the reference takes.
+    fn check<S: Simd>(simd: S, places: &[f64; 8], count: u32, wrap: Wrap) {
+        for at in (0..places.len()).step_by(Lanes::<S, f64>::LEN) {
+            let place = Lanes::<S, f64>::from_slice(simd, &places[at..at + Lanes::<S, f64>::LEN]);
+            let (left, right, share) = neighbours::<S, f64>(simd, place, count, wrap);
+            for lane in 0..Lanes::<S, f64>::LEN {
+                let found = ([left[lane] as u32, right[lane] as u32], share[lane]);
+                let place = places[at + lane];
+                assert_eq!(found, pictures::neighbours(place, count, wrap), "{place} of {count}, {wrap:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_pixels_around_a_place_are_those_of_the_reference() {
+        let places = [
+            [0.0, -0.0, 1.0, 0.5, 0.375, 1.125, 1.375, -0.125],
+            [-1e-20, 1e-20, -3.0, 2.0, 0.999_999_999, 1e17, -1e300, 0.1],
+            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -0.7, 1.6, 2.1, 1.0 - f64::EPSILON],
+        ];
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            for (places, count) in
+                places.iter().flat_map(|places| [1, 2, 7, 1024].map(|count| (places, count)))
+            {
+                dispatch!(Level::new(), simd => check(simd, places, count, wrap));
+            }
+        }
+    }
+}

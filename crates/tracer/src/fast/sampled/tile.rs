@@ -115,7 +115,7 @@ pub(super) struct Drawn<'a, 'b> {
     pub(super) first: Option<&'a mut FirstRows<'b>>,
     /// The sums and the first samples of the cover, in scenes without background.
     pub(super) cover: Option<CoverTile<'a, 'b>>,
-    /// What is known of the pixels of its row of tiles.
+    /// The state of the pixels of its row of tiles.
     pub(super) judged: &'a mut Judged<'b>,
 }
 

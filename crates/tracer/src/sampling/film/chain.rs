@@ -41,7 +41,7 @@ pub(super) struct SampleSchedule {
     still: f64,
 }
 
-/// What the samples of a pixel say.
+/// The conclusion from the samples of a pixel.
 pub(crate) struct Verdict {
     /// Whether it needs more of them.
     pub(crate) is_unsettled: bool,
@@ -116,7 +116,7 @@ impl SampleSchedule {
         }
     }
 
-    /// What the samples of a pixel say where so much varies around it; nothing of what is under way between two numbers.
+    /// Judges a pixel by its samples, where so much varies around it. Between two numbers of the chain nothing is unsettled.
     #[inline(never)]
     pub(super) fn verdict(&self, pixel: &Pixel, density: usize) -> Verdict {
         let count = pixel.count();

@@ -59,7 +59,7 @@ pub(crate) struct Band<'a> {
     pub(crate) first: Option<FirstRows<'a>>,
     /// The cover, in scenes without background.
     pub(crate) cover: Option<CoverRows<'a>>,
-    /// What is known of its pixels, noted by what adds samples.
+    /// The state of its pixels, noted when samples are added.
     pub(crate) judged: Judged<'a>,
 }
 
@@ -158,7 +158,7 @@ impl Film {
         self.each_in_row((self.first.as_ref(), &self.tiles), row, Pixel::mean, each);
     }
 
-    /// The same as they are shown, before the sRGB curve where there is one.
+    /// Gives the colours of a row as they are shown, from the left, before the sRGB curve where there is one.
     #[inline(always)]
     pub(crate) fn each_shown_of_row(&self, row: usize, each: impl FnMut(Color)) {
         if self.first.is_some() && self.plan.shows_raised() {

@@ -60,8 +60,8 @@ impl PassTargets<'_> {
         self.chain.moments(sample, all)
     }
 
-    /// What the samples of the pixel of a column and row say once it has got what it is given; of no consequence between two
-    /// numbers of the chain.
+    /// Judges the pixel of a column and row once it has got what it is given. Between two numbers of the chain this has no
+    /// consequence.
     #[inline(always)]
     pub(crate) fn verdict(&self, pixel: &Pixel, (column, row): (usize, usize)) -> Verdict {
         self.chain.verdict(pixel, self.density.map_or(0, |density| density.at(column, row)))
@@ -77,7 +77,7 @@ pub(crate) struct Work {
     pub(crate) ahead: u64,
 }
 
-/// What is known of the pixels of some rows once they have got their samples.
+/// The state of the pixels of some rows once they have got their samples.
 pub(crate) struct Judged<'a> {
     unsettled: BitRows<'a>,
     /// While it counts.
