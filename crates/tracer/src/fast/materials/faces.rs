@@ -31,6 +31,8 @@ pub(crate) struct ShadedFaces<E> {
     runs: Vec<ShadedRun<E>>,
     /// Whether any are drawn from the trees of their models.
     has_models: bool,
+    /// Whether any of those have a picture that alone colours their faces.
+    has_pictures: bool,
     /// The scene, for its materials.
     scene: Scene,
     center: DVec3,
@@ -72,8 +74,6 @@ struct Gathered<E> {
     /// shaded by the functions of the reference tracer alone, because it has holes.
     more: [(usize, usize, bool); 16],
     more_count: usize,
-    /// The faces with a picture.
-    looked: Looked<E>,
 }
 
 impl<E: Real> ShadedFaces<E> {
@@ -85,7 +85,8 @@ impl<E: Real> ShadedFaces<E> {
         let runs = runs.map(|(index, run)| ShadedRun::new(index, run, &scene, (center, scale)));
         let runs: Vec<_> = runs.collect();
         let has_models = runs.iter().any(|run| run.model.is_some());
-        Some(Self { faces, runs, has_models, scene, center, scale })
+        let has_pictures = runs.iter().any(|run| run.picture.is_some());
+        Some(Self { faces, runs, has_models, has_pictures, scene, center, scale })
     }
 
     /// Gives hits the normals and colours of their faces. Rays that go on from them start as from triangles.
@@ -108,6 +109,7 @@ impl<E: Real> ShadedFaces<E> {
                     self.fetch::<S>(hits);
                 }
                 let mut gathered = Gathered::new();
+                let mut looked = self.has_pictures.then(Looked::new);
                 for packet in 0..hits.packets.len() {
                     let (at, _) = hits.packets[packet];
                     let lanes = at..at + Lanes::<S, E>::LEN;
@@ -127,8 +129,9 @@ impl<E: Real> ShadedFaces<E> {
                         if let Some(&(_, run, false)) = more
                             && let ShadedRun { picture: Some(picture), model: Some(model), .. } =
                                 &self.runs[run]
+                            && let Some(looked) = &mut looked
                         {
-                            gathered.multiply(simd, picture, model, hits, (at, weights));
+                            gathered.multiply(simd, (picture, looked), model, hits, (at, weights));
                         } else if more.is_some() {
                             self.add_more::<S, EYE>(simd, queue, hits, (at, &gathered, weights));
                         }
@@ -344,7 +347,6 @@ impl<E: Real> Gathered<E> {
             is_filled: [E::narrow(0.0); 16],
             more: [(0, 0, false); 16],
             more_count: 0,
-            looked: Looked::new(),
         }
     }
 
@@ -370,9 +372,9 @@ impl<E: Real> Gathered<E> {
     /// Multiplies colours by the only picture of a model, where its faces are hit.
     #[inline(always)]
     fn multiply<S: Simd>(
-        &mut self,
+        &self,
         simd: S,
-        picture: &FacePicture,
+        (picture, looked): (&FacePicture, &mut Looked<E>),
         model: &ModelFaces<E>,
         hits: &mut Hits<E>,
         (at, weights): (usize, [Lanes<S, E>; 3]),
@@ -380,9 +382,9 @@ impl<E: Real> Gathered<E> {
         let (mut bits, one) = (0, constant::<S, E>(simd, 1.0));
         for &(lane, ..) in &self.more[..self.more_count] {
             bits |= 1 << lane;
-            self.looked.put(lane, model.uvs(hit_face(hits.order.0[at + lane].widen())));
+            looked.put(lane, model.uvs(hit_face(hits.order.0[at + lane].widen())));
         }
-        let factors = self.looked.factors(simd, picture, weights, bits);
+        let factors = looked.factors(simd, picture, weights, bits);
         let is_face = Lanes::<S, E>::from_slice(simd, &self.is_face[..Lanes::<S, E>::LEN]);
         let is_face = is_face.simd_gt(constant::<S, E>(simd, 0.0));
         let factors = Vec3::select(is_face, factors, Vec3::new(one, one, one));
