@@ -44,9 +44,11 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let library = Library::new(files);
-    let parsed = parse_with_files(path, &std::fs::read(path)?, &Limits::default(), &library);
-    let script = parsed.script.ok_or("not a script")?;
+    // Models are read here, too: threads that wait for each other take any number of instructions.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build()?;
+    let text = std::fs::read(path)?;
+    let parsed = pool.install(|| parse_with_files(path, &text, &Limits::default(), &library));
+    let script = parsed.script.ok_or("not a script")?;
     let mut digest = DefaultHasher::new();
     for _ in 0..times.parse()? {
         let options = RenderOptions { precision, ..Default::default() };
