@@ -2,12 +2,15 @@
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
+use std::net::SocketAddr;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
+use rayfold_pipeline::store::Connection;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::region::REGION;
 
 /// An access key and its secret.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +28,17 @@ impl Credentials {
     /// [`Error::Random`] if the system has no random bytes.
     pub fn random() -> Result<Self> {
         Ok(Self { access_key: format!("rayfold{}", token(6)?), secret_key: token(20)? })
+    }
+
+    /// Returns their connection to the server at an address.
+    pub(crate) fn connection(&self, address: SocketAddr) -> Connection {
+        Connection {
+            endpoint: format!("http://{address}"),
+            region: REGION.to_owned(),
+            access_key: self.access_key.clone(),
+            secret_key: self.secret_key.clone(),
+            session_token: None,
+        }
     }
 
     /// Returns the credentials of an earlier run beside `data`. If there are none, makes new ones

@@ -29,7 +29,15 @@ pub(crate) async fn start(
     lock: &File,
 ) -> Result<ServerProcess> {
     let environment = environment(credentials, webhook);
-    let command = Command { program: &MINIO, binary, environment, log, ready: "/minio/health/ready", lock };
+    let command = Command {
+        program: &MINIO,
+        binary,
+        environment,
+        log,
+        ready: "/minio/health/ready",
+        credentials,
+        lock,
+    };
     let objects = objects.to_string_lossy().into_owned();
     ServerProcess::start(command, address, |address| {
         Ok(vec!["server".into(), "--quiet".into(), "--address".into(), address.to_string(), objects.clone()])

@@ -12,6 +12,9 @@ use std::time::{Duration, Instant};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
+use rayfold_pipeline::store::{S3Store, Store};
+
+use crate::credentials::Credentials;
 use crate::error::{Error, Result};
 use crate::guard::Guarded;
 use crate::program::Program;
@@ -28,6 +31,8 @@ pub(crate) struct Command<'a> {
     pub(crate) log: &'a Path,
     /// A path that returns 200 when the server is ready.
     pub(crate) ready: &'a str,
+    /// The keys that it knows.
+    pub(crate) credentials: &'a Credentials,
     /// A file that is locked until the server has ended.
     pub(crate) lock: &'a File,
 }
@@ -49,7 +54,7 @@ impl ServerProcess {
         mut address: SocketAddr,
         arguments: impl Fn(SocketAddr) -> Result<Vec<String>>,
     ) -> Result<Self> {
-        let Command { program, binary, environment, log, ready, lock } = command;
+        let Command { program, binary, environment, log, ready, credentials, lock } = command;
         let start = Instant::now();
         let may_choose = address.port() == 0;
         if !may_choose {
@@ -61,7 +66,7 @@ impl ServerProcess {
                 address = free(address)?;
             }
             let process = Guarded::spawn(binary, &arguments(address)?, environment.clone(), log, lock)?;
-            match wait_until_ready(&process, address, ready, start).await {
+            match wait_until_ready(&process, address, ready, credentials, start).await {
                 Ok(()) => return Ok(Self { process, address }),
                 Err(reason) if start.elapsed() >= START_TIMEOUT => {
                     return Err(Error::ServerStart { program, reason, log: log.to_owned() });
@@ -109,6 +114,7 @@ async fn wait_until_ready(
     process: &Guarded,
     address: SocketAddr,
     path: &str,
+    credentials: &Credentials,
     start: Instant,
 ) -> Result<(), String> {
     loop {
@@ -118,7 +124,7 @@ async fn wait_until_ready(
         if start.elapsed() >= START_TIMEOUT {
             return Err(format!("no answer on {address} within {} s", START_TIMEOUT.as_secs()));
         }
-        if is_ready(address, path).await {
+        if is_ready(address, path).await && knows(address, credentials).await {
             return Ok(());
         }
         tokio::time::sleep(Duration::from_millis(20)).await;
@@ -137,11 +143,23 @@ async fn is_ready(address: SocketAddr, path: &str) -> bool {
     matches!(tokio::time::timeout(Duration::from_secs(2), ask).await, Ok(Ok(true)))
 }
 
+/// Whether the server at the address knows the keys. Another one may have taken the port before ours listened; ours then ends.
+async fn knows(address: SocketAddr, credentials: &Credentials) -> bool {
+    match S3Store::at(&credentials.connection(address), "rayfold").get("ready").await {
+        Err(rayfold_pipeline::Error::Refused { source, .. }) => {
+            let code = source.to_string();
+            !(code.starts_with("InvalidAccessKeyId") || code.starts_with("SignatureDoesNotMatch"))
+        }
+        _ => true,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::http::any_port;
     use crate::program::SEAWEEDFS;
+    use crate::{S3Server, StoreKind};
 
     async fn started(folder: &Path, address: SocketAddr) -> Result<ServerProcess> {
         let log = folder.join("server.log");
@@ -152,6 +170,7 @@ mod tests {
             environment: Vec::new(),
             log: &log,
             ready: "/healthz",
+            credentials: &Credentials::kept(folder).unwrap(),
             lock: &lock,
         };
         ServerProcess::start(command, address, |_| Ok(Vec::new())).await
@@ -175,5 +194,18 @@ mod tests {
             matches!(&error, Error::Listen { address: named, .. } if *named == address.to_string()),
             "{error}"
         );
+    }
+
+    /// Two servers started at once were once given the same port: the second one's client was refused by the first.
+    #[tokio::test]
+    async fn a_server_with_other_keys_is_not_the_one_that_was_started() {
+        let (ours, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let server =
+            S3Server::start(StoreKind::BuiltIn, ours.path(), any_port(), None, &mut |_| {}).await.unwrap();
+        assert!(knows(server.address(), server.credentials()).await);
+        assert!(!knows(server.address(), &Credentials::kept(other.path()).unwrap()).await);
+        let mut forged = server.credentials().clone();
+        forged.secret_key.push('x');
+        assert!(!knows(server.address(), &forged).await);
     }
 }

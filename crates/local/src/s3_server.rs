@@ -250,13 +250,7 @@ impl S3Server {
 
     /// Returns the owner's connection to it.
     pub fn connection(&self) -> Connection {
-        Connection {
-            endpoint: self.endpoint(),
-            region: REGION.to_owned(),
-            access_key: self.credentials.access_key.clone(),
-            secret_key: self.credentials.secret_key.clone(),
-            session_token: None,
-        }
+        self.credentials.connection(self.address())
     }
 }
 

@@ -44,7 +44,8 @@ pub(crate) async fn start(
     let config = objects.with_file_name(CONFIG);
     write_identity(&config, credentials).map_err(Error::file(&config))?;
     let environment = Vec::new();
-    let command = Command { program: &SEAWEEDFS, binary, environment, log, ready: "/healthz", lock };
+    let command =
+        Command { program: &SEAWEEDFS, binary, environment, log, ready: "/healthz", credentials, lock };
     ServerProcess::start(command, address, |address| arguments(address, objects, &config)).await
 }
 
