@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use fearless_simd::Simd;
 use glam::{DMat3, DVec3};
-use rayfold_scene::{Instance, Object};
+use rayfold_scene::{Instance, Object, Placement};
 
 use self::cuboid::Cuboid;
 use self::sphere::{Circle, Sphere};
@@ -110,16 +110,58 @@ impl Shape {
             Object::Triangle(triangle) => {
                 triangle::RenderSpaceTriangle::new(triangle.vertices(), center, scale).map(Self::Triangle)
             }
-            Object::Instance(instance) => {
-                let placed = Self::new(&instance::in_world(instance)?, center, scale)?;
-                Some(placed.on_the_side_of(instance, center, scale))
-            }
+            Object::Instance(instance) => match Self::new(&instance::in_world(instance)?, center, scale) {
+                Some(placed) if !placed.is_lost(center * scale) => {
+                    Some(placed.on_the_side_of(instance, center, scale))
+                }
+                _ => Self::at_the_eye(instance, center, scale),
+            },
             _ => None,
         }
     }
 }
 
+/// A visible part of an object's size.
+const VISIBLE: f64 = 1e-3;
+
+/// Returns corners of a group as seen from the eye. The eye is taken into the group, so that what is tiny and beside the eye
+/// keeps its size wherever the group is.
+fn from_eye<const N: usize>(corners: &[DVec3; N], placement: &Placement, eye: DVec3) -> [DVec3; N] {
+    let local = Place::in_group(eye, placement);
+    corners.map(|corner| placement.rotation() * local.towards(corner) * placement.scale())
+}
+
 impl Shape {
+    /// Returns an object of a group as seen from the eye.
+    fn at_the_eye(instance: &Instance, eye: DVec3, scale: f64) -> Option<Self> {
+        let placement = instance.placement();
+        match instance.object() {
+            Object::Sphere(sphere) => {
+                let [center] = from_eye(&[sphere.center()], placement, eye);
+                let radius = placement.scale() * sphere.radius();
+                let moved = rayfold_scene::Sphere::new(radius, center, sphere.material().clone()).ok()?;
+                Some(Self::Sphere(sphere::RenderSpaceSphere::new(&moved, DVec3::ZERO, scale)))
+            }
+            Object::Cuboid(cuboid) => {
+                let [a, b] = from_eye(cuboid.corners(), placement, eye).map(|corner| corner * scale);
+                Some(Self::of_box((a.min(b), a.max(b))))
+            }
+            Object::Triangle(triangle) => {
+                let corners = from_eye(triangle.vertices(), placement, eye);
+                triangle::RenderSpaceTriangle::new(&corners, DVec3::ZERO, scale).map(Self::Triangle)
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns whether rounding where the group is may have moved its numbers by a visible part of its size, for an eye in
+    /// these coordinates.
+    fn is_lost(&self, eye: DVec3) -> bool {
+        let (low, high) = self.bounds();
+        let largest = eye.abs().max(low.abs()).max(high.abs()).max_element();
+        f64::EPSILON * largest > VISIBLE * (high - low).max_element()
+    }
+
     /// Returns an object of a group with the eye on the right side of its surface, even if rounding changed the side.
     fn on_the_side_of(self, instance: &Instance, eye: DVec3, scale: f64) -> Self {
         let placement = instance.placement();
@@ -132,14 +174,8 @@ impl Shape {
                 Self::Sphere(if is_other { sphere::RenderSpaceSphere { power, ..placed } } else { placed })
             }
             (Self::Cuboid(placed), Object::Cuboid(cuboid)) => {
-                let local = Place::in_group(eye, placement);
-                let corners = cuboid
-                    .corners()
-                    .map(|corner| placement.rotation() * local.towards(corner) * (placement.scale() * scale));
-                let exact = cuboid::RenderSpaceCuboid {
-                    min: corners[0].min(corners[1]),
-                    max: corners[0].max(corners[1]),
-                };
+                let [a, b] = from_eye(cuboid.corners(), placement, eye).map(|corner| corner * scale);
+                let exact = cuboid::RenderSpaceCuboid { min: a.min(b), max: a.max(b) };
                 let sides = |of: cuboid::RenderSpaceCuboid| {
                     [of.min, of.max].map(|corner| corner.to_array().map(|x| x.partial_cmp(&0.0)))
                 };
