@@ -159,12 +159,14 @@ fn length(rng: &mut Rng, from: f64, to: f64) -> f64 {
 
 /// Returns the same solid twice.
 fn twins(rng: &mut Rng) -> [Solid; 2] {
-    let solid = match rng.u32(0..6) {
+    let solid = match rng.u32(0..8) {
         0 => return [ball(rng), ball(rng)].map(|_| Solid::Sphere { radius: 0.9, center: DVec3::Y * 0.1 }),
         1 => return rings(rng),
         2 => Solid::Cylinder { radius: 0.7, ends: [DVec3::Y * -0.4, DVec3::Y * 0.9] },
         3 => Solid::Cone { radii: [0.9, 0.2], ends: [DVec3::Y * -0.4, DVec3::Y * 0.9] },
         4 => Solid::Disc { radius: 1.1, center: DVec3::Y * 0.3, normal: DVec3::new(0.1, 1.0, -0.3) },
+        5 => Solid::Capsule { radius: 0.5, ends: [DVec3::Y * -0.4, DVec3::new(0.3, 0.7, 0.2)] },
+        6 => round_edged([DVec3::new(-0.6, -0.5, -0.8), DVec3::new(0.7, 0.9, 0.3)], length(rng, 0.1, 0.5)),
         _ => Solid::Box([DVec3::new(-0.6, -0.5, -0.8), DVec3::new(0.7, 0.9, 0.3)]),
     };
     [solid.clone(), solid]
@@ -172,7 +174,7 @@ fn twins(rng: &mut Rng) -> [Solid; 2] {
 
 /// Returns two solids that share a part of their surfaces.
 fn two(rng: &mut Rng) -> [Solid; 2] {
-    match rng.u32(0..8) {
+    match rng.u32(0..10) {
         0 => cylinders(rng),
         1 => cones(rng),
         2 => rings(rng),
@@ -181,6 +183,8 @@ fn two(rng: &mut Rng) -> [Solid; 2] {
             [ball.clone(), ball]
         }
         4 => boxes(rng),
+        5 => capsules(rng),
+        6 => round_edged_boxes(rng),
         _ => {
             let height = length(rng, 0.1, 0.9);
             [flat(rng, height), flat(rng, height)]
@@ -224,6 +228,46 @@ fn cylinders(rng: &mut Rng) -> [Solid; 2] {
     })
 }
 
+/// Returns a capsule, and another one, a cylinder or a sphere that shares its side or an end.
+fn capsules(rng: &mut Rng) -> [Solid; 2] {
+    let (radius, axis) = (length(rng, 0.3, 0.8), axis(rng));
+    let (_, ends) = span(rng, axis);
+    let (_, other) = span(rng, axis);
+    let second = match rng.u32(0..4) {
+        0 => Solid::Cylinder { radius, ends: other },
+        1 => Solid::Sphere { radius, center: ends[rng.usize(0..2)] },
+        2 => Solid::Capsule { radius, ends: [ends[1], ends[0]] },
+        _ => Solid::Capsule { radius, ends: other },
+    };
+    let mut both = [Solid::Capsule { radius, ends }, second];
+    if rng.bool() {
+        both.reverse();
+    }
+    both
+}
+
+/// Makes a box with round edges, which are as round as asked for or as they can be.
+fn round_edged(corners: [DVec3; 2], radius: f64) -> Solid {
+    Solid::Roundbox { corners, radius: radius.min(0.5 * (corners[1] - corners[0]).abs().min_element()) }
+}
+
+/// Returns a box with round edges, and another one or a box that shares its faces or one of them.
+fn round_edged_boxes(rng: &mut Rng) -> [Solid; 2] {
+    let [Solid::Box(first), Solid::Box(second)] = boxes(rng) else { unreachable!("boxes are boxes") };
+    let radius = length(rng, 0.1, 0.5);
+    let second = match rng.u32(0..4) {
+        0 => Solid::Box(first),
+        1 => round_edged(first, length(rng, 0.1, 0.5)),
+        2 => round_edged(second, radius),
+        _ => round_edged(first, radius),
+    };
+    let mut both = [round_edged(first, radius), second];
+    if rng.bool() {
+        both.reverse();
+    }
+    both
+}
+
 fn cones(rng: &mut Rng) -> [Solid; 2] {
     let (middle, slope, axis) = (length(rng, 0.5, 0.9), rng.f64() * 0.6 - 0.3, axis(rng));
     [(), ()].map(|()| {
@@ -249,7 +293,7 @@ fn flat(rng: &mut Rng, height: f64) -> Solid {
     let normal = [DVec3::Y, DVec3::NEG_Y, 0.3 * DVec3::Y][rng.usize(0..3)];
     let aside = size * DVec3::new(1.0, 0.0, 0.8);
     let depth = length(rng, 0.2, 0.8) * if rng.bool() { DVec3::Y } else { DVec3::NEG_Y };
-    match rng.u32(0..9) {
+    match rng.u32(0..10) {
         0 => Solid::Plane { point: middle, normal },
         1 => Solid::Disc { radius: size, center: middle, normal },
         2 => Solid::Box([middle - aside, middle + aside]),
@@ -257,6 +301,7 @@ fn flat(rng: &mut Rng, height: f64) -> Solid {
         4 => Solid::Cylinder { radius: size, ends: [middle, middle + depth] },
         5 => Solid::Cylinder { radius: size, ends: [middle + depth, middle] },
         6 => Solid::Cone { radii: [size, length(rng, 0.1, 0.8)], ends: [middle, middle + depth] },
+        7 => round_edged([middle - aside, middle + aside + depth], length(rng, 0.1, 0.4)),
         _ => {
             let turn = TAU * rng.f64();
             Solid::Triangle([0.0, 1.3, 3.0].map(|part| {

@@ -16,6 +16,8 @@ pub(super) enum Solid {
     Cylinder { radius: f64, ends: [DVec3; 2] },
     Cone { radii: [f64; 2], ends: [DVec3; 2] },
     Torus { radius: f64, thickness: f64, center: DVec3, normal: DVec3 },
+    Capsule { radius: f64, ends: [DVec3; 2] },
+    Roundbox { corners: [DVec3; 2], radius: f64 },
 }
 
 impl Solid {
@@ -33,9 +35,12 @@ impl Solid {
             Self::Torus { radius, thickness, center, normal } => {
                 ("Torus", &[*radius, *thickness], &[*center, *normal])
             }
+            Self::Capsule { radius, ends } => ("Capsule", &[*radius], ends),
+            Self::Roundbox { corners, .. } => ("Roundbox", &[], corners),
         };
         line += name;
-        let numbers = lengths.iter().copied().chain(vectors.iter().flat_map(|v| v.to_array()));
+        let last = if let Self::Roundbox { radius, .. } = self { Some(*radius) } else { None };
+        let numbers = lengths.iter().copied().chain(vectors.iter().flat_map(|v| v.to_array())).chain(last);
         for number in numbers {
             // `+ 0.0` removes the sign of a zero.
             let _ = write!(line, " {}", number + 0.0);
@@ -43,7 +48,7 @@ impl Solid {
         line
     }
 
-    /// Returns the solid rotated and then moved. Returns `None` for a box, which is axis-aligned, unless the rotation
+    /// Returns the solid rotated and then moved. Returns `None` for a box of either kind, which is axis-aligned, unless the rotation
     /// is the identity.
     pub(super) fn placed(&self, turn: DMat3, shift: DVec3) -> Option<Self> {
         let place = |point: &DVec3| shift + turn * *point;
@@ -66,6 +71,13 @@ impl Solid {
                 center: place(center),
                 normal: turn * *normal,
             },
+            Self::Capsule { radius, ends } => {
+                Self::Capsule { radius: *radius, ends: ends.each_ref().map(place) }
+            }
+            Self::Roundbox { .. } if turn != DMat3::IDENTITY => return None,
+            Self::Roundbox { corners, radius } => {
+                Self::Roundbox { corners: corners.each_ref().map(place), radius: *radius }
+            }
         })
     }
 
@@ -106,6 +118,13 @@ impl Solid {
                 thickness: number(*thickness),
                 center: vector(*center, &mut number),
                 normal: vector(*normal, &mut number),
+            },
+            Self::Capsule { radius, ends } => {
+                Self::Capsule { radius: number(*radius), ends: ends.map(|end| vector(end, &mut number)) }
+            }
+            Self::Roundbox { corners, radius } => Self::Roundbox {
+                corners: corners.map(|corner| vector(corner, &mut number)),
+                radius: number(*radius),
             },
         }
     }
@@ -157,6 +176,11 @@ impl Solid {
                 center: *center,
                 normal: *normal,
             }],
+            Self::Capsule { radius, ends } => vec![Self::Capsule { radius: radius + depth, ends: *ends }],
+            Self::Roundbox { corners: [u, v], radius } => {
+                let corners = [u.min(*v) - depth, u.max(*v) + depth];
+                vec![Self::Roundbox { corners, radius: radius + depth }]
+            }
         }
     }
 }
