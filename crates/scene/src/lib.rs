@@ -43,10 +43,7 @@ pub use form::{
 };
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
-pub use model::shapes::{
-    Capsule, Cone, Cuboid, Cylinder, Disc, Instance, Mesh, Motion, Object, Placement, Plane, Roundbox,
-    Source, Sphere, Torus, Triangle,
-};
+pub use model::shapes::*;
 pub use model::{
     Axes, Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, Image,
     ImageMap, Indirect, InvalidValue, Lamp, Lens, Light, Look, Material, Parameter, Pattern, PictureFile,

@@ -6,8 +6,8 @@ use anyhow::{Context, Result};
 use fastrand::Rng;
 use glam::{DMat3, DVec3};
 use rayfold_scene::{
-    Camera, DirectionalLight, Instance, Lamp, Light, Limits, Look, Object, Pinhole, Placement, Scene, Script,
-    Triangle, parse,
+    Camera, DirectionalLight, Instance, Lamp, Light, Limits, Look, Object, Outline, Pinhole, Placement,
+    Scene, Script, Triangle, parse,
 };
 
 use super::placed::{place, right_turns, turn, written_out};
@@ -106,18 +106,18 @@ fn lengths(scene: &Scene) -> Vec<f64> {
         Light::Directional(_) => None,
     });
     let of_objects = scene.objects.iter().flat_map(|object| match object {
-        Object::Sphere(o) => vec![o.center(), DVec3::splat(o.radius())],
-        Object::Triangle(o) => o.vertices().to_vec(),
-        Object::Cuboid(o) => o.corners().to_vec(),
-        Object::Plane(o) => vec![o.point()],
-        Object::Disc(o) => vec![o.center(), DVec3::splat(o.radius())],
-        Object::Cylinder(o) => [o.ends().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
-        Object::Cone(o) => o.ends().to_vec(),
-        Object::Torus(o) => vec![o.center(), DVec3::splat(o.thickness())],
-        Object::Roundbox(o) => [o.corners().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
-        Object::Capsule(o) => [o.ends().to_vec(), vec![DVec3::splat(o.radius())]].concat(),
         Object::Mesh(o) => o.model().positions().to_vec(),
         Object::Instance(o) => vec![o.placement().translation(), DVec3::splat(o.placement().scale())],
+        _ => object.outline().map_or(vec![], |outline| match outline {
+            Outline::Ball { center, radius } | Outline::Disc { center, radius, .. } => {
+                vec![center, DVec3::splat(radius)]
+            }
+            Outline::Triangle(corners) => corners.to_vec(),
+            Outline::Box { corners: [low, high], radius } => vec![low, high, DVec3::splat(radius)],
+            Outline::Plane(point) => vec![point],
+            Outline::Rod { radii: [a, b], ends: [from, to], .. } => vec![from, to, DVec3::new(a, b, 0.0)],
+            Outline::Ring { thickness, center, .. } => vec![center, DVec3::splat(thickness)],
+        }),
     });
     std::iter::once(eye).chain(lamps).chain(of_objects).flat_map(|v| v.to_array()).collect()
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
@@ -55,6 +55,10 @@ impl Shape for Capsule {
 
     fn support(&self, direction: DVec3) -> Option<f64> {
         Some(furthest(&self.ends, direction) + self.radius * direction.length())
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Rod { radii: [self.radius; 2], ends: self.ends, is_round: true }
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::Material;
@@ -64,6 +64,10 @@ impl Shape for Cone {
         let ([a, b], [radius_a, radius_b]) = (self.ends, self.radii);
         let across = across(b - a, direction);
         Some((a.dot(direction) + radius_a * across).max(b.dot(direction) + radius_b * across))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Rod { radii: self.radii, ends: self.ends, is_round: false }
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
@@ -56,6 +56,10 @@ impl Shape for Cuboid {
 
     fn support(&self, direction: DVec3) -> Option<f64> {
         Some(DVec3::select(direction.cmpgt(DVec3::ZERO), self.max(), self.min()).dot(direction))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Box { corners: [self.min(), self.max()], radius: 0.0 }
     }
 }
 

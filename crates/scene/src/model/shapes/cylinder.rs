@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
@@ -58,6 +58,10 @@ impl Shape for Cylinder {
     fn support(&self, direction: DVec3) -> Option<f64> {
         let [a, b] = self.ends;
         Some(furthest(&self.ends, direction) + self.radius * across(b - a, direction))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Rod { radii: [self.radius; 2], ends: self.ends, is_round: false }
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
@@ -61,6 +61,10 @@ impl Shape for Disc {
 
     fn support(&self, direction: DVec3) -> Option<f64> {
         Some(self.center.dot(direction) + self.radius * across(self.normal, direction))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Disc { center: self.center, normal: self.normal, radius: self.radius }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Objects, which rays can hit.
 //!
-//! Each shape has a file with its checking constructor, its extent and its syntax. A new shape needs a file, its `mod`
-//! and a line in `with_shapes` here, and its export in `lib.rs`. A parameter that no other shape has is added to `Parameter`.
+//! Each shape has a file with its checking constructor, its extent, its outline and its syntax. A new shape needs a file,
+//! and here its `mod` and a line in `with_shapes`. A parameter that no other shape has is added to `Parameter`.
 
 mod capsule;
 mod cone;
@@ -10,6 +10,7 @@ mod cylinder;
 mod disc;
 mod instance;
 mod mesh;
+mod outline;
 mod plane;
 mod roundbox;
 mod sphere;
@@ -24,6 +25,7 @@ pub(crate) use instance::USE;
 pub use instance::{Instance, Placement};
 pub(crate) use mesh::{FLAT, FONT, MESH, TEXT, align_from_word, letter_plate, letter_surface, mesh_surface};
 pub use mesh::{Mesh, Source};
+pub use outline::Outline;
 
 use super::invalid::{InvalidValue, Lint};
 use super::material::Material;
@@ -59,6 +61,9 @@ trait Shape: Sized {
 
     /// Returns the maximum of p·`direction` over all points p, or `None` if the shape is unbounded.
     fn support(&self, direction: DVec3) -> Option<f64>;
+
+    /// Returns a simple solid that holds it closely.
+    fn outline(&self) -> Outline;
 
     /// Returns a valid property that is probably a mistake.
     fn lint(&self) -> Option<Lint> {
@@ -133,6 +138,14 @@ macro_rules! objects {
                     $(Self::$Shape(shape) => shape.support(direction),)*
                     Self::Instance(instance) => instance.support(direction),
                     Self::Mesh(mesh) => mesh.support(direction),
+                }
+            }
+
+            /// Returns a simple solid that holds the object closely; `None` for an object of a group and for a model.
+            pub fn outline(&self) -> Option<Outline> {
+                match self {
+                    $(Self::$Shape(shape) => Some(shape.outline()),)*
+                    Self::Instance(_) | Self::Mesh(_) => None,
                 }
             }
 

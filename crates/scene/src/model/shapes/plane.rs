@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite};
 use crate::model::material::Material;
@@ -52,6 +52,10 @@ impl Shape for Plane {
 
     fn support(&self, _: DVec3) -> Option<f64> {
         None
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Plane(self.point)
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Cuboid, Motion, Object, Shape};
+use super::{Cuboid, Motion, Object, Outline, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use crate::model::material::Material;
@@ -87,6 +87,10 @@ impl Shape for Roundbox {
     fn support(&self, direction: DVec3) -> Option<f64> {
         let corner = DVec3::select(direction.cmpgt(DVec3::ZERO), self.max(), self.min());
         Some(corner.dot(direction) - self.radius() * (direction.abs().element_sum() - direction.length()))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Box { corners: [self.min(), self.max()], radius: self.radius() }
     }
 
     fn simpler(&self) -> Option<Object> {

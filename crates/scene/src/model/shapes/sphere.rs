@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Parameter, finite, not_negative, positive};
 use crate::model::material::Material;
@@ -52,6 +52,10 @@ impl Shape for Sphere {
 
     fn support(&self, direction: DVec3) -> Option<f64> {
         Some(self.center.dot(direction) + self.radius * direction.length())
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Ball { center: self.center, radius: self.radius }
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Constraint, Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{self, Faults, InvalidValue, Parameter, finite, positive};
 use crate::model::material::Material;
@@ -80,6 +80,11 @@ impl Shape for Torus {
     fn support(&self, direction: DVec3) -> Option<f64> {
         let ring = self.radius * across(self.normal, direction);
         Some(self.center.dot(direction) + ring + self.thickness * direction.length())
+    }
+
+    fn outline(&self) -> Outline {
+        let &Self { radius, thickness, center, normal, .. } = self;
+        Outline::Ring { radius, thickness, center, normal }
     }
 }
 

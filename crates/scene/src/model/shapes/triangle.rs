@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-use super::{Motion, Shape};
+use super::{Motion, Outline, Shape};
 use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 use crate::model::invalid::{Faults, InvalidValue, Lint, Parameter, finite};
 use crate::model::material::Material;
@@ -62,6 +62,10 @@ impl Shape for Triangle {
 
     fn support(&self, direction: DVec3) -> Option<f64> {
         Some(furthest(&self.vertices, direction))
+    }
+
+    fn outline(&self) -> Outline {
+        Outline::Triangle(self.vertices)
     }
 
     fn lint(&self) -> Option<Lint> {

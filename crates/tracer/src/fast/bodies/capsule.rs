@@ -14,6 +14,7 @@ use glam::DVec3;
 
 use super::solid::{Form, Frame, Place};
 use super::{BodyHit, Local};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Side, Surface};
@@ -156,5 +157,9 @@ impl Form for CapsuleForm {
     fn bounds(&self, frame: &Frame) -> Option<Bounds> {
         let (a, b) = (frame.center, self.end);
         Some((a.min(b) - self.radius, a.max(b) + self.radius))
+    }
+
+    fn hollow(&self, frame: &Frame) -> Option<Hollow> {
+        Some((self.ball(frame).0, self.radius))
     }
 }

@@ -15,8 +15,9 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 
-use super::solid::{Form, Frame, Place, flat};
+use super::solid::{Form, Frame, Place, Span, flat};
 use super::{BodyHit, Local};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Plain, Side, Surface};
@@ -219,5 +220,15 @@ impl Form for ConeForm {
         let (circle, center) = (frame.circle(), frame.center);
         let [a, b] = self.radii.map(|radius| radius * circle);
         Some(((center - a).min(self.end - b), (center + a).max(self.end + b)))
+    }
+
+    fn slab(&self, frame: &Frame) -> Option<Span> {
+        Some(Span::across(frame, 0.5 * self.height, 0.0))
+    }
+
+    fn hollow(&self, frame: &Frame) -> Option<Hollow> {
+        let ([a, b], height) = (self.radii, self.height);
+        let side = 0.5 * (a + b) * height / libm::hypot(height, b - a);
+        Some((0.5 * (frame.center + self.end), side.min(0.5 * height)))
     }
 }

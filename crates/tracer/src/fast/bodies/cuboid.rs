@@ -5,8 +5,9 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::Placement;
 
-use super::solid::{Form, Frame, Place, flat};
+use super::solid::{Form, Frame, Place, Span, flat};
 use super::{BodyHit, Local};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::arithmetic::rounding::LATE;
 use crate::fast::rays::bounds::Bounds;
@@ -168,5 +169,13 @@ impl Form for CuboidForm {
         let ([x, y, z], half) = (frame.axes, self.half);
         let reach = x.abs() * half.x + y.abs() * half.y + z.abs() * half.z;
         Some((frame.center - reach, frame.center + reach))
+    }
+
+    fn slab(&self, frame: &Frame) -> Option<Span> {
+        Span::of_box(frame, self.half)
+    }
+
+    fn hollow(&self, frame: &Frame) -> Option<Hollow> {
+        Some((frame.center, self.half.min_element()))
     }
 }

@@ -6,7 +6,8 @@ use glam::DVec3;
 use rayfold_scene::model::unit;
 
 use super::Local;
-use super::solid::{Form, Frame, Place, flat};
+use super::solid::{Form, Frame, Place, Span, flat};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, constant, splat};
 use crate::fast::bodies::plane;
 use crate::fast::rays::bounds::Bounds;
@@ -51,6 +52,9 @@ impl DiscForm {
     }
 }
 
+/// The radius of the ball above a disc, as a part of the distance of the eye from its plane.
+const OVER_DISC: f64 = 1.5;
+
 impl Form for DiscForm {
     fn size(&self) -> f64 {
         self.radius
@@ -71,5 +75,17 @@ impl Form for DiscForm {
     fn bounds(&self, frame: &Frame) -> Option<Bounds> {
         let reach = self.radius * frame.circle();
         Some((frame.center - reach, frame.center + reach))
+    }
+
+    fn slab(&self, frame: &Frame) -> Option<Span> {
+        Some(Span::across(frame, 0.0, 0.0))
+    }
+
+    fn hollow(&self, &Frame { axes: [.., axis], center }: &Frame) -> Option<Hollow> {
+        // Above the side that the eye sees, and not much larger than needed to hold it, so that balls of many discs
+        // have much in common.
+        let radius = OVER_DISC * axis.dot(center).abs();
+        let up = if axis.dot(center) > 0.0 { -axis } else { axis };
+        Some((center + radius * up, radius))
     }
 }

@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rayfold_scene::Object;
 
 use self::body_culler::BodyCuller;
@@ -45,7 +45,6 @@ use self::solid::{Form, Frame, Place};
 pub(super) use self::solid::{Solid, body, reach};
 use self::torus::{Torus, TorusForm};
 use super::shapes::Shape as PlacedShape;
-use super::shapes::instance::{Turned, turned};
 use crate::fast::acceleration::descent::{nearest_in, nearest_past};
 use crate::fast::acceleration::hollow::Hollows;
 use crate::fast::acceleration::tree::{Copies, Tree, group};
@@ -84,7 +83,8 @@ enum AnyForm {
 }
 
 impl AnyForm {
-    /// Returns the shape of an object and its coordinate frame, or `None` if the object is no body.
+    /// Returns the shape of an object and its coordinate frame, or `None` if the object is no body. A box of a group is one
+    /// that is [turned](super::shapes::instance::turned).
     fn new(object: &Object, place: Place) -> Option<(Frame, Self)> {
         fn of<F>(form: fn(F) -> AnyForm) -> impl Fn((Frame, F)) -> (Frame, AnyForm) {
             move |(frame, own)| (frame, form(own))
@@ -96,24 +96,15 @@ impl AnyForm {
             Object::Cone(o) => of(Self::Cone)(ConeForm::new(o.radii(), o.ends(), place)),
             Object::Torus(o) => of(Self::Torus)(TorusForm::new(o, place)),
             Object::Capsule(o) => of(Self::Capsule)(CapsuleForm::new(o, place)),
-            Object::Roundbox(o) => {
-                let center = o.min() + 0.5 * (o.max() - o.min());
-                of(Self::Roundbox)(RoundboxForm::new(o, (DMat3::IDENTITY, 1.0), center, place))
-            }
+            Object::Roundbox(o) => of(Self::Roundbox)(RoundboxForm::new(o, None, place)),
             Object::Mesh(o) => of(Self::Model)(ModelForm::new(o.model(), None, place)),
             Object::Instance(o) => {
-                if let Object::Mesh(mesh) = o.object() {
-                    return Some(of(Self::Model)(ModelForm::new(mesh.model(), Some(o.placement()), place)));
-                }
-                match turned(o)? {
-                    Turned::Cuboid(cuboid) => of(Self::Cuboid)(CuboidForm::new(cuboid, o.placement(), place)),
-                    Turned::Roundbox(roundbox) => {
-                        let placement = o.placement();
-                        let (min, max) = (roundbox.min(), roundbox.max());
-                        let center = placement.point(min + 0.5 * (max - min));
-                        let turn = (placement.rotation(), placement.scale());
-                        of(Self::Roundbox)(RoundboxForm::new(roundbox, turn, center, place))
-                    }
+                let placement = o.placement();
+                match o.object() {
+                    Object::Mesh(o) => of(Self::Model)(ModelForm::new(o.model(), Some(placement), place)),
+                    Object::Cuboid(o) => of(Self::Cuboid)(CuboidForm::new(o, placement, place)),
+                    Object::Roundbox(o) => of(Self::Roundbox)(RoundboxForm::new(o, Some(placement), place)),
+                    _ => return None,
                 }
             }
             _ => return None,

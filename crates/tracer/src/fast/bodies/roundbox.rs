@@ -22,9 +22,11 @@
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use glam::{DMat3, DVec3};
+use rayfold_scene::Placement;
 
-use super::solid::{Form, Frame, Place, flat};
+use super::solid::{Form, Frame, Place, Span, flat};
 use super::{BodyHit, Local};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Plain, Side, Surface};
@@ -378,15 +380,20 @@ pub(super) struct RoundboxForm {
 const SHARP: f64 = 1.0 / (1u64 << 46) as f64;
 
 impl RoundboxForm {
-    /// Makes the form of a box that is turned by `rotation` and scaled, and has its centre at `center` in the world.
+    /// Makes the form of a box of the world, or of a group that is placed there.
     pub(super) fn new(
         roundbox: &rayfold_scene::Roundbox,
-        (rotation, scale): (DMat3, f64),
-        center: DVec3,
+        placement: Option<&Placement>,
         place: Place,
     ) -> (Frame, Self) {
+        let (min, max) = (roundbox.min(), roundbox.max());
+        let center = min + 0.5 * (max - min);
+        let (rotation, scale, center) = match placement {
+            Some(placement) => (placement.rotation(), placement.scale(), placement.point(center)),
+            None => (DMat3::IDENTITY, 1.0, center),
+        };
         let scale = scale * place.scale;
-        let half = 0.5 * (roundbox.max() - roundbox.min()) * scale;
+        let half = 0.5 * (max - min) * scale;
         let center = place.point(center);
         let sharp = SHARP * (center.abs().max_element() + half.max_element());
         let radius = (roundbox.radius() * scale).max(sharp).min(half.min_element());
@@ -443,5 +450,13 @@ impl Form for RoundboxForm {
         let ([x, y, z], core) = (frame.axes, self.core());
         let reach = x.abs() * core.x + y.abs() * core.y + z.abs() * core.z + self.radius;
         Some((frame.center - reach, frame.center + reach))
+    }
+
+    fn slab(&self, frame: &Frame) -> Option<Span> {
+        Span::of_box(frame, self.half)
+    }
+
+    fn hollow(&self, frame: &Frame) -> Option<Hollow> {
+        Some((frame.center, self.half.min_element()))
     }
 }

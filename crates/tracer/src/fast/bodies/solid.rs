@@ -66,6 +66,16 @@ pub(super) trait Form {
 
     /// Returns the bounding box, as computed; `None` for a plane.
     fn bounds(&self, frame: &Frame) -> Option<Bounds>;
+
+    /// Returns the two planes around it, as computed; `None` if it is not flat.
+    fn slab(&self, _: &Frame) -> Option<Span> {
+        None
+    }
+
+    /// Returns a ball that holds nothing of its surface, as computed; `None` if there is no useful one.
+    fn hollow(&self, _: &Frame) -> Option<Hollow> {
+        None
+    }
 }
 
 /// The margin of a body's bounding box, relative to its numbers.
@@ -74,9 +84,6 @@ const WIDER: f64 = 32.0 * f64::EPSILON;
 /// The distance from the origin within which rounding may put a surface on the other side of it, relative to the body's
 /// numbers.
 const AT_ORIGIN: f64 = 64.0 * f64::EPSILON;
-
-/// The radius of the ball above a disc, as a part of the distance of the eye from its plane.
-const OVER_DISC: f64 = 1.5;
 
 /// Returns an object in the kernels' coordinates, if it is a body that can be hit.
 pub(in crate::fast) fn body(object: &Object, order: u32, center: DVec3, scale: f64) -> Option<Solid> {
@@ -114,6 +121,19 @@ impl Frame {
     pub(super) fn circle(&self) -> DVec3 {
         let z = self.axes[2];
         (DVec3::ONE - z * z).max(DVec3::ZERO).map(f64::sqrt)
+    }
+}
+
+impl Span {
+    /// Returns the one along the last axis.
+    pub(super) fn across(frame: &Frame, half: f64, hole: f64) -> Self {
+        Self { axis: frame.axes[2], half, hole }
+    }
+
+    /// Returns the one along the shortest side of a box.
+    pub(super) fn of_box(frame: &Frame, half: DVec3) -> Option<Self> {
+        let number = half.to_array().iter().position(|&length| length == half.min_element())?;
+        Some(Self { axis: frame.axes[number], half: half[number], hole: 0.0 })
     }
 }
 
@@ -161,45 +181,12 @@ impl Solid {
     /// Returns the two planes around it, as computed; `None` for shapes that are not flat. Its bounding sphere is centred between
     /// them.
     pub(super) fn slab(&self) -> Option<Span> {
-        let axes = self.frame.axes;
-        let shortest = |half: DVec3| {
-            let number = half.to_array().iter().position(|&length| length == half.min_element())?;
-            Some(Span { axis: axes[number], half: half[number], hole: 0.0 })
-        };
-        let across = |half: f64, hole: f64| Some(Span { axis: axes[2], half, hole });
-        match &self.form {
-            AnyForm::Disc(_) => across(0.0, 0.0),
-            AnyForm::Cone(form) => across(0.5 * form.height, 0.0),
-            AnyForm::Torus(form) => across(form.thickness, (form.radius - form.thickness).max(0.0)),
-            AnyForm::Cuboid(form) => shortest(form.half),
-            AnyForm::Roundbox(form) => shortest(form.half),
-            AnyForm::Plane(_) | AnyForm::Capsule(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => None,
-        }
+        self.form.form().slab(&self.frame)
     }
 
     /// Returns a ball that holds nothing of its surface, as computed; `None` for shapes without a useful one.
     pub(super) fn hollow(&self) -> Option<Hollow> {
-        let Frame { axes: [.., axis], center } = self.frame;
-        let (center, radius) = match &self.form {
-            AnyForm::Disc(_) => {
-                // Above the side that the eye sees, and not much larger than needed to hold it, so that balls of many discs
-                // have much in common.
-                let radius = OVER_DISC * axis.dot(center).abs();
-                let up = if axis.dot(center) > 0.0 { -axis } else { axis };
-                (center + radius * up, radius)
-            }
-            AnyForm::Cone(form) => {
-                let ([a, b], height) = (form.radii, form.height);
-                let side = 0.5 * (a + b) * height / libm::hypot(height, b - a);
-                (0.5 * (center + form.end), side.min(0.5 * height))
-            }
-            AnyForm::Torus(form) => (center, form.radius - form.thickness),
-            AnyForm::Capsule(form) => (form.ball(&self.frame).0, form.radius),
-            AnyForm::Cuboid(form) => (center, form.half.min_element()),
-            AnyForm::Roundbox(form) => (center, form.half.min_element()),
-            AnyForm::Plane(_) | AnyForm::Cutout(_) | AnyForm::Model(_) => return None,
-        };
-        (radius > 0.0).then_some((center, radius))
+        self.form.form().hollow(&self.frame).filter(|&(_, radius)| radius > 0.0)
     }
 
     /// Returns its bounding box; `None` for a plane.

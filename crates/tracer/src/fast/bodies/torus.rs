@@ -13,8 +13,9 @@ use fearless_simd::prelude::*;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 
-use super::solid::{Form, Frame, Place};
+use super::solid::{Form, Frame, Place, Span};
 use super::{BodyHit, Local};
+use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::arithmetic::real::{Fused, Lanes, Mask, Real, Vec3, constant, splat};
 use crate::fast::rays::bounds::Bounds;
 use crate::fast::shared::{Ring, Surface};
@@ -329,5 +330,13 @@ impl Form for TorusForm {
     fn bounds(&self, frame: &Frame) -> Option<Bounds> {
         let reach = self.radius * frame.circle() + self.thickness;
         Some((frame.center - reach, frame.center + reach))
+    }
+
+    fn slab(&self, frame: &Frame) -> Option<Span> {
+        Some(Span::across(frame, self.thickness, (self.radius - self.thickness).max(0.0)))
+    }
+
+    fn hollow(&self, frame: &Frame) -> Option<Hollow> {
+        Some((frame.center, self.radius - self.thickness))
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use rayfold_scene::model::unit;
-use rayfold_scene::{Capsule, Light, Object, Scene, Shine};
+use rayfold_scene::{Light, Object, Outline, Scene, Shine};
 
 use crate::fast::placement::lens::Lens;
 use crate::fast::rays::view::{View, view};
@@ -169,22 +169,12 @@ fn across(points: impl Iterator<Item = DVec2> + Clone) -> f64 {
 
 /// The smallest radius of a curved object and its middle.
 fn curvature(object: &Object) -> Option<(f64, DVec3)> {
-    match object {
-        Object::Sphere(o) => Some((o.radius(), o.center())),
-        Object::Cylinder(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
-        Object::Cone(o) => Some((o.radii()[0].max(o.radii()[1]), 0.5 * (o.ends()[0] + o.ends()[1]))),
-        Object::Torus(o) => Some((o.thickness(), o.center())),
-        Object::Capsule(o) => Some((o.radius(), 0.5 * (o.ends()[0] + o.ends()[1]))),
-        Object::Roundbox(o) => Some((o.radius(), 0.5 * o.min() + 0.5 * o.max())),
-        Object::Instance(o) => match in_world(o) {
-            Some(object) => curvature(&object),
-            None => {
-                let (radius, at) = curvature(o.object())?;
-                Some((o.placement().scale() * radius, o.placement().point(at)))
-            }
-        },
-        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
-            None
+    let Object::Instance(o) = object else { return object.outline()?.curvature() };
+    match in_world(o) {
+        Some(object) => curvature(&object),
+        None => {
+            let (radius, at) = curvature(o.object())?;
+            Some((o.placement().scale() * radius, o.placement().point(at)))
         }
     }
 }
@@ -207,58 +197,51 @@ fn of_box(ends: [DVec3; 2], place: impl Fn(DVec3) -> DVec3, scale: f64) -> Hull 
     Hull { points: (0..8).map(|k| place(corner(k))).collect(), girth, is_flat: false }
 }
 
-/// What an object of the world lies between; none if it has no end.
+/// Some points that an object lies between; none if it has no end.
 pub(super) fn hull(object: &Object) -> Option<Hull> {
-    Some(match object {
-        Object::Sphere(o) => {
-            let (center, r) = (o.center(), o.radius());
-            let points = DMat3::from_diagonal(DVec3::splat(r));
+    if let Object::Instance(o) = object {
+        return match (in_world(o), o.object().outline()) {
+            (Some(object), _) => hull(&object),
+            (None, Some(Outline::Box { corners, .. })) => {
+                Some(of_box(corners, |p| o.placement().point(p), o.placement().scale()))
+            }
+            (None, _) => None,
+        };
+    }
+    Some(match object.outline()? {
+        Outline::Ball { center, radius } => {
+            let points = DMat3::from_diagonal(DVec3::splat(radius));
             let points =
                 [0, 1, 2].map(|axis| points.col(axis)).into_iter().flat_map(|r| [center + r, center - r]);
-            Hull { points: points.collect(), girth: 2.0 * r, is_flat: false }
+            Hull { points: points.collect(), girth: 2.0 * radius, is_flat: false }
         }
-        Object::Triangle(o) => {
-            Hull { points: o.vertices().to_vec(), girth: height(o.vertices()), is_flat: true }
+        Outline::Triangle(corners) => {
+            Hull { points: corners.to_vec(), girth: height(&corners), is_flat: true }
         }
-        Object::Cuboid(o) => of_box([o.min(), o.max()], |p| p, 1.0),
-        Object::Roundbox(o) => of_box([o.min(), o.max()], |p| p, 1.0),
-        Object::Plane(_) | Object::Mesh(_) => return None,
-        Object::Disc(o) => {
-            let points = ring(o.center(), o.normal(), o.radius()).collect();
-            Hull { points, girth: f64::INFINITY, is_flat: true }
+        Outline::Box { corners, .. } => of_box(corners, |p| p, 1.0),
+        Outline::Plane(_) => return None,
+        Outline::Disc { center, normal, radius } => {
+            Hull { points: ring(center, normal, radius).collect(), girth: f64::INFINITY, is_flat: true }
         }
-        Object::Cylinder(o) => round([o.radius(); 2], o.ends()),
-        Object::Cone(o) => round(o.radii(), o.ends()),
-        Object::Torus(o) => {
-            let n = o.thickness() * unit(o.normal());
-            let rings = [o.center() + n, o.center() - n];
-            let outer = o.radius() + o.thickness();
-            let points = rings.into_iter().flat_map(|c| ring(c, o.normal(), outer)).collect();
-            Hull { points, girth: 2.0 * o.thickness(), is_flat: false }
+        Outline::Ring { radius, thickness, center, normal } => {
+            let n = thickness * unit(normal);
+            let rings = [center + n, center - n];
+            let points = rings.into_iter().flat_map(|c| ring(c, normal, radius + thickness)).collect();
+            Hull { points, girth: 2.0 * thickness, is_flat: false }
         }
-        Object::Capsule(o) => {
-            let [tip, end] = tips(o);
-            let round = round([o.radius(); 2], o.ends());
-            Hull { points: round.points.into_iter().chain([tip, end]).collect(), ..round }
-        }
-        Object::Instance(o) => match in_world(o) {
-            Some(object) => return hull(&object),
-            None => {
-                let ends = match o.object() {
-                    Object::Cuboid(cuboid) => [cuboid.min(), cuboid.max()],
-                    Object::Roundbox(roundbox) => [roundbox.min(), roundbox.max()],
-                    _ => return None,
-                };
-                of_box(ends, |p| o.placement().point(p), o.placement().scale())
+        Outline::Rod { radii, ends, is_round } => {
+            let mut round = round(radii, ends);
+            if is_round {
+                round.points.extend(tips(radii[0], ends));
             }
-        },
+            round
+        }
     })
 }
 
-/// The outermost points of a capsule along its axis.
-pub(super) fn tips(capsule: &Capsule) -> [DVec3; 2] {
-    let [a, b] = capsule.ends();
-    let reach = capsule.radius() * along(a, b);
+/// The outermost points of a rod with round ends.
+pub(super) fn tips(radius: f64, [a, b]: [DVec3; 2]) -> [DVec3; 2] {
+    let reach = radius * along(a, b);
     [a - reach, b + reach]
 }
 

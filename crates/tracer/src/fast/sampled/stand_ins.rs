@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayfold_scene::model::unit;
 use rayfold_scene::{
-    Capsule, Cone, Cuboid, Cylinder, Instance, Material, Object, Placement, Roundbox, SharedSlice, Sphere,
-    Torus, Triangle,
+    Cone, Cuboid, Cylinder, Instance, Material, Object, Outline, Placement, SharedSlice, Sphere, Torus,
+    Triangle,
 };
 
 use super::gauge::{Gauge, tips};
@@ -49,52 +49,48 @@ impl<'a> Widener<'a> {
     }
 
     fn widen(&mut self, object: &Object) {
-        let material = self.material.clone();
-        match object {
-            Object::Sphere(o) => {
-                let sphere = Sphere::new(o.radius() + self.wider(o.center()), o.center(), material);
-                self.make(sphere);
+        if let Object::Instance(o) = object {
+            match (in_world(o), o.object().outline()) {
+                (Some(object), _) => self.widen(&object),
+                (None, Some(Outline::Box { corners, .. })) => {
+                    self.brick(corners, Some(o.placement()), HALVINGS);
+                }
+                (None, _) => {}
             }
-            Object::Triangle(o) => {
-                let [a, b, c] = *o.vertices();
+        }
+        let material = self.material.clone();
+        match object.outline() {
+            Some(Outline::Ball { center, radius }) => {
+                self.make(Sphere::new(radius + self.wider(center), center, material));
+            }
+            Some(Outline::Triangle([a, b, c])) => {
                 self.make(Triangle::new([a, b, c], material));
                 for (a, b) in [(a, b), (b, c), (c, a)] {
                     self.rod([0.0; 2], [a, b], HALVINGS);
                 }
             }
-            Object::Cuboid(o) => self.brick((o.min(), o.max()), None, HALVINGS),
-            Object::Roundbox(o) => self.brick((o.min(), o.max()), None, HALVINGS),
-            Object::Plane(_) | Object::Mesh(_) => {}
-            Object::Disc(o) => {
-                let n = unit(o.normal());
-                let wider = self.wider(o.center())
-                    + self.gauge.pixel(o.center() + o.radius() * n.any_orthonormal_vector());
+            Some(Outline::Box { corners, .. }) => self.brick(corners, None, HALVINGS),
+            Some(Outline::Plane(_)) | None => {}
+            Some(Outline::Disc { center, normal, radius }) => {
+                let n = unit(normal);
+                let wider =
+                    self.wider(center) + self.gauge.pixel(center + radius * n.any_orthonormal_vector());
                 let n = wider * n;
-                self.make(Cylinder::new(o.radius() + wider, [o.center() - n, o.center() + n], material));
+                self.make(Cylinder::new(radius + wider, [center - n, center + n], material));
             }
-            Object::Cylinder(o) => self.rod([o.radius(); 2], o.ends(), HALVINGS),
-            Object::Cone(o) => self.rod(o.radii(), o.ends(), HALVINGS),
-            Object::Torus(o) => {
-                let (x, y) = unit(o.normal()).any_orthonormal_pair();
-                let around = [x, -x, y, -y].map(|way| self.wider(o.center() + o.radius() * way));
-                let thick = o.thickness() + around.into_iter().fold(0.0, f64::max);
-                if thick < o.radius() {
-                    self.make(Torus::new(o.radius(), thick, o.center(), o.normal(), material));
+            Some(Outline::Rod { radii, ends, is_round }) => {
+                self.rod(radii, if is_round { tips(radii[0], ends) } else { ends }, HALVINGS);
+            }
+            Some(Outline::Ring { radius, thickness, center, normal }) => {
+                let (x, y) = unit(normal).any_orthonormal_pair();
+                let around = [x, -x, y, -y].map(|way| self.wider(center + radius * way));
+                let thick = thickness + around.into_iter().fold(0.0, f64::max);
+                if thick < radius {
+                    self.make(Torus::new(radius, thick, center, normal, material));
                 } else {
-                    self.make(Sphere::new(o.radius() + thick, o.center(), material));
+                    self.make(Sphere::new(radius + thick, center, material));
                 }
             }
-            Object::Capsule(o) => self.rod([o.radius(); 2], tips(o), HALVINGS),
-            Object::Instance(o) => match (in_world(o), o.object()) {
-                (Some(object), _) => self.widen(&object),
-                (None, Object::Cuboid(cuboid)) => {
-                    self.brick((cuboid.min(), cuboid.max()), Some(o.placement()), HALVINGS);
-                }
-                (None, Object::Roundbox(roundbox)) => {
-                    self.brick((roundbox.min(), roundbox.max()), Some(o.placement()), HALVINGS);
-                }
-                (None, _) => {}
-            },
         }
     }
 
@@ -115,7 +111,7 @@ impl<'a> Widener<'a> {
     }
 
     /// A box, in parts where pixels are of other sizes along it.
-    fn brick(&mut self, (low, high): (DVec3, DVec3), placement: Option<&Placement>, halvings: u32) {
+    fn brick(&mut self, [low, high]: [DVec3; 2], placement: Option<&Placement>, halvings: u32) {
         let place = |p: DVec3| placement.map_or(p, |placement| placement.point(p));
         let scale = placement.map_or(1.0, Placement::scale);
         let ends = [low, high];
@@ -130,8 +126,8 @@ impl<'a> Widener<'a> {
         if halvings > 0 && most > 1.5 * least && scale * size[longest] > 2.0 * most {
             let (mut end, mut start) = (high, low);
             (end[longest], start[longest]) = (middle[longest], middle[longest]);
-            self.brick((low, end), placement, halvings - 1);
-            self.brick((start, high), placement, halvings - 1);
+            self.brick([low, end], placement, halvings - 1);
+            self.brick([start, high], placement, halvings - 1);
             return;
         }
         let wider = DVec3::splat(most / scale);
@@ -148,25 +144,15 @@ impl<'a> Widener<'a> {
 
 /// A curved object with another material, in the world.
 pub(super) fn repainted(object: &Object, material: Material) -> Option<Object> {
-    let made = match object {
-        Object::Sphere(o) => Object::from(Sphere::new(o.radius(), o.center(), material).ok()?),
-        Object::Cylinder(o) => Object::from(Cylinder::new(o.radius(), o.ends(), material).ok()?),
-        Object::Cone(o) => Object::from(Cone::new(o.radii(), o.ends(), material).ok()?),
-        Object::Torus(o) => {
-            Object::from(Torus::new(o.radius(), o.thickness(), o.center(), o.normal(), material).ok()?)
-        }
-        Object::Capsule(o) => Object::from(Capsule::new(o.radius(), o.ends(), material).ok()?),
-        Object::Roundbox(o) => Object::from(Roundbox::new(*o.corners(), o.radius(), material).ok()?),
-        Object::Instance(o) => match in_world(o) {
-            Some(object) => return repainted(&object, material),
-            None => {
-                let group = SharedSlice::from(vec![repainted(o.object(), material)?]);
-                Object::from(Instance::new(&group, 0, &Arc::new(*o.placement())))
-            }
-        },
-        Object::Triangle(_) | Object::Cuboid(_) | Object::Plane(_) | Object::Disc(_) | Object::Mesh(_) => {
-            return None;
-        }
+    let Object::Instance(o) = object else {
+        object.outline()?.curvature()?;
+        return object.with_material(material).ok();
     };
-    Some(made)
+    match in_world(o) {
+        Some(object) => repainted(&object, material),
+        None => {
+            let group = SharedSlice::from(vec![repainted(o.object(), material)?]);
+            Some(Instance::new(&group, 0, &Arc::new(*o.placement())).into())
+        }
+    }
 }

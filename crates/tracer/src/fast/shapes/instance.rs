@@ -5,28 +5,18 @@
 //! regardless of rounding.
 
 use glam::DVec3;
-use rayfold_scene::{Cuboid, Instance, Object, Roundbox};
+use rayfold_scene::{Instance, Object, Outline};
 
 use crate::parts::BUILT;
 use crate::reference::{triangle_normal, turns_axes_to_axes};
 
-/// A box of a group, which is along the group's axes.
-pub(in crate::fast) enum Turned<'a> {
-    Cuboid(&'a Cuboid),
-    Roundbox(&'a Roundbox),
-}
-
-/// Returns the group's box, if it is rotated in the world by other than right angles.
-pub(in crate::fast) fn turned(instance: &Instance) -> Option<Turned<'_>> {
-    if !BUILT.groups {
-        return None;
-    }
-    let turned = match instance.object() {
-        Object::Cuboid(cuboid) => Turned::Cuboid(cuboid),
-        Object::Roundbox(roundbox) => Turned::Roundbox(roundbox),
-        _ => return None,
-    };
-    (!turns_axes_to_axes(instance.placement())).then_some(turned)
+/// Returns the group's box, with sharp or round edges, if it is rotated in the world by other than right angles.
+pub(in crate::fast) fn turned(instance: &Instance) -> Option<&Object> {
+    let object = instance.object();
+    let is_turned = BUILT.groups
+        && matches!(object.outline(), Some(Outline::Box { .. }))
+        && !turns_axes_to_axes(instance.placement());
+    is_turned.then_some(object)
 }
 
 /// Returns the object as one of the world, or `None` for a box that is [`turned`] and for an object that can never be hit.
