@@ -10,7 +10,7 @@ use crate::fast::acceleration::hollow::Hollow;
 use crate::fast::acceleration::tree::Grouped;
 use crate::fast::rays::bounds::{Bounds, NOTHING};
 use crate::fast::shapes::instance::{in_world, turned};
-use crate::fast::shared::{Flat, Plain, Surface};
+use crate::fast::shared::{Flat, Plain, Surface, is_square};
 use crate::meshes::mesh;
 
 /// A body and its position in the script.
@@ -168,7 +168,7 @@ impl Solid {
         let Frame { axes, center } = self.frame;
         let near = AT_ORIGIN * self.extent().max(self.reach);
         let place = DVec3::from(axes.map(|axis| -axis.dot(center)));
-        self.form.form().is_near(place, near, axes[2].abs().max_element() < 1.0)
+        self.form.form().is_near(place, near, !is_square(axes[2]))
     }
 
     /// Returns the centre and the radius of a bounding sphere, wide enough for rounding errors. For a plane it is its

@@ -12,7 +12,7 @@
 
 pub(super) mod surface;
 
-pub(super) use self::surface::{Flat, Plain, Ring, Side, Surface};
+pub(super) use self::surface::{Flat, Plain, Ring, Side, Surface, is_square};
 use crate::fast::arithmetic::real::Real;
 
 /// How far apart hits may be that count as equal, in roundoffs of the numbers of both objects and of the distance: as far as
@@ -81,7 +81,7 @@ impl SharedSurfaces {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
-    use rayfold_scene::{Camera, Disc, Material, Object, Scene, Screen, Torus, Triangle};
+    use rayfold_scene::{Camera, Disc, Limits, Material, Object, Scene, Screen, Torus, Triangle, parse};
 
     use crate::probe::nearest_hits;
     use crate::{Precision, RenderOptions, precision};
@@ -119,6 +119,30 @@ mod tests {
             assert!(met.len() > 300, "{}", met.len());
             assert!(met.iter().all(|(a, b)| a.distance == b.distance), "before a wall at {z}");
         }
+    }
+
+    /// Their planes have the same numbers, but rays do not meet them at the same distance: that depends on the centres.
+    #[test]
+    fn of_discs_that_are_tilted_by_less_than_a_roundoff_the_first_is_met() {
+        let eye = DVec3::new(-39.703_401_364_447_09, 0.766_533_590_484_827_9, -2.464_513_971_398_901);
+        let text = "Screen 40 32
+            Look -39.70340136444709 0.7665335904848279 -2.464513971398901 -37.293 0 0 46
+            Disc .41888635328496 -37.61664068823529 .32829385205500167 -.8155749021454818 6.123233995736764e-17 -1.2246467991473532e-16 -1 1 0 0 0 0 0
+            Disc 1.0956250820334263 -37.44393318010792 .007217480117956848 -.8155749021454818 6.123233995736764e-17 -1.2246467991473532e-16 -1 0 1 0 0 0 0
+            Trace";
+        let scene = parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();
+        let mut rng = fastrand::Rng::with_seed(3_008_409);
+        let rays: Vec<_> = (0..2000)
+            .map(|_| {
+                let mut aside = || DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, 0.0) * 0.5;
+                let target =
+                    DVec3::new(-37.616_640_688_235_29, 0.328_293_852_055_001_67, -0.815_574_902_145_481_8);
+                let origin = eye + 2.0 * aside();
+                (origin, (target + aside() - origin).normalize())
+            })
+            .collect();
+        let hits = nearest_hits(&scene, &rays, &RenderOptions::default()).unwrap();
+        assert!(hits.iter().all(|hit| hit.as_ref().is_some_and(|hit| hit.object == 0)));
     }
 
     #[test]

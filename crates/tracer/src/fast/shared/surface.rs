@@ -64,6 +64,11 @@ pub(crate) const ASIDE: DVec3 = DVec3::new(0.577_215_664_9, 0.302_775_637_7, 0.1
 /// Another such direction, along which places are sorted.
 const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.428_249_505_6);
 
+/// Whether a direction is one of an axis. The largest part of one that is tilted by less than a roundoff may be 1, too.
+pub(crate) fn is_square(direction: DVec3) -> bool {
+    direction.to_array().iter().filter(|&&part| part != 0.0).count() == 1
+}
+
 impl Surface {
     /// Two numbers that are about the same for parts that lie in one surface: of what is flat one of its direction, and one of
     /// its place.
@@ -157,12 +162,11 @@ impl Flat {
     pub(crate) fn is_met_with(&self, other: &Self) -> bool {
         let is_equal = self.normal == other.normal && self.height == other.height
             || self.normal == -other.normal && self.height == -other.height;
-        let is_square = || self.normal.abs().max_element() == 1.0;
         is_equal
             && match (self.plain, other.plain) {
                 (Plain::No, _) | (_, Plain::No) => false,
                 (Plain::Triangle, Plain::Triangle) => true,
-                _ => is_square(),
+                _ => is_square(self.normal),
             }
     }
 }
