@@ -1,14 +1,14 @@
 //! An estimate of the light that the depth of a scene cuts off, because rays after the last bounce are black.
 
-use rayfold_scene::{Depth, Samples, Scene};
+use rayfold_scene::{Camera, Depth, Samples, Scene, Screen};
 
 use crate::{Drawing, RenderError, RenderOptions};
 
 /// The largest share of a frame's light that may be cut off without a warning.
 const NEGLIGIBLE: f64 = 0.001;
 
-/// The number of rows that are drawn for an estimate, evenly spaced. A frame with fewer rows is drawn whole.
-const ROWS: u32 = 24;
+/// The number of pixels, approximately, of the smaller picture that is drawn for an estimate.
+const PIXELS: f64 = 20_000.0;
 
 /// The light that is missing from a frame because rays are followed for too few bounces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +22,9 @@ pub struct CutLight {
 
 /// Estimates the light that the depth of a scene cuts off. Returns `None` if it is at most a thousandth.
 ///
-/// Compares 24 rows of the frame, drawn with one ray per pixel, at the scene's depth and at the greatest depth. A scene
-/// without mirrors and glass is not drawn.
+/// Compares pictures with one ray per pixel at the scene's depth and at the greatest depth. They have about 20,000 pixels if the
+/// frame has more; in parallel projection, where a pixel has a size of its own, they are whole. A scene without mirrors and glass
+/// is not drawn.
 ///
 /// # Errors
 /// The errors of [`crate::render`].
@@ -41,7 +42,11 @@ pub fn cut_light(scene: &Scene, options: &RenderOptions) -> Result<Option<CutLig
     if !sends_rays_on || depth >= Depth::MOST {
         return Ok(None);
     }
-    let scene = Scene { samples: Samples::default(), ..scene.clone() };
+    let share = (PIXELS / scene.screen.pixels() as f64).sqrt();
+    let is_small = share >= 1.0 || matches!(scene.camera, Camera::Orthographic);
+    let side = |side: u32| if is_small { side } else { (f64::from(side) * share).ceil() as u32 };
+    let screen = Screen::new(side(scene.screen.width()), side(scene.screen.height())).unwrap_or(scene.screen);
+    let scene = Scene { screen, samples: Samples::default(), ..scene.clone() };
     let levels = |depth| levels(&scene, &RenderOptions { bounces: Some(depth), ..*options });
     let whole = levels(Depth::MOST)?;
     let light = whole.iter().map(|&level| f64::from(level)).sum::<f64>().max(1.0);
@@ -65,17 +70,9 @@ pub fn cut_light(scene: &Scene, options: &RenderOptions) -> Result<Option<CutLig
     Ok(Some(CutLight { share, enough: Some(enough) }))
 }
 
-/// Returns the levels of the rows, channel by channel.
+/// Returns the levels of the picture, channel by channel.
 fn levels(scene: &Scene, options: &RenderOptions) -> Result<Vec<u8>, RenderError> {
-    let drawing = Drawing::new(scene, options)?;
-    let height = scene.screen.height();
-    let rows = height.min(ROWS);
-    let mut levels = Vec::new();
-    for row in (0..rows).map(|n| ((2 * u64::from(n) + 1) * u64::from(height) / (2 * u64::from(rows))) as u32)
-    {
-        levels.extend(drawing.draw_rows(row..row + 1)?.into_raw());
-    }
-    Ok(levels)
+    Ok(Drawing::new(scene, options)?.draw()?.into_raw())
 }
 
 #[cfg(test)]
