@@ -202,7 +202,7 @@ fn bands_are_the_whole_picture() {
             let joined: Vec<u8> =
                 [0..5, 5..6, 6..30, 30..90].map(band).iter().flat_map(|b| b.as_bytes().to_vec()).collect();
             assert!(joined == whole.as_bytes(), "{samples} {error} {matte:?}");
-            let last = with(&script, &options, |drawing| drawing.draw_progressively(|_| ()).unwrap());
+            let last = with(&script, &options, |drawing| drawing.draw_progressively(|_| Ok(())).unwrap());
             assert!(last == whole);
         }
     }

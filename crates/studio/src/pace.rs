@@ -12,10 +12,13 @@ pub(crate) const MOVING_UNDER_WAY: u32 = 1;
 pub(crate) const RESTING_UNDER_WAY: u32 = 2;
 
 /// The time from the last request of something that moves to its rest.
-pub(crate) const REST: Duration = Duration::from_millis(120);
+pub(crate) const REST: Duration = Duration::from_millis(80);
 
 /// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
 pub(crate) const PATIENCE: f64 = 0.1;
+
+/// The shortest time between two pictures of one that gets finer. Each takes time to be made and shown.
+pub(crate) const APART: Duration = Duration::from_millis(200);
 
 /// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
 pub(crate) const FEW: u32 = 4;

@@ -18,7 +18,9 @@ use rayfold_scene::{Samples, Scene};
 use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
 use crate::clock::Instant;
-use crate::pace::{Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller};
+use crate::pace::{
+    APART, Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller,
+};
 use crate::packing::{Packer, Picture, Quality};
 use crate::wanted::Wanted;
 
@@ -181,8 +183,9 @@ impl Shared {
         let scene = &wanted.scene;
         let is_sampled = scene.samples.most() > 1;
         let mut share = pace.share(scene, PATIENCE);
-        // With one ray per pixel, a sketch of the full size is the picture.
-        while share < 1.0 || is_sampled {
+        // With one ray per pixel, a sketch of the full size is the picture. With several, the first pass comes as soon as one.
+        let is_soon = is_sampled && GROWTH * share >= 1.0;
+        while (share < 1.0 || is_sampled) && !is_soon {
             let sketch = self.sketch(wanted, Effort { share, bounces: None }, pace)?;
             // A sketch that the page cannot show in time is skipped: a finer one follows.
             if let Some(number) = self.another() {
@@ -204,11 +207,20 @@ impl Shared {
         let options = RenderOptions { cancel: Some(&self.cancel), ..RenderOptions::default() };
         let drawing = Drawing::exposed(exposure, &options)?;
         let begin = Instant::now();
+        let mut seen: Option<Instant> = None;
         let image = drawing.draw_progressively(|image| {
-            if let Some(number) = self.another() {
-                let image = image.into_rgba8();
-                send(Picture { number, image, took: start.elapsed(), quality: Quality::Coarse });
+            if seen.is_none() && !scene.goes_round() {
+                // The first pass is one ray per pixel.
+                pace.drawn(scene.screen, None, begin.elapsed());
             }
+            if seen.is_none_or(|seen| seen.elapsed() >= APART)
+                && let Some(number) = self.another()
+            {
+                let image = image()?.into_rgba8();
+                send(Picture { number, image, took: start.elapsed(), quality: Quality::Coarse });
+                seen = Some(Instant::now());
+            }
+            Ok(())
         })?;
         if !is_sampled {
             pace.drawn(scene.screen, None, begin.elapsed());
@@ -366,6 +378,18 @@ mod tests {
         };
         assert_eq!(brightness("0"), 0);
         assert!(brightness("1") > 0);
+        painter.close();
+    }
+
+    #[test]
+    fn where_the_first_pass_comes_soon_there_is_no_sketch_and_not_each_pass_is_sent() {
+        let (sender, pictures) = mpsc::channel();
+        let painter = Painter::start(move |picture| sender.send(picture).is_ok()).unwrap();
+        let ball = "Samples 64 1\nSphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3";
+        assert!(drawn(&painter, &pictures, pinhole(1, ball)).len() > 2, "its time is not known at first");
+        let again = drawn(&painter, &pictures, pinhole(2, &ball.replace("0.7", "0.6")));
+        assert!(again.iter().all(|picture| size(picture) == [96, 64]), "no sketch");
+        assert!(again.len() < 6, "{} passes were sent", again.len());
         painter.close();
     }
 

@@ -178,14 +178,15 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws the picture as [`Self::draw_picture`] does. `each` gets it after each pass over the image except the last. Each is
-    /// an estimate of the whole picture, the next one with more samples. With one sample per pixel there are none.
+    /// Draws the picture as [`Self::draw_picture`] does. `each` is called after each pass over the image except the last, with a
+    /// function that makes the picture so far: an estimate of the whole picture, the next one with more samples. With one sample
+    /// per pixel there are none.
     ///
     /// # Errors
-    /// The errors of [`crate::render`].
+    /// The errors of [`crate::render`], and those of `each`.
     pub fn draw_progressively(
         &self,
-        mut each: impl FnMut(DynamicImage),
+        mut each: impl FnMut(&dyn Fn() -> Result<DynamicImage, RenderError>) -> Result<(), RenderError>,
     ) -> Result<DynamicImage, RenderError> {
         match &self.0 {
             Backend::SampledSingle(sampled) => sampled.draw_progressively(&mut each),

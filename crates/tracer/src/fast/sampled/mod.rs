@@ -38,6 +38,10 @@ use crate::sampling::film::{self, Band, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions};
 
+/// Gets a function that makes the picture so far.
+pub(super) type Each<'a> =
+    dyn FnMut(&dyn Fn() -> Result<DynamicImage, RenderError>) -> Result<(), RenderError> + 'a;
+
 /// Samples that a pass adds to a pixel at most: their points are kept.
 const PASS: u32 = 256;
 
@@ -103,11 +107,8 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(Self { scene, options, dimensions, moments, side, scouts: Scouts::default() })
     }
 
-    /// Draws all passes; `each` sees the picture so far after each but the last.
-    pub(super) fn draw_progressively(
-        &self,
-        each: &mut dyn FnMut(DynamicImage),
-    ) -> Result<DynamicImage, RenderError> {
+    /// Draws all passes; `each` may see the picture so far after each but the last.
+    pub(super) fn draw_progressively(&self, each: &mut Each<'_>) -> Result<DynamicImage, RenderError> {
         let rows = 0..self.scene.screen.height();
         let size = (self.scene.screen.width(), self.scene.screen.height());
         let picture = |film: &Film| {
@@ -124,10 +125,7 @@ impl<'a, E: Real> Sampled<'a, E> {
                 }
             })
         };
-        let film = self.expose(rows.clone(), |film| {
-            each(picture(film)?);
-            Ok(())
-        })?;
+        let film = self.expose(rows.clone(), |film| each(&|| picture(film)))?;
         picture(&film)
     }
 
