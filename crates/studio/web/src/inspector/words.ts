@@ -1,7 +1,7 @@
 // Parameters in people's words. One that is not here has the name of the language.
 
 const WORDS: Readonly<Record<string, string>> = {
-  "ambient coefficient": "glow",
+  "ambient coefficient": "colour in shadow",
   "diffuse coefficient": "colour",
   "mirror coefficient": "mirror",
   "glass coefficient": "clearness",
@@ -69,7 +69,7 @@ const NAMES: Readonly<Record<string, string>> = {
   Camera: "through a window",
   Look: "looks at a target",
   Orthocamera: "parallel",
-  ambient: "glow",
+  ambient: "colour in shadow",
   diffuse: "colour",
   shine: "highlight",
 };
