@@ -77,6 +77,9 @@ struct Item {
 pub(super) struct Workspace<'a, E> {
     scratch: Scratch<'a, E>,
     items: Vec<Item>,
+    /// The first samples of all pixels of a tile, and of which size that was.
+    firsts: Vec<Item>,
+    size: (usize, usize),
     /// Memory for sorting them.
     sorted: Vec<Item>,
     lights: LightPoints<E>,
@@ -95,6 +98,8 @@ impl<'a, E: Real> Workspace<'a, E> {
         Self {
             scratch: Scratch::new(cancel),
             items: vec![],
+            firsts: vec![],
+            size: (0, 0),
             sorted: vec![],
             lights: LightPoints::default(),
             seeds: [0; ROOM],
@@ -143,7 +148,15 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                     tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), [0; CHANNELS], NOTHING));
                 }
             }
-            _ => tile.each_pixel(|pixel| items.push(Item { moment: 0, sample: 0, pixel })),
+            _ => {
+                let Workspace { firsts, size, .. } = workspace;
+                if *size != (tile.width, tile.height) {
+                    *size = (tile.width, tile.height);
+                    firsts.clear();
+                    tile.each_pixel(|pixel| firsts.push(Item { moment: 0, sample: 0, pixel }));
+                }
+                items.extend_from_slice(firsts);
+            }
         }
     } else {
         pixels.resize(tile.side.0 * tile.side.1, Pixel::default());
@@ -456,9 +469,20 @@ fn put_first<S: Simd, E: Real>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let [red, green, blue] = levels(batch.len(), workspace);
-            for (k, item) in batch.iter().enumerate() {
-                first.put(tile.in_rows(item.pixel), [red[k], green[k], blue[k]], workspace.objects[k]);
+            let levels = levels(batch.len(), workspace);
+            for (from, run) in (0..ROOM).step_by(BLOCK).zip(batch.chunks(BLOCK)) {
+                let (at, last) = (run[0].pixel, run[run.len() - 1].pixel);
+                // Pixels are in order, so that none is left out between these.
+                if (at.0 + BLOCK as u32 - 1, at.1) == last {
+                    let run = from..from + BLOCK;
+                    let levels = levels.each_ref().map(|levels| &levels[run.clone()]);
+                    first.put_run(tile.in_rows(at), levels, &workspace.objects[run]);
+                    continue;
+                }
+                for (k, item) in (from..).zip(run) {
+                    let color = levels.each_ref().map(|levels| levels[k]);
+                    first.put(tile.in_rows(item.pixel), color, workspace.objects[k]);
+                }
             }
         },
     );
@@ -544,17 +568,19 @@ fn place<S: Simd, E: Real>(
         || {
             let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, .. } = workspace;
             let anchor = moment.prepared.rays.anchor();
-            let count = batch.len();
-            // In two loops, of which the second is done in packets.
+            // Known to lie within the columns, so that loops have no checks and are done in packets.
+            let count = batch.len().min(ROOM);
+            // In two loops, of which the second is.
             let mut pixels = [[0; ROOM]; 2];
             for (k, item) in batch.iter().enumerate() {
                 (pixels[0][k], pixels[1][k]) = tile.in_image(item.pixel);
                 samples[k] = item.sample;
             }
+            let last = pass.height - 1;
             for k in 0..count {
                 let (column, row) = (pixels[0][k], pixels[1][k]);
-                (columns[k], rows[k]) =
-                    (f64::from(column) - anchor.0, f64::from(pass.height - 1 - row) - anchor.1);
+                columns[k] = f64::from(column) - anchor.0;
+                rows[k] = f64::from(last - row) - anchor.1;
                 seeds[k] = pass.points.pixel_seed(column, row);
             }
             let (seeds, samples) = (&seeds[..count], &samples[..count]);
@@ -578,8 +604,9 @@ fn place<S: Simd, E: Real>(
                 pass.points.coordinates(first, seeds, samples, &mut u[..count]);
                 pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
                 let [x, y, _] = &mut queue.origin;
+                let radius = lens.radius;
                 for k in 0..count {
-                    let at = on_disc(u[k], v[k]) * lens.radius;
+                    let at = on_disc(u[k], v[k]) * radius;
                     (x.0[k], y.0[k]) = (E::narrow(at.x), E::narrow(at.y));
                 }
             }
@@ -625,10 +652,10 @@ fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]
     objects.fill(NOTHING);
     for &(at, _) in &hits.packets {
         let end = (at + lanes).min(ROOM);
-        for (lane, object) in (at..end).zip(&mut objects[at..end]) {
-            if hits.is_hit(lane) {
-                *object = hits.order.0[lane].to_index() as u32;
-            }
+        let (distances, orders) = (&hits.distance.0[at..end], &hits.order.0[at..end]);
+        for ((object, distance), order) in objects[at..end].iter_mut().zip(distances).zip(orders) {
+            let is_hit = distance.widen() < E::narrow(E::FAR).widen();
+            *object = if is_hit { order.to_index() as u32 } else { NOTHING };
         }
     }
 }

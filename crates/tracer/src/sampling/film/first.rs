@@ -149,6 +149,16 @@ impl FirstRows<'_> {
         self.objects[place] = object as u16;
     }
 
+    /// The same for pixels side by side.
+    #[inline(always)]
+    pub(crate) fn put_run(&mut self, place: usize, colors: [&[u32]; CHANNELS], objects: &[u32]) {
+        let put = |plane: &mut [u16], of: &[u32]| {
+            plane[place..place + of.len()].iter_mut().zip(of).for_each(|(into, &of)| *into = of as u16);
+        };
+        self.colors.iter_mut().zip(colors).for_each(|(plane, levels)| put(plane, levels));
+        put(self.objects, objects);
+    }
+
     #[inline(always)]
     pub(crate) fn color(&self, place: usize) -> [u32; CHANNELS] {
         self.colors.each_ref().map(|plane| u32::from(plane[place]))
