@@ -26,6 +26,7 @@ use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::build::features::{self, Kernel};
 use crate::fast::build::prepare::Prepared;
+use crate::fast::film::watch::Watch;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::placement::lens::Aperture;
 use crate::fast::placement::window::{Grid, Window};
@@ -34,9 +35,9 @@ use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::soft_light::Extents;
 use crate::parallel::{CHANNELS, image, values, whole_bands};
 use crate::parts;
-use crate::sampling::film::{self, Band, Film, First, PassTargets};
+use crate::sampling::film::{self, Band, Bits, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
-use crate::{RenderError, RenderOptions};
+use crate::{RenderError, RenderOptions, Sampler};
 
 /// Samples that a pass adds to a pixel at most: their points are kept.
 const PASS: u32 = 256;
@@ -46,6 +47,10 @@ pub(super) const SIDE: (u32, u32) = (16, 16);
 
 /// The same of moving scenes: of larger tiles more rays are of one moment.
 const MOVING_SIDE: (u32, u32) = (32, 32);
+
+/// So many pixels beside those whose first rays come near narrow objects count as well where something moves: as many as have
+/// first samples at all moments.
+const BESIDE: usize = 6;
 
 /// The half of a pixel, and a little for rounding: how far rays go from its middle.
 pub(super) const MARGIN: f64 = 0.5 + crate::fast::arithmetic::rounding::MARGIN;
@@ -59,6 +64,8 @@ struct Moment<E> {
     bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
+    /// What is watched in the first look.
+    watch: Option<Watch<E>>,
 }
 
 /// A scene at all its moments.
@@ -83,7 +90,19 @@ impl<'a, E: Real> Sampled<'a, E> {
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
         let scouts = Scouts::new(moments, options)?;
-        Ok(Self { scouts, ..Self::of_one_look(Cow::Borrowed(scene), moments, geometries, *options)? })
+        let mut sampled = Self::of_one_look(Cow::Borrowed(scene), moments, geometries, *options)?;
+        if let Some(boxes) = scouts.boxes()
+            && options.sampler == Sampler::default()
+        {
+            for (moment, geometry) in sampled.moments.iter_mut().zip(geometries) {
+                // What rays meet within glass, and where they go by chance, is not followed.
+                if !moment.prepared.has_glass() && !scene.goes_round() {
+                    moment.watch = Some(Watch::new(geometry, &boxes));
+                }
+            }
+        }
+        sampled.scouts = scouts;
+        Ok(sampled)
     }
 
     /// The same for [`Self::first_look`] alone.
@@ -174,7 +193,13 @@ impl<'a, E: Real> Sampled<'a, E> {
         mut each: impl FnMut(&Film) -> Result<(), RenderError>,
     ) -> Result<Film, RenderError> {
         let mut film = self.film(&rows)?;
-        if let Some(floors) = self.scouts.floors(rows.clone())? {
+        let is_watched = self.moments.iter().all(|moment| moment.watch.is_some());
+        if is_watched {
+            film.watch().ok_or(RenderError::TooLarge {
+                width: self.scene.screen.width(),
+                height: rows.end - rows.start,
+            })?;
+        } else if let Some(floors) = self.scouts.floors(rows.clone(), None)? {
             film.raise(floors);
         }
         if let Some(progress) = self.options.progress {
@@ -187,6 +212,14 @@ impl<'a, E: Real> Sampled<'a, E> {
             }
             passes += 1;
             self.pass(&mut film, rows.start, span)?;
+            // Where no first ray came near narrow objects none of them matters. In one of several moments that is likely if
+            // none beside it did in others.
+            let beside = if self.moments.len() > 1 { BESIDE } else { 1 };
+            if let Some(near) = film.near(beside)
+                && let Some(floors) = self.scouts.floors(rows.clone(), Some(&near))?
+            {
+                film.raise(floors);
+            }
         }
         if let Some(progress) = self.options.progress {
             progress.set(progress.done(), 0);
@@ -205,10 +238,13 @@ impl<'a, E: Real> Sampled<'a, E> {
             .ok_or_else(too_large)
     }
 
-    /// The first samples of the pixels of some rows, which are whole rows of tiles.
-    fn first_look(&self, rows: Range<u32>) -> Result<Option<First>, RenderError> {
+    /// The first samples of the pixels of some rows, which are whole rows of tiles: of all or of some.
+    fn first_look(&self, rows: Range<u32>, some: Option<&Bits>) -> Result<Option<First>, RenderError> {
         let mut film = self.film(&rows)?;
         if let Some(span) = film.plan() {
+            if let Some(some) = some {
+                film.want_only(some);
+            }
             self.pass(&mut film, rows.start, span)?;
         }
         Ok(film.into_first())
@@ -336,7 +372,7 @@ impl<E: Real> Moment<E> {
             View::Pinhole { right, up, .. } => geometry.lens.map(|lens| Aperture::new(lens, right, up)),
             View::Parallel { .. } => None,
         };
-        Ok(Self { prepared, window, bodies, extents, lens })
+        Ok(Self { prepared, window, bodies, extents, lens, watch: None })
     }
 }
 
@@ -387,8 +423,8 @@ impl<E: Real> Job<'_, E> {
                     };
                     if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
                         let cover = band.cover.as_mut().map(|cover| cover.of_tile(column));
-                        let drawn =
-                            Drawn { pixels, first: band.first.as_mut(), cover, judged: &mut band.judged };
+                        let (first, judged) = (band.first.as_mut(), &mut band.judged);
+                        let drawn = Drawn { pixels, first, cover, judged, near: band.near.as_mut() };
                         tile::draw::<S, E, N>(simd, &pass, &tile, drawn, workspace);
                     }
                 }

@@ -21,7 +21,7 @@ use crate::fast::transport::paths::PathNumbers;
 use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
 use crate::parts;
-use crate::sampling::film::{CoverTile, FirstRows, Judged, PassTargets, Pixel, quantised};
+use crate::sampling::film::{BitRows, CoverTile, FirstRows, Judged, PassTargets, Pixel, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points};
 
@@ -90,6 +90,8 @@ pub(super) struct Workspace<'a, E> {
     coordinates: [[f64; ROOM]; 3],
     /// What the rays from the camera meet.
     objects: [u32; ROOM],
+    /// Which of them came near what is watched, or rays that go on from them.
+    is_near: [bool; ROOM],
 }
 
 impl<'a, E: Real> Workspace<'a, E> {
@@ -108,6 +110,7 @@ impl<'a, E: Real> Workspace<'a, E> {
             rows: [0.0; ROOM],
             coordinates: [[0.0; ROOM]; 3],
             objects: [NOTHING; ROOM],
+            is_near: [false; ROOM],
         }
     }
 }
@@ -122,6 +125,8 @@ pub(super) struct Drawn<'a, 'b> {
     pub(super) cover: Option<CoverTile<'a, 'b>>,
     /// The state of the pixels of its row of tiles.
     pub(super) judged: &'a mut Judged<'b>,
+    /// Those of its row of tiles whose rays come near what is watched.
+    pub(super) near: Option<&'a mut BitRows<'b>>,
 }
 
 /// Draws the samples that a tile's pixels lack.
@@ -130,7 +135,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    Drawn { pixels, mut first, mut cover, judged }: Drawn,
+    Drawn { pixels, mut first, mut cover, judged, mut near }: Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
@@ -150,12 +155,18 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             }
             _ => {
                 let Workspace { firsts, size, .. } = workspace;
-                if *size != (tile.width, tile.height) {
+                if !tile.is_wanted_whole(pass.wanted) {
+                    tile.each_wanted_pixel(pass.wanted, |pixel| {
+                        items.push(Item { moment: 0, sample: 0, pixel });
+                    });
+                } else if *size != (tile.width, tile.height) {
                     *size = (tile.width, tile.height);
                     firsts.clear();
                     tile.each_pixel(|pixel| firsts.push(Item { moment: 0, sample: 0, pixel }));
+                    items.extend_from_slice(firsts);
+                } else {
+                    items.extend_from_slice(firsts);
                 }
-                items.extend_from_slice(firsts);
             }
         }
     } else {
@@ -186,10 +197,19 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if let Some(time) = pass.dimensions.time {
         set_moments(pass, tile, time, &mut items, &mut workspace.sorted);
     }
+    if let (Some(near), Some(_)) = (&mut near, backdrop) {
+        // Beside what such a tile shows there may be something wider.
+        tile.each_pixel(|at| near.set(tile.left + at.0 as usize, at.1 as usize, true));
+    }
     for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
         let moment = &pass.moments[of_moment[0].moment as usize];
         for batch in of_moment.chunks(ROOM) {
             draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
+            if let Some(near) = &mut near {
+                for (item, _) in batch.iter().zip(&workspace.is_near).filter(|(_, is_near)| **is_near) {
+                    near.set(tile.left + item.pixel.0 as usize, item.pixel.1 as usize, true);
+                }
+            }
             match &mut first {
                 Some(first) if pass.wanted.is_first_look => {
                     put_first::<S, E>(simd, tile, batch, workspace, first);
@@ -281,6 +301,12 @@ impl SampledTile {
                 bits &= bits - 1;
             }
         });
+    }
+
+    /// Whether all of its pixels are wanted.
+    #[inline(always)]
+    fn is_wanted_whole(&self, wanted: PassTargets) -> bool {
+        self.rows().all(|row| wanted.pixels.has_all(self.columns(), row))
     }
 
     /// The rows of each block: left column, row, and number of columns.
@@ -375,7 +401,8 @@ fn set_moments<E: Real>(
     core::mem::swap(items, sorted);
 }
 
-/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then.
+/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then. Notes which of a first look
+/// came near what is watched.
 #[inline(always)]
 fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
@@ -385,7 +412,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     workspace: &mut Workspace<E>,
 ) {
     place::<S, E>(simd, pass, (tile, moment), batch, workspace);
-    let Workspace { scratch, lights, objects, seeds, samples, .. } = workspace;
+    let Workspace { scratch, lights, objects, seeds, samples, is_near, .. } = workspace;
     let (scene, count) = (&moment.prepared, batch.len());
     let soft = moment
         .extents
@@ -419,6 +446,10 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     }
     let (kinds, background) = (candidates.kinds, scene.backdrop());
     let bodies = moment.bodies_in(tile);
+    let watch = moment.watch.as_ref().filter(|_| pass.wanted.is_first_look);
+    if watch.is_some() {
+        is_near.fill(false);
+    }
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
@@ -427,6 +458,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         let met =
             HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, true>(simd, scene, met, hits, occluders);
+        if let Some(watch) = watch {
+            watch.note::<S, true>(simd, queue, hits, is_near);
+        }
     } else {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
@@ -435,6 +469,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         let met =
             HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, false>(simd, scene, met, hits, occluders);
+        if let Some(watch) = watch {
+            watch.note::<S, false>(simd, queue, hits, is_near);
+        }
     }
     if pass.wanted.is_first_look {
         note_objects(hits, Lanes::<S, E>::LEN, objects);
@@ -442,7 +479,8 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     if scene.is_clear() {
         cover_hits(hits, count, Lanes::<S, E>::LEN, cover);
     }
-    scratch.follow::<S, N>(simd, scene, pass.bounces, soft, paths);
+    let watch = watch.map(|watch| (watch, &mut *is_near));
+    scratch.follow::<S, N>(simd, scene, pass.bounces, (soft, paths), watch);
 }
 
 /// The colours of a batch as parts.
@@ -472,8 +510,9 @@ fn put_first<S: Simd, E: Real>(
             let levels = levels(batch.len(), workspace);
             for (from, run) in (0..ROOM).step_by(BLOCK).zip(batch.chunks(BLOCK)) {
                 let (at, last) = (run[0].pixel, run[run.len() - 1].pixel);
-                // Pixels are in order, so that none is left out between these.
-                if (at.0 + BLOCK as u32 - 1, at.1) == last {
+                // Pixels are in order, so that as many from one to the other are all between them.
+                let is_whole = run.len() == BLOCK && at.0.is_multiple_of(BLOCK as u32);
+                if is_whole && (at.0 + BLOCK as u32 - 1, at.1) == last {
                     let run = from..from + BLOCK;
                     let levels = levels.each_ref().map(|levels| &levels[run.clone()]);
                     first.put_run(tile.in_rows(at), levels, &workspace.objects[run]);

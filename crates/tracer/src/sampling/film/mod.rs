@@ -20,6 +20,7 @@ use rayfold_scene::{Samples, Tone};
 
 use self::chain::SampleSchedule;
 pub(crate) use self::cover::CoverTile;
+pub(crate) use self::bits::{BitRows, Bits};
 use self::cover::{CoverRows, Layer};
 pub(crate) use self::first::{First, FirstRows};
 pub(crate) use self::floors::{Difference, Floors};
@@ -49,6 +50,8 @@ pub(crate) struct Film {
     /// The cover, in scenes without background.
     cover: Option<Layer>,
     plan: Plan,
+    /// What the first look notes, if it is to note something.
+    near: Option<Bits>,
 }
 
 /// A row of tiles.
@@ -61,6 +64,8 @@ pub(crate) struct Band<'a> {
     pub(crate) cover: Option<CoverRows<'a>>,
     /// The state of its pixels, noted when samples are added.
     pub(crate) judged: Judged<'a>,
+    /// Those of its pixels that are near something.
+    pub(crate) near: Option<BitRows<'a>>,
 }
 
 impl Film {
@@ -97,7 +102,7 @@ impl Film {
         } else {
             None
         };
-        Some(Self { size, side, first, tiles, cover, plan })
+        Some(Self { size, side, first, tiles, cover, plan, near: None })
     }
 
     /// Gives pixels some number of samples in any case.
@@ -117,6 +122,24 @@ impl Film {
         self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), cover))
     }
 
+    /// Leaves all but some pixels out of the pass that [`Self::plan`] planned.
+    pub(crate) fn want_only(&mut self, some: &Bits) {
+        self.plan.want_only(some);
+    }
+
+    /// Lets the first look note which pixels are near something; `None` where there is no memory for it.
+    pub(crate) fn watch(&mut self) -> Option<()> {
+        self.near = Some(Bits::none(self.size)?);
+        Some(())
+    }
+
+    /// Takes the pixels that the first look noted, and so many beside them on all sides; none if they were taken before.
+    pub(crate) fn near(&mut self, beside: usize) -> Option<Bits> {
+        let mut near = self.near.take()?;
+        (0..beside).for_each(|_| near.widen());
+        Some(near)
+    }
+
     /// Returns the work of the pass that [`Self::plan`] planned, and of those after it.
     pub(crate) fn work(&self) -> Work {
         self.plan.work()
@@ -128,16 +151,20 @@ impl Film {
         let columns = self.size.0.div_ceil(self.side.0);
         let tiles = self.tiles.chunks_mut(columns).zip(judged);
         let mut bands: Vec<Band<'_>> = match &mut self.first {
-            None => tiles.map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged }).collect(),
+            None => tiles.map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged, near: None }).collect(),
             Some(first) => {
                 let first = first.bands(self.size.0 * self.side.1).map(Some);
-                let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged };
+                let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged, near: None };
                 tiles.zip(first).map(band).collect()
             }
         };
         if let Some(cover) = &mut self.cover {
             let rows = cover.rows(columns, self.size.0 * self.side.1);
             bands.iter_mut().zip(rows).for_each(|(band, rows)| band.cover = Some(rows));
+        }
+        if let Some(near) = &mut self.near {
+            let rows = near.bands(self.side.1);
+            bands.iter_mut().zip(rows).for_each(|(band, rows)| band.near = Some(rows));
         }
         (bands, wanted)
     }
@@ -391,7 +418,7 @@ mod tests {
         };
         let mut floors = Floors::new((2, 2), &[8, 16]).unwrap();
         let (a, b) = (look([0, 1, 1, 1], [900; 4]), look([0, 1, 7, 1], [900, 910, 900, 920]));
-        floors.add(&a, &b, |difference| Some(usize::from(difference == Difference::Color)));
+        floors.add((&a, &b), None, |difference| Some(usize::from(difference == Difference::Color)));
         let of = |set: usize| [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| floors.sets[set].1.has(x, y));
         assert_eq!((of(0), of(1)), ([false, false, true, false], [false, false, false, true]));
     }

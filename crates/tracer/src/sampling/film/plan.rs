@@ -176,6 +176,11 @@ impl Plan {
         (wanted, self.unsettled.bands(rows).map(judged))
     }
 
+    /// Leaves all but some pixels out of a pass.
+    pub(super) fn want_only(&mut self, some: &Bits) {
+        self.wanted.keep(some);
+    }
+
     /// The numbers of samples from and to which pixels of a place of the chain go in this pass, if they do.
     fn part(&self, (from, to): (u32, u32)) -> Option<(u32, u32)> {
         let from = u64::from(from) + u64::from(self.done) * u64::from(self.chain.step);
