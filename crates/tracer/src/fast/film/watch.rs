@@ -130,9 +130,8 @@ impl<E: Real> Watch<E> {
                         let low = [x.reduce_min(), y.reduce_min(), z.reduce_min()];
                         let high = [x.reduce_max(), y.reduce_max(), z.reduce_max()];
                         let region = Region::new(low, high);
-                        let between = |&(lamp, radius): &(DVec3, f64)| {
-                            self.hulls.between(&region, lamp, radius) != 0
-                        };
+                        let between =
+                            |&(lamp, radius): &(DVec3, f64)| self.hulls.between(&region, lamp, radius) != 0;
                         if self.lamps.iter().any(between) {
                             near = !no_lane::<S, E>(simd);
                         }

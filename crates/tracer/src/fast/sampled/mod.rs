@@ -48,10 +48,6 @@ pub(super) const SIDE: (u32, u32) = (16, 16);
 /// The same of moving scenes: of larger tiles more rays are of one moment.
 const MOVING_SIDE: (u32, u32) = (32, 32);
 
-/// So many pixels beside those whose first rays come near narrow objects count as well where something moves: as many as have
-/// first samples at all moments.
-const BESIDE: usize = 6;
-
 /// The half of a pixel, and a little for rounding: how far rays go from its middle.
 pub(super) const MARGIN: f64 = 0.5 + crate::fast::arithmetic::rounding::MARGIN;
 
@@ -214,7 +210,7 @@ impl<'a, E: Real> Sampled<'a, E> {
             self.pass(&mut film, rows.start, span)?;
             // Where no first ray came near narrow objects none of them matters. In one of several moments that is likely if
             // none beside it did in others.
-            let beside = if self.moments.len() > 1 { BESIDE } else { 1 };
+            let beside = if self.moments.len() > 1 { film::BESIDE } else { 1 };
             if let Some(near) = film.near(beside)
                 && let Some(floors) = self.scouts.floors(rows.clone(), Some(&near))?
             {
@@ -330,16 +326,16 @@ impl<'a, E: Real> Sampled<'a, E> {
     fn develop(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let (width, tone) = (self.scene.screen.width(), self.scene.tone);
         let first = (rows.start - above) as usize;
+        let level = self.options.level.unwrap_or_else(Level::new);
         image((width, rows.end - rows.start), |bytes| {
             bytes.par_chunks_exact_mut(CHANNELS * width as usize).enumerate().for_each(|(row, bytes)| {
+                if tone == Tone::Plain {
+                    return on!(level, _simd => film.put_levels(first + row, bytes));
+                }
                 let mut bytes = bytes.chunks_exact_mut(CHANNELS);
                 film.each_shown_of_row(first + row, |color| {
-                    let levels = match tone {
-                        Tone::Plain => color.levels(),
-                        Tone::Srgb => crate::fast::film::tone::levels(color.unit(), tone),
-                    };
                     if let Some(bytes) = bytes.next() {
-                        bytes.copy_from_slice(&levels);
+                        bytes.copy_from_slice(&crate::fast::film::tone::levels(color.unit(), tone));
                     }
                 });
             });
@@ -450,4 +446,46 @@ fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mu
 #[cfg(not(target_arch = "x86_64"))]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
     on!(level, simd => job.draw::<_, features::FullKernel<Robust>>(simd, band, workspace));
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Limits, parse};
+
+    use super::*;
+
+    /// Wires, a triangle that the sun sees from its edge, and their images in mirrors.
+    const NARROW: &str = "Screen 120 90\nLook 0 2.4 8  0 .7 0  34\nBackground .5 .6 .8\nSamples 16 1\n\
+        Box -9 -1 -9 9 0 9  .1 .1 .1 .5 .5 .45\nSphere .9 -1.2 .9 -.4  .04 .04 .04 .2 .2 .2 .6 .6 .6\n\
+        Sphere .5 1.6 .5 1.2  .08 .02 .02 .8 .2 .15\nCylinder .004 2.4 0 0  2.4 1.5 .4  .3 .3 .3 .6 .6 .6\n\
+        Triangle -3 .2 2  -1.7 .2 2  -2.4 1.6 2  .1 .1 .02 .7 .7 .2\n";
+
+    #[test]
+    fn narrow_objects_matter_only_where_rays_come_near_them() {
+        for more in [
+            "Ilight .6 .6 .6  .3 -1 0",
+            "Ilight .6 .6 .6  .3 -1 0  5\nLens .1 8",
+            "Plight .8 .8 .8  -1 4 2.01  .1",
+        ] {
+            let text = format!("{NARROW}{more}\nTrace\n");
+            let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+            let scene = parsed.script.and_then(|script| script.frame(0)).unwrap();
+            let geometry = Geometry::new(&scene, None).unwrap();
+            let options = RenderOptions::default();
+            let sampled =
+                Sampled::<f64>::new(&scene, core::slice::from_ref(&scene), &[geometry], &options).unwrap();
+            let rows = 0..scene.screen.height();
+            let mut film = sampled.film(&rows).unwrap();
+            film.watch().unwrap();
+            let span = film.plan().unwrap();
+            sampled.pass(&mut film, 0, span).unwrap();
+            let near = film.near(1).unwrap();
+            let all = sampled.scouts.floors(rows.clone(), None).unwrap();
+            let some = sampled.scouts.floors(rows, Some(&near)).unwrap();
+            assert!(all.is_some() && all == some, "{more}");
+            let share = near.count(0..90) as f64 / (120.0 * 90.0);
+            println!("{more}: {:.1} % of the pixels", 100.0 * share);
+            assert!(share > 0.0 && share < 0.7, "{more}: {share}");
+        }
+    }
 }

@@ -254,11 +254,12 @@ fn pair(
     Some(Compared { without: scene(without), with: scene(with), marks, boxes })
 }
 
-/// A box around an object, if it has an end: that of its hull and a part more, since rings are hulls of few points.
+/// A box around an object, if it has an end: that of its hull, and a part more where that is rings of few points.
 fn box_around(object: &Object) -> Option<Bounds> {
     let points = hull(object)?.points;
     let (low, high) = points.into_iter().map(|point| (point, point)).reduce(join)?;
-    let more = DVec3::splat(0.1 * (high - low).max_element());
+    let is_exact = matches!(object, Object::Triangle(_) | Object::Cuboid(_) | Object::Sphere(_));
+    let more = DVec3::splat(if is_exact { 1e-6 } else { 0.1 } * (high - low).max_element());
     Some((low - more, high + more))
 }
 

@@ -155,17 +155,16 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
             }
             _ => {
                 let Workspace { firsts, size, .. } = workspace;
-                if !tile.is_wanted_whole(pass.wanted) {
-                    tile.each_wanted_pixel(pass.wanted, |pixel| {
-                        items.push(Item { moment: 0, sample: 0, pixel });
-                    });
-                } else if *size != (tile.width, tile.height) {
-                    *size = (tile.width, tile.height);
-                    firsts.clear();
-                    tile.each_pixel(|pixel| firsts.push(Item { moment: 0, sample: 0, pixel }));
+                let first_of = |pixel| Item { moment: 0, sample: 0, pixel };
+                if tile.is_wanted_whole(pass.wanted) {
+                    if *size != (tile.width, tile.height) {
+                        *size = (tile.width, tile.height);
+                        firsts.clear();
+                        tile.each_pixel(|pixel| firsts.push(first_of(pixel)));
+                    }
                     items.extend_from_slice(firsts);
                 } else {
-                    items.extend_from_slice(firsts);
+                    tile.each_wanted_pixel(pass.wanted, |pixel| items.push(first_of(pixel)));
                 }
             }
         }

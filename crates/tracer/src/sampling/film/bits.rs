@@ -12,7 +12,7 @@ pub(super) fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
 }
 
 /// A set of pixels; bits beyond a row's last column are never set.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Bits {
     pub(super) words: Vec<u64>,
     /// Words of a row.
@@ -86,7 +86,8 @@ impl Bits {
         let mut wide = self.clone();
         for (row, words) in wide.words.chunks_exact_mut(self.stride).enumerate() {
             for (word, into) in words.iter_mut().enumerate() {
-                let near = (row.saturating_sub(1)..(row + 2).min(rows)).map(|row| widened(self.row(row), word));
+                let near =
+                    (row.saturating_sub(1)..(row + 2).min(rows)).map(|row| widened(self.row(row), word));
                 *into = near.fold(0, |all, bits| all | bits) & self.inside(word);
             }
         }
@@ -208,6 +209,15 @@ mod tests {
                 let expected: Vec<usize> =
                     (column.saturating_sub(1)..(column + 2).min(columns_in_all)).collect();
                 assert_eq!(near, expected);
+                let mut wide = bits.clone();
+                wide.widen();
+                let in_rows = (row.saturating_sub(1)..(row + 2).min(3)).len();
+                assert_eq!(wide.count(0..3) as usize, expected.len() * in_rows);
+                let (from, to) = (expected[0], expected[expected.len() - 1] + 1);
+                assert!(wide.has_all(from..to, row) && all.has_all(left..right, row));
+                assert!(bits.has_all(from..to, row) == (from + 1 == to));
+                wide.keep(&bits);
+                assert_eq!(wide, bits);
                 assert!(
                     (0..columns_in_all).all(|at| bits.has(at, row) == (at == column) && all.has(at, row))
                 );

@@ -8,7 +8,7 @@ use crate::parallel::CHANNELS;
 const SAME: u16 = 16;
 
 /// Sets of pixels, each with the number of samples that its pixels get at least.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(crate) struct Floors {
     pub(super) sets: Vec<(u32, Bits)>,
 }

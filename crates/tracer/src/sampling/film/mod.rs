@@ -18,9 +18,9 @@ mod plan;
 use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
+pub(crate) use self::bits::{BitRows, Bits};
 use self::chain::SampleSchedule;
 pub(crate) use self::cover::CoverTile;
-pub(crate) use self::bits::{BitRows, Bits};
 use self::cover::{CoverRows, Layer};
 pub(crate) use self::first::{First, FirstRows};
 pub(crate) use self::floors::{Difference, Floors};
@@ -31,8 +31,13 @@ pub(crate) use self::plan::{Judged, PassTargets, Work};
 use crate::parallel::CHANNELS;
 
 /// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
-/// it in the first look, one more for each time that it is decided who goes on, and those in which it is counted what varies.
-pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32;
+/// it in the first look, one more for each time that it is decided who goes on, those in which it is counted what varies, and
+/// those that are near something.
+pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32 + BESIDE as u32;
+
+/// So many pixels beside those whose first rays come near narrow objects count as near them as well, where something moves: as
+/// many as have first samples at all moments.
+pub(crate) const BESIDE: usize = 3;
 
 /// The samples that each pixel gets where they are not clamped: in fewer, what is rare and bright is seen by none.
 const FEWEST: u32 = 16;
@@ -151,7 +156,9 @@ impl Film {
         let columns = self.size.0.div_ceil(self.side.0);
         let tiles = self.tiles.chunks_mut(columns).zip(judged);
         let mut bands: Vec<Band<'_>> = match &mut self.first {
-            None => tiles.map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged, near: None }).collect(),
+            None => tiles
+                .map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged, near: None })
+                .collect(),
             Some(first) => {
                 let first = first.bands(self.size.0 * self.side.1).map(Some);
                 let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged, near: None };
@@ -193,6 +200,27 @@ impl Film {
         } else {
             self.each_of_row(row, each);
         }
+    }
+
+    /// Writes the levels of a row so far, without any curve.
+    #[inline(always)]
+    pub(crate) fn put_levels(&self, row: usize, bytes: &mut [u8]) {
+        let (columns, (across, down)) = (self.size.0, self.side);
+        let (pixels, _) = bytes.as_chunks_mut::<CHANNELS>();
+        let Some(first) = &self.first else {
+            let mut pixels = pixels.iter_mut();
+            return self.each_of_row(row, |color| {
+                if let Some(pixel) = pixels.next() {
+                    *pixel = color.levels();
+                }
+            });
+        };
+        first.put_levels(row * columns..(row + 1) * columns, pixels.as_flattened_mut());
+        let first_tile = row / down * columns.div_ceil(across);
+        self.plan.each_with_many(row, |column| {
+            let sums = &self.tiles[first_tile + column / across];
+            pixels[column] = Color::Mean(sums[row % down * across + column % across].mean()).levels();
+        });
     }
 
     /// The covers of a row so far, from the left, in each channel of a colour; none where all is covered.
@@ -270,8 +298,7 @@ impl Color {
     #[inline(always)]
     pub(crate) fn levels(&self) -> [u8; CHANNELS] {
         match self {
-            // Of 65,536 levels, of which 257 are a step.
-            Self::Sample(color) => color.map(|channel| ((u32::from(channel) + 128) / 257) as u8),
+            Self::Sample(color) => color.map(first::level),
             Self::Mean(mean) => mean.to_array().map(|channel| (255.0 * channel + 0.5) as u8),
         }
     }
@@ -514,6 +541,12 @@ mod tests {
                 counts = next;
             }
             assert_eq!(self::counts(&film), counts, "seed {seed}");
+            for row in 0..size.1 as usize {
+                let (mut levels, mut put) = (vec![], vec![0; CHANNELS * width]);
+                film.each_of_row(row, |color| levels.extend(color.levels()));
+                film.put_levels(row, &mut put);
+                assert_eq!(put, levels, "seed {seed}, row {row}");
+            }
         }
     }
 

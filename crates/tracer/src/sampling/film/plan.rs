@@ -11,7 +11,7 @@
 use rayfold_scene::Tone;
 use rayon::prelude::*;
 
-use super::bits::{BitRows, Bits, widened};
+use super::bits::{BitRows, Bits, WORD, widened};
 use super::chain::{SampleSchedule, Verdict};
 use super::density::Density;
 use super::first::First;
@@ -164,6 +164,19 @@ impl Plan {
     #[inline(always)]
     pub(super) fn has_many(&self, column: usize, row: usize) -> bool {
         self.at_least.first().is_some_and(|many| many.has(column, row))
+    }
+
+    /// Calls `each` with the columns of the pixels of a row that have the second number of the chain.
+    #[inline(always)]
+    pub(super) fn each_with_many(&self, row: usize, mut each: impl FnMut(usize)) {
+        let words = self.at_least.first().map_or(&[][..], |many| many.row(row));
+        for (word, &bits) in words.iter().enumerate() {
+            let mut bits = bits;
+            while bits != 0 {
+                each(word * WORD + bits.trailing_zeros() as usize);
+                bits &= bits - 1;
+            }
+        }
     }
 
     /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
