@@ -9,8 +9,9 @@ use glam::{DVec2, DVec3};
 pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     let is_wide = a.abs() > b.abs();
-    let (radius, part) = if is_wide { (a, b / a) } else { (b, a / b) };
-    let angle = core::f64::consts::FRAC_PI_4 * part;
+    // One division for both cases, so that many points are worked out in packets.
+    let (radius, other) = if is_wide { (a, b) } else { (b, a) };
+    let angle = core::f64::consts::FRAC_PI_4 * (other / radius);
     let (sine, cosine) = (radius * sine(angle), radius * cosine(angle));
     if is_wide { DVec2::new(cosine, sine) } else { DVec2::new(sine, cosine) }
 }

@@ -7,3 +7,4 @@ pub(crate) mod cover;
 pub(crate) mod tile;
 pub(crate) mod tone;
 pub(crate) mod trace;
+pub(crate) mod watch;

@@ -25,6 +25,7 @@ use crate::fast::film::cover::{cover_hits, let_through};
 use crate::fast::film::trace::{
     aim_along_axis, trace_bodies, trace_primary, trace_queue, trace_queue_of_glass,
 };
+use crate::fast::film::watch::Watch;
 use crate::fast::materials::sky::{show_panorama, show_sky};
 use crate::fast::rays::bounce::{Column, Columns, Hits, PIXELS, RayBatch, columns};
 use crate::fast::rays::kind::{ByKind, Kind};
@@ -148,7 +149,7 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if scene.is_clear() {
         cover_hits(hits, rays_of::<S, E>((tile.width, tile.height)), Lanes::<S, E>::LEN, cover);
     }
-    scratch.follow::<S, N>(simd, scene, tile.bounces, None, None);
+    scratch.follow::<S, N>(simd, scene, tile.bounces, (None, None), None);
     let hits = &scratch.hits;
     if scene.is_clear() {
         return write_lit::<S, E>(tile, &hits.color, &scratch.cover, band);
@@ -161,15 +162,16 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 }
 
 impl<E: Real> Scratch<'_, E> {
-    /// Traces the rays that mirrors and glass have spawned, and adds their colours to those of the previous hits.
+    /// Traces the rays that mirrors and glass have spawned, and adds their colours to those of the previous hits. In scenes
+    /// without glass it notes which come near what is watched.
     #[inline(always)]
     pub(crate) fn follow<S: Simd, N: Kernel<E>>(
         &mut self,
         simd: S,
         scene: &Prepared<E>,
         bounces: u32,
-        soft: Option<SoftLight<E>>,
-        paths: Option<PathNumbers>,
+        (soft, paths): (Option<SoftLight<E>>, Option<PathNumbers>),
+        mut watch: Option<(&Watch<E>, &mut [bool; PIXELS])>,
     ) {
         if let Some(numbers) = paths.filter(|_| parts::BUILT.paths) {
             return follow_paths::<S, E, N>(simd, scene, (soft, numbers), self);
@@ -206,6 +208,9 @@ impl<E: Real> Scratch<'_, E> {
                 paths: None,
             };
             shade::<S, E, N, false>(simd, scene, met, hits, occluders);
+            if let Some((watch, is_near)) = &mut watch {
+                watch.note::<S, false>(simd, queue, hits, is_near);
+            }
             for ray in 0..queue.count {
                 let pixel = queue.pixel.0[ray].to_index();
                 for (sum, color) in pixels.iter_mut().zip(&hits.color) {

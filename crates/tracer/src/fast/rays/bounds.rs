@@ -51,6 +51,33 @@ impl<S: Simd, E: Real> Crossing<S, E> {
         enter.simd_le(leave.min(limit))
     }
 
+    /// Returns the lanes that come as near to a [padded] box as `wider`, anywhere ahead.
+    #[inline(always)]
+    pub(crate) fn comes_near(
+        &self,
+        simd: S,
+        (low, high): ([E; 3], [E; 3]),
+        wider: Lanes<S, E>,
+    ) -> Mask<S, E> {
+        let (low, high) = (Vec3::<S, E>::splat(simd, low), Vec3::<S, E>::splat(simd, high));
+        let (inverse, shift) = (self.inverse, self.shift);
+        let (ax, bx) = (
+            (low.x - wider).fused_mul_add(inverse.x, shift.x),
+            (high.x + wider).fused_mul_add(inverse.x, shift.x),
+        );
+        let (ay, by) = (
+            (low.y - wider).fused_mul_add(inverse.y, shift.y),
+            (high.y + wider).fused_mul_add(inverse.y, shift.y),
+        );
+        let (az, bz) = (
+            (low.z - wider).fused_mul_add(inverse.z, shift.z),
+            (high.z + wider).fused_mul_add(inverse.z, shift.z),
+        );
+        let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz)).max(constant::<S, E>(simd, 0.0));
+        let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz));
+        enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE_IN_TREE * E::ROUNDOFF))
+    }
+
     /// Returns the distances at which the rays enter a [padded] box and the largest at which they can leave it. The
     /// interval of a box contains that of each box within it, because rounding is monotonic.
     #[inline(always)]

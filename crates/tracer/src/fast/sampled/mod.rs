@@ -26,6 +26,7 @@ use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::build::features::{self, Kernel};
 use crate::fast::build::prepare::Prepared;
+use crate::fast::film::watch::Watch;
 use crate::fast::placement::geometry::Geometry;
 use crate::fast::placement::lens::Aperture;
 use crate::fast::placement::window::{Grid, Window};
@@ -34,9 +35,9 @@ use crate::fast::shapes::shape::Robust;
 use crate::fast::transport::soft_light::Extents;
 use crate::parallel::{CHANNELS, image, values, whole_bands};
 use crate::parts;
-use crate::sampling::film::{self, Band, Film, First, PassTargets};
+use crate::sampling::film::{self, Band, Bits, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
-use crate::{RenderError, RenderOptions};
+use crate::{RenderError, RenderOptions, Sampler};
 
 /// Gets a function that makes the picture so far.
 pub(super) type Each<'a> =
@@ -63,6 +64,8 @@ struct Moment<E> {
     bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
+    /// What is watched in the first look.
+    watch: Option<Watch<E>>,
 }
 
 /// A scene at all its moments.
@@ -87,7 +90,19 @@ impl<'a, E: Real> Sampled<'a, E> {
         options: &'a RenderOptions<'a>,
     ) -> Result<Self, RenderError> {
         let scouts = Scouts::new(moments, options)?;
-        Ok(Self { scouts, ..Self::of_one_look(Cow::Borrowed(scene), moments, geometries, *options)? })
+        let mut sampled = Self::of_one_look(Cow::Borrowed(scene), moments, geometries, *options)?;
+        if let Some(boxes) = scouts.boxes()
+            && options.sampler == Sampler::default()
+        {
+            for (moment, geometry) in sampled.moments.iter_mut().zip(geometries) {
+                // What rays meet within glass, and where they go by chance, is not followed.
+                if !moment.prepared.has_glass() && !scene.goes_round() {
+                    moment.watch = Some(Watch::new(geometry, &boxes));
+                }
+            }
+        }
+        sampled.scouts = scouts;
+        Ok(sampled)
     }
 
     /// The same for [`Self::first_look`] alone.
@@ -172,7 +187,13 @@ impl<'a, E: Real> Sampled<'a, E> {
         mut each: impl FnMut(&Film) -> Result<(), RenderError>,
     ) -> Result<Film, RenderError> {
         let mut film = self.film(&rows)?;
-        if let Some(floors) = self.scouts.floors(rows.clone())? {
+        let is_watched = self.moments.iter().all(|moment| moment.watch.is_some());
+        if is_watched {
+            film.watch().ok_or(RenderError::TooLarge {
+                width: self.scene.screen.width(),
+                height: rows.end - rows.start,
+            })?;
+        } else if let Some(floors) = self.scouts.floors(rows.clone(), None)? {
             film.raise(floors);
         }
         if let Some(progress) = self.options.progress {
@@ -185,6 +206,14 @@ impl<'a, E: Real> Sampled<'a, E> {
             }
             passes += 1;
             self.pass(&mut film, rows.start, span)?;
+            // Where no first ray came near narrow objects none of them matters. In one of several moments that is likely if
+            // none beside it did in others.
+            let beside = if self.moments.len() > 1 { film::BESIDE } else { 1 };
+            if let Some(near) = film.near(beside)
+                && let Some(floors) = self.scouts.floors(rows.clone(), Some(&near))?
+            {
+                film.raise(floors);
+            }
         }
         if let Some(progress) = self.options.progress {
             progress.set(progress.done(), 0);
@@ -203,10 +232,13 @@ impl<'a, E: Real> Sampled<'a, E> {
             .ok_or_else(too_large)
     }
 
-    /// The first samples of the pixels of some rows, which are whole rows of tiles.
-    fn first_look(&self, rows: Range<u32>) -> Result<Option<First>, RenderError> {
+    /// The first samples of the pixels of some rows, which are whole rows of tiles: of all or of some.
+    fn first_look(&self, rows: Range<u32>, some: Option<&Bits>) -> Result<Option<First>, RenderError> {
         let mut film = self.film(&rows)?;
         if let Some(span) = film.plan() {
+            if let Some(some) = some {
+                film.want_only(some);
+            }
             self.pass(&mut film, rows.start, span)?;
         }
         Ok(film.into_first())
@@ -292,16 +324,16 @@ impl<'a, E: Real> Sampled<'a, E> {
     fn develop(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let (width, tone) = (self.scene.screen.width(), self.scene.tone);
         let first = (rows.start - above) as usize;
+        let level = self.options.level.unwrap_or_else(Level::new);
         image((width, rows.end - rows.start), |bytes| {
             bytes.par_chunks_exact_mut(CHANNELS * width as usize).enumerate().for_each(|(row, bytes)| {
+                if tone == Tone::Plain {
+                    return on!(level, _simd => film.put_levels(first + row, bytes));
+                }
                 let mut bytes = bytes.chunks_exact_mut(CHANNELS);
                 film.each_shown_of_row(first + row, |color| {
-                    let levels = match tone {
-                        Tone::Plain => color.levels(),
-                        Tone::Srgb => crate::fast::film::tone::levels(color.unit(), tone),
-                    };
                     if let Some(bytes) = bytes.next() {
-                        bytes.copy_from_slice(&levels);
+                        bytes.copy_from_slice(&crate::fast::film::tone::levels(color.unit(), tone));
                     }
                 });
             });
@@ -334,7 +366,7 @@ impl<E: Real> Moment<E> {
             View::Pinhole { right, up, .. } => geometry.lens.map(|lens| Aperture::new(lens, right, up)),
             View::Parallel { .. } => None,
         };
-        Ok(Self { prepared, window, bodies, extents, lens })
+        Ok(Self { prepared, window, bodies, extents, lens, watch: None })
     }
 }
 
@@ -385,8 +417,8 @@ impl<E: Real> Job<'_, E> {
                     };
                     if self.wanted.pixels.has_any(tile.columns(), tile.rows()) {
                         let cover = band.cover.as_mut().map(|cover| cover.of_tile(column));
-                        let drawn =
-                            Drawn { pixels, first: band.first.as_mut(), cover, judged: &mut band.judged };
+                        let (first, judged) = (band.first.as_mut(), &mut band.judged);
+                        let drawn = Drawn { pixels, first, cover, judged, near: band.near.as_mut() };
                         tile::draw::<S, E, N>(simd, &pass, &tile, drawn, workspace);
                     }
                 }
@@ -412,4 +444,46 @@ fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mu
 #[cfg(not(target_arch = "x86_64"))]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
     on!(level, simd => job.draw::<_, features::FullKernel<Robust>>(simd, band, workspace));
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Limits, parse};
+
+    use super::*;
+
+    /// Wires, a triangle that the sun sees from its edge, and their images in mirrors.
+    const NARROW: &str = "Screen 120 90\nLook 0 2.4 8  0 .7 0  34\nBackground .5 .6 .8\nSamples 16 1\n\
+        Box -9 -1 -9 9 0 9  .1 .1 .1 .5 .5 .45\nSphere .9 -1.2 .9 -.4  .04 .04 .04 .2 .2 .2 .6 .6 .6\n\
+        Sphere .5 1.6 .5 1.2  .08 .02 .02 .8 .2 .15\nCylinder .004 2.4 0 0  2.4 1.5 .4  .3 .3 .3 .6 .6 .6\n\
+        Triangle -3 .2 2  -1.7 .2 2  -2.4 1.6 2  .1 .1 .02 .7 .7 .2\n";
+
+    #[test]
+    fn narrow_objects_matter_only_where_rays_come_near_them() {
+        for more in [
+            "Ilight .6 .6 .6  .3 -1 0",
+            "Ilight .6 .6 .6  .3 -1 0  5\nLens .1 8",
+            "Plight .8 .8 .8  -1 4 2.01  .1",
+        ] {
+            let text = format!("{NARROW}{more}\nTrace\n");
+            let parsed = parse("a.txt", text.as_bytes(), &Limits::default());
+            let scene = parsed.script.and_then(|script| script.frame(0)).unwrap();
+            let geometry = Geometry::new(&scene, None).unwrap();
+            let options = RenderOptions::default();
+            let sampled =
+                Sampled::<f64>::new(&scene, core::slice::from_ref(&scene), &[geometry], &options).unwrap();
+            let rows = 0..scene.screen.height();
+            let mut film = sampled.film(&rows).unwrap();
+            film.watch().unwrap();
+            let span = film.plan().unwrap();
+            sampled.pass(&mut film, 0, span).unwrap();
+            let near = film.near(1).unwrap();
+            let all = sampled.scouts.floors(rows.clone(), None).unwrap();
+            let some = sampled.scouts.floors(rows, Some(&near)).unwrap();
+            assert!(all.is_some() && all == some, "{more}");
+            let share = near.count(0..90) as f64 / (120.0 * 90.0);
+            println!("{more}: {:.1} % of the pixels", 100.0 * share);
+            assert!(share > 0.0 && share < 0.7, "{more}: {share}");
+        }
+    }
 }

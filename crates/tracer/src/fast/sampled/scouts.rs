@@ -11,6 +11,7 @@ use core::ops::Range;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
+use glam::DVec3;
 use rayfold_scene::model::Finish;
 use rayfold_scene::{Material, Object, Samples, Scene, Shine};
 
@@ -19,10 +20,11 @@ use super::stand_ins::{Widener, repainted};
 use crate::RenderOptions;
 use crate::fast::build::precision;
 use crate::fast::placement::geometry::Geometry;
+use crate::fast::rays::bounds::{Bounds, join};
 use crate::fast::sampled::Sampled;
 use crate::parts;
 use crate::reference::triangle_normal;
-use crate::sampling::film::{Difference, Floors};
+use crate::sampling::film::{Bits, Difference, Floors};
 use crate::{Precision, RenderError, Sampler};
 
 /// Moments of an exposure that are looked at.
@@ -51,12 +53,16 @@ const SEEN: f64 = 32.0;
 const FLOORS: [u32; 3] = [64, 256, u32::MAX];
 const ALL: usize = FLOORS.len() - 1;
 
+/// More boxes are joined, so that few are watched.
+const BOXES: usize = 16;
+
 /// Two scenes, ready to be drawn.
 #[derive(Debug)]
 struct Pair<'a> {
     without: Sampled<'a, f64>,
     with: Sampled<'a, f64>,
     marks: Marks,
+    boxes: Option<Vec<Bounds>>,
 }
 
 /// What a difference between two scenes says.
@@ -99,26 +105,39 @@ impl<'a> Scouts<'a> {
         for (k, moment) in moments.iter().enumerate() {
             let near = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
             let near: Vec<&Scene> = near.filter_map(|k| moments.get(k).copied()).collect();
-            for (without, with, marks) in pairs(moment, &near) {
+            for Compared { without, with, marks, boxes } in pairs(moment, &near) {
                 let ready = |scene| ready(scene, options);
                 if let (Some(without), Some(with)) = (ready(without)?, ready(with)?) {
-                    all.push(Pair { without, with, marks });
+                    all.push(Pair { without, with, marks, boxes });
                 }
             }
         }
         Ok(Self(all))
     }
 
-    /// Which pixels of some rows get how many samples in any case; none if there are no such pixels.
-    pub(super) fn floors(&self, rows: Range<u32>) -> Result<Option<Floors>, RenderError> {
+    /// Boxes around all in which any two scenes differ, at most [`BOXES`]; none where something has no end, or nothing differs.
+    pub(super) fn boxes(&self) -> Option<Vec<Bounds>> {
+        let all = self.0.iter().map(|pair| pair.boxes.as_deref()).collect::<Option<Vec<_>>>()?.concat();
+        let boxes = all.chunks(all.len().div_ceil(BOXES).max(1));
+        let joined: Vec<Bounds> = boxes.filter_map(|some| some.iter().copied().reduce(join)).collect();
+        (!joined.is_empty()).then_some(joined)
+    }
+
+    /// Which pixels of some rows get how many samples in any case; none if there are no such pixels. Only `some`
+    /// can be, if they are known.
+    pub(super) fn floors(
+        &self,
+        rows: Range<u32>,
+        some: Option<&Bits>,
+    ) -> Result<Option<Floors>, RenderError> {
         let Some(first) = self.0.first() else { return Ok(None) };
         let size = (first.with.scene().screen.width(), rows.end - rows.start);
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
         let mut floors = Floors::new(size, &FLOORS).ok_or_else(too_large)?;
-        for Pair { without, with, marks } in &self.0 {
-            let looks = (without.first_look(rows.clone())?, with.first_look(rows.clone())?);
+        for Pair { without, with, marks, .. } in &self.0 {
+            let looks = (without.first_look(rows.clone(), some)?, with.first_look(rows.clone(), some)?);
             if let (Some(without), Some(with)) = looks {
-                floors.add(&without, &with, |difference| marks.floor(difference));
+                floors.add((&without, &with), some, |difference| marks.floor(difference));
             }
         }
         Ok(Some(floors))
@@ -151,7 +170,13 @@ impl Marks {
 }
 
 /// Two scenes without narrow objects and with stand-ins for them.
-type Compared = (Scene, Scene, Marks);
+struct Compared {
+    without: Scene,
+    with: Scene,
+    marks: Marks,
+    /// Around all in which they differ from each other and from the picture's scene; none where that has no end.
+    boxes: Option<Vec<Bounds>>,
+}
 
 /// What is compared of a scene, if anything is; `near` is what it is at the moments before and after.
 fn pairs(scene: &Scene, near: &[&Scene]) -> Vec<Compared> {
@@ -192,6 +217,11 @@ fn pair(
     let (mut without, mut with) = (vec![], vec![]);
     let (mut stand_ins, mut floors) = (vec![], vec![]);
     let mut widener = Widener::new(gauge, wider);
+    let mut boxes = Some(vec![]);
+    let mut include = |object: &Object| match (box_around(object), &mut boxes) {
+        (Some(around), Some(boxes)) => boxes.push(around),
+        _ => boxes = None,
+    };
     let mut is_any = false;
     for (at, (object, width)) in scene.objects.iter().zip(widths).enumerate() {
         if width.least < narrow {
@@ -201,12 +231,14 @@ fn pair(
             let wanted = SEEN * (1.0 + drift * MOMENTS as f64) / width.seen;
             let floor = FLOORS.iter().position(|&floor| f64::from(floor) >= wanted).unwrap_or(ALL);
             floors.extend(made.iter().map(|_| floor as u8));
+            made.iter().chain([object]).for_each(&mut include);
             stand_ins.extend(made);
             is_any = true;
             continue;
         }
         let gleams = gleams(object, gauge).filter(|_| !is_indirect);
         is_any |= gleams.is_some();
+        gleams.iter().for_each(|(_, shiny)| include(shiny));
         let (plain, shiny) = gleams.unwrap_or_else(|| (object.clone(), object.clone()));
         without.push(plain);
         with.push(shiny);
@@ -218,7 +250,17 @@ fn pair(
     with.extend(stand_ins);
     let samples = Samples::new(2, 1.0).ok()?;
     let scene = |objects: Vec<Object>| Scene { objects: objects.into(), samples, ..scene.clone() };
-    Some((scene(without), scene(with), Marks { others, floors, is_indirect }))
+    let marks = Marks { others, floors, is_indirect };
+    Some(Compared { without: scene(without), with: scene(with), marks, boxes })
+}
+
+/// A box around an object, if it has an end: that of its hull, and a part more where that is rings of few points.
+fn box_around(object: &Object) -> Option<Bounds> {
+    let points = hull(object)?.points;
+    let (low, high) = points.into_iter().map(|point| (point, point)).reduce(join)?;
+    let is_exact = matches!(object, Object::Triangle(_) | Object::Cuboid(_) | Object::Sphere(_));
+    let more = DVec3::splat(if is_exact { 1e-6 } else { 0.1 } * (high - low).max_element());
+    Some((low - more, high + more))
 }
 
 /// An object whose highlight is narrower than a pixel without it, and with a wider one.

@@ -21,7 +21,7 @@ use crate::fast::transport::paths::PathNumbers;
 use crate::fast::transport::soft_light::{LightPoints, SoftLight};
 use crate::parallel::CHANNELS;
 use crate::parts;
-use crate::sampling::film::{CoverTile, FirstRows, Judged, PassTargets, Pixel, quantised};
+use crate::sampling::film::{BitRows, CoverTile, FirstRows, Judged, PassTargets, Pixel, quantised};
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points};
 
@@ -77,6 +77,9 @@ struct Item {
 pub(super) struct Workspace<'a, E> {
     scratch: Scratch<'a, E>,
     items: Vec<Item>,
+    /// The first samples of all pixels of a tile, and of which size that was.
+    firsts: Vec<Item>,
+    size: (usize, usize),
     /// Memory for sorting them.
     sorted: Vec<Item>,
     lights: LightPoints<E>,
@@ -87,6 +90,8 @@ pub(super) struct Workspace<'a, E> {
     coordinates: [[f64; ROOM]; 3],
     /// What the rays from the camera meet.
     objects: [u32; ROOM],
+    /// Which of them came near what is watched, or rays that go on from them.
+    is_near: [bool; ROOM],
 }
 
 impl<'a, E: Real> Workspace<'a, E> {
@@ -95,6 +100,8 @@ impl<'a, E: Real> Workspace<'a, E> {
         Self {
             scratch: Scratch::new(cancel),
             items: vec![],
+            firsts: vec![],
+            size: (0, 0),
             sorted: vec![],
             lights: LightPoints::default(),
             seeds: [0; ROOM],
@@ -103,6 +110,7 @@ impl<'a, E: Real> Workspace<'a, E> {
             rows: [0.0; ROOM],
             coordinates: [[0.0; ROOM]; 3],
             objects: [NOTHING; ROOM],
+            is_near: [false; ROOM],
         }
     }
 }
@@ -117,6 +125,8 @@ pub(super) struct Drawn<'a, 'b> {
     pub(super) cover: Option<CoverTile<'a, 'b>>,
     /// The state of the pixels of its row of tiles.
     pub(super) judged: &'a mut Judged<'b>,
+    /// Those of its row of tiles whose rays come near what is watched.
+    pub(super) near: Option<&'a mut BitRows<'b>>,
 }
 
 /// Draws the samples that a tile's pixels lack.
@@ -125,7 +135,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
     pass: &Pass<E>,
     tile: &SampledTile,
-    Drawn { pixels, mut first, mut cover, judged }: Drawn,
+    Drawn { pixels, mut first, mut cover, judged, mut near }: Drawn,
     workspace: &mut Workspace<E>,
 ) {
     let mut items = core::mem::take(&mut workspace.items);
@@ -143,7 +153,20 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
                     tile.each_pixel(|pixel| first.put(tile.in_rows(pixel), [0; CHANNELS], NOTHING));
                 }
             }
-            _ => tile.each_pixel(|pixel| items.push(Item { moment: 0, sample: 0, pixel })),
+            _ => {
+                let Workspace { firsts, size, .. } = workspace;
+                let first_of = |pixel| Item { moment: 0, sample: 0, pixel };
+                if tile.is_wanted_whole(pass.wanted) {
+                    if *size != (tile.width, tile.height) {
+                        *size = (tile.width, tile.height);
+                        firsts.clear();
+                        tile.each_pixel(|pixel| firsts.push(first_of(pixel)));
+                    }
+                    items.extend_from_slice(firsts);
+                } else {
+                    tile.each_wanted_pixel(pass.wanted, |pixel| items.push(first_of(pixel)));
+                }
+            }
         }
     } else {
         pixels.resize(tile.side.0 * tile.side.1, Pixel::default());
@@ -173,10 +196,19 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     if let Some(time) = pass.dimensions.time {
         set_moments(pass, tile, time, &mut items, &mut workspace.sorted);
     }
+    if let (Some(near), Some(_)) = (&mut near, backdrop) {
+        // Beside what such a tile shows there may be something wider.
+        tile.each_pixel(|at| near.set(tile.left + at.0 as usize, at.1 as usize, true));
+    }
     for of_moment in items.chunk_by(|a, b| a.moment == b.moment) {
         let moment = &pass.moments[of_moment[0].moment as usize];
         for batch in of_moment.chunks(ROOM) {
             draw_batch::<S, E, N>(simd, pass, (tile, moment), batch, workspace);
+            if let Some(near) = &mut near {
+                for (item, _) in batch.iter().zip(&workspace.is_near).filter(|(_, is_near)| **is_near) {
+                    near.set(tile.left + item.pixel.0 as usize, item.pixel.1 as usize, true);
+                }
+            }
             match &mut first {
                 Some(first) if pass.wanted.is_first_look => {
                     put_first::<S, E>(simd, tile, batch, workspace, first);
@@ -268,6 +300,12 @@ impl SampledTile {
                 bits &= bits - 1;
             }
         });
+    }
+
+    /// Whether all of its pixels are wanted.
+    #[inline(always)]
+    fn is_wanted_whole(&self, wanted: PassTargets) -> bool {
+        self.rows().all(|row| wanted.pixels.has_all(self.columns(), row))
     }
 
     /// The rows of each block: left column, row, and number of columns.
@@ -362,7 +400,8 @@ fn set_moments<E: Real>(
     core::mem::swap(items, sorted);
 }
 
-/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then.
+/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then. Notes which of a first look
+/// came near what is watched.
 #[inline(always)]
 fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
@@ -372,7 +411,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     workspace: &mut Workspace<E>,
 ) {
     place::<S, E>(simd, pass, (tile, moment), batch, workspace);
-    let Workspace { scratch, lights, objects, seeds, samples, .. } = workspace;
+    let Workspace { scratch, lights, objects, seeds, samples, is_near, .. } = workspace;
     let (scene, count) = (&moment.prepared, batch.len());
     let soft = moment
         .extents
@@ -406,6 +445,10 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     }
     let (kinds, background) = (candidates.kinds, scene.backdrop());
     let bodies = moment.bodies_in(tile);
+    let watch = moment.watch.as_ref().filter(|_| pass.wanted.is_first_look);
+    if watch.is_some() {
+        is_near.fill(false);
+    }
     if matches!(scene.rays, Rays::Pinhole(_)) && moment.lens().is_none() {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, true>(simd, scene, candidates, background, queue, hits)
@@ -414,6 +457,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         let met =
             HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, true>(simd, scene, met, hits, occluders);
+        if let Some(watch) = watch {
+            watch.note::<S, true>(simd, queue, hits, is_near);
+        }
     } else {
         fitted!(N, kinds, tree, C T D => {
             trace_queue::<S, E, Variant<N::By, C, T, D>, false>(simd, scene, candidates, background, queue, hits)
@@ -422,6 +468,9 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
         let met =
             HitBatch { kinds, bodies, background, queue, count, next, waiting, soft, is_first: true, paths };
         shade::<S, E, N, false>(simd, scene, met, hits, occluders);
+        if let Some(watch) = watch {
+            watch.note::<S, false>(simd, queue, hits, is_near);
+        }
     }
     if pass.wanted.is_first_look {
         note_objects(hits, Lanes::<S, E>::LEN, objects);
@@ -429,7 +478,8 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     if scene.is_clear() {
         cover_hits(hits, count, Lanes::<S, E>::LEN, cover);
     }
-    scratch.follow::<S, N>(simd, scene, pass.bounces, soft, paths);
+    let watch = watch.map(|watch| (watch, &mut *is_near));
+    scratch.follow::<S, N>(simd, scene, pass.bounces, (soft, paths), watch);
 }
 
 /// The colours of a batch as parts.
@@ -456,9 +506,21 @@ fn put_first<S: Simd, E: Real>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let [red, green, blue] = levels(batch.len(), workspace);
-            for (k, item) in batch.iter().enumerate() {
-                first.put(tile.in_rows(item.pixel), [red[k], green[k], blue[k]], workspace.objects[k]);
+            let levels = levels(batch.len(), workspace);
+            for (from, run) in (0..ROOM).step_by(BLOCK).zip(batch.chunks(BLOCK)) {
+                let (at, last) = (run[0].pixel, run[run.len() - 1].pixel);
+                // Pixels are in order, so that as many from one to the other are all between them.
+                let is_whole = run.len() == BLOCK && at.0.is_multiple_of(BLOCK as u32);
+                if is_whole && (at.0 + BLOCK as u32 - 1, at.1) == last {
+                    let run = from..from + BLOCK;
+                    let levels = levels.each_ref().map(|levels| &levels[run.clone()]);
+                    first.put_run(tile.in_rows(at), levels, &workspace.objects[run]);
+                    continue;
+                }
+                for (k, item) in (from..).zip(run) {
+                    let color = levels.each_ref().map(|levels| levels[k]);
+                    first.put(tile.in_rows(item.pixel), color, workspace.objects[k]);
+                }
             }
         },
     );
@@ -544,17 +606,19 @@ fn place<S: Simd, E: Real>(
         || {
             let Workspace { scratch, lights, seeds, samples, columns, rows, coordinates, .. } = workspace;
             let anchor = moment.prepared.rays.anchor();
-            let count = batch.len();
-            // In two loops, of which the second is done in packets.
+            // Known to lie within the columns, so that loops have no checks and are done in packets.
+            let count = batch.len().min(ROOM);
+            // In two loops, of which the second is.
             let mut pixels = [[0; ROOM]; 2];
             for (k, item) in batch.iter().enumerate() {
                 (pixels[0][k], pixels[1][k]) = tile.in_image(item.pixel);
                 samples[k] = item.sample;
             }
+            let last = pass.height - 1;
             for k in 0..count {
                 let (column, row) = (pixels[0][k], pixels[1][k]);
-                (columns[k], rows[k]) =
-                    (f64::from(column) - anchor.0, f64::from(pass.height - 1 - row) - anchor.1);
+                columns[k] = f64::from(column) - anchor.0;
+                rows[k] = f64::from(last - row) - anchor.1;
                 seeds[k] = pass.points.pixel_seed(column, row);
             }
             let (seeds, samples) = (&seeds[..count], &samples[..count]);
@@ -578,8 +642,9 @@ fn place<S: Simd, E: Real>(
                 pass.points.coordinates(first, seeds, samples, &mut u[..count]);
                 pass.points.coordinates(first + 1, seeds, samples, &mut v[..count]);
                 let [x, y, _] = &mut queue.origin;
+                let radius = lens.radius;
                 for k in 0..count {
-                    let at = on_disc(u[k], v[k]) * lens.radius;
+                    let at = on_disc(u[k], v[k]) * radius;
                     (x.0[k], y.0[k]) = (E::narrow(at.x), E::narrow(at.y));
                 }
             }
@@ -625,10 +690,10 @@ fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]
     objects.fill(NOTHING);
     for &(at, _) in &hits.packets {
         let end = (at + lanes).min(ROOM);
-        for (lane, object) in (at..end).zip(&mut objects[at..end]) {
-            if hits.is_hit(lane) {
-                *object = hits.order.0[lane].to_index() as u32;
-            }
+        let (distances, orders) = (&hits.distance.0[at..end], &hits.order.0[at..end]);
+        for ((object, distance), order) in objects[at..end].iter_mut().zip(distances).zip(orders) {
+            let is_hit = distance.widen() < E::narrow(E::FAR).widen();
+            *object = if is_hit { order.to_index() as u32 } else { NOTHING };
         }
     }
 }

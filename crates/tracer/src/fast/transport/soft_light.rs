@@ -21,7 +21,7 @@ use crate::fast::transport::light::{Occluders, add_light, region, shows, widened
 use crate::fast::transport::search::{nearest, unoccluded};
 use crate::fast::transport::transmittance::{IncidentLight, Panes, Shadow};
 use crate::sampling::places::{in_ball, in_cone};
-use crate::sampling::{Dimensions, Points};
+use crate::sampling::{BATCH, Dimensions, Points};
 
 /// The extents of a scene's lights.
 #[derive(Debug)]
@@ -113,20 +113,25 @@ impl Extents {
         points: &Points,
         pixel_seeds: &[u32],
         samples: &[u32],
-        coordinates: &mut [[f64; 256]; 3],
+        coordinates: &mut [[f64; BATCH]; 3],
         into: &mut LightPoints<E>,
     ) {
         into.of.resize_with(self.dimensions.len(), columns);
-        let count = samples.len();
+        // Known to lie within the columns, so that the loops have no checks and are done in packets.
+        let count = samples.len().min(BATCH);
         for (own, sun) in self.suns.iter().flatten() {
             let first = self.dimensions[*own];
             let [u, v, _] = &mut *coordinates;
             points.coordinates(first, pixel_seeds, samples, &mut u[..count]);
             points.coordinates(first + 1, pixel_seeds, samples, &mut v[..count]);
-            let [x, y, z] = sun.axes;
+            let ([x, y, z], spread) = (sun.axes, sun.spread);
+            let [to_x, to_y, to_z] = &mut into.of[*own];
             for k in 0..count {
-                let at = in_cone(u[k], v[k], sun.spread);
-                put(&mut into.of[*own], k, at.x * x + at.y * y + at.z * z);
+                let at = in_cone(u[k], v[k], spread);
+                let towards = at.x * x + at.y * y + at.z * z;
+                to_x.0[k] = E::narrow(towards.x);
+                to_y.0[k] = E::narrow(towards.y);
+                to_z.0[k] = E::narrow(towards.z);
             }
         }
         for (own, ball) in self.lamps.iter().flatten() {
@@ -135,18 +140,15 @@ impl Extents {
             points.coordinates(first, pixel_seeds, samples, &mut u[..count]);
             points.coordinates(first + 1, pixel_seeds, samples, &mut v[..count]);
             points.coordinates(first + 2, pixel_seeds, samples, &mut w[..count]);
+            let [to_x, to_y, to_z] = &mut into.of[*own];
             for k in 0..count {
-                put(&mut into.of[*own], k, ball.middle + ball.radius * in_ball(u[k], v[k], w[k]));
+                let place = ball.middle + ball.radius * in_ball(u[k], v[k], w[k]);
+                to_x.0[k] = E::narrow(place.x);
+                to_y.0[k] = E::narrow(place.y);
+                to_z.0[k] = E::narrow(place.z);
             }
         }
     }
-}
-
-#[inline(always)]
-fn put<E: Real>(columns: &mut Columns<E>, k: usize, v: DVec3) {
-    columns[0].0[k] = E::narrow(v.x);
-    columns[1].0[k] = E::narrow(v.y);
-    columns[2].0[k] = E::narrow(v.z);
 }
 
 impl<E: Real> LightPoints<E> {

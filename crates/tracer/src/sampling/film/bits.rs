@@ -1,5 +1,7 @@
 //! A bit for each pixel of an image, row by row in words of 64.
 
+use core::ops::Range;
+
 /// Pixels in a word.
 pub(super) const WORD: usize = 64;
 
@@ -10,7 +12,7 @@ pub(super) fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
 }
 
 /// A set of pixels; bits beyond a row's last column are never set.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Bits {
     pub(super) words: Vec<u64>,
     /// Words of a row.
@@ -57,7 +59,7 @@ impl Bits {
     }
 
     /// Returns the number of its pixels in some rows.
-    pub(crate) fn count(&self, rows: core::ops::Range<usize>) -> u64 {
+    pub(crate) fn count(&self, rows: Range<usize>) -> u64 {
         let words = &self.words[rows.start * self.stride..rows.end * self.stride];
         words.iter().map(|word| u64::from(word.count_ones())).sum()
     }
@@ -71,6 +73,34 @@ impl Bits {
     /// Puts a pixel in.
     pub(super) fn put(&mut self, column: usize, row: usize) {
         self.words[row * self.stride + column / WORD] |= 1 << (column % WORD);
+    }
+
+    /// Takes all out that are not among others.
+    pub(super) fn keep(&mut self, others: &Self) {
+        self.words.iter_mut().zip(&others.words).for_each(|(word, others)| *word &= others);
+    }
+
+    /// Adds the pixels on all sides of those that are in.
+    pub(super) fn widen(&mut self) {
+        let rows = self.rows();
+        let mut wide = self.clone();
+        for (row, words) in wide.words.chunks_exact_mut(self.stride).enumerate() {
+            for (word, into) in words.iter_mut().enumerate() {
+                let near =
+                    (row.saturating_sub(1)..(row + 2).min(rows)).map(|row| widened(self.row(row), word));
+                *into = near.fold(0, |all, bits| all | bits) & self.inside(word);
+            }
+        }
+        *self = wide;
+    }
+
+    /// Whether it holds all of some columns of a row.
+    #[inline(always)]
+    pub(crate) fn has_all(&self, columns: Range<usize>, row: usize) -> bool {
+        columns.clone().step_by(32).all(|column| {
+            let count = (columns.end - column).min(32);
+            self.run(column, row) | (u32::MAX << (count - 1) << 1) == u32::MAX
+        })
     }
 
     /// In bands of so many rows.
@@ -101,7 +131,7 @@ impl Bits {
 
     /// Whether it holds one of a rectangle.
     #[inline(always)]
-    pub(crate) fn has_any(&self, columns: core::ops::Range<usize>, rows: core::ops::Range<usize>) -> bool {
+    pub(crate) fn has_any(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
         let (first, last) = (columns.start / WORD, (columns.end - 1) / WORD);
         rows.clone().any(|row| {
             let row = self.row(row);
@@ -179,6 +209,15 @@ mod tests {
                 let expected: Vec<usize> =
                     (column.saturating_sub(1)..(column + 2).min(columns_in_all)).collect();
                 assert_eq!(near, expected);
+                let mut wide = bits.clone();
+                wide.widen();
+                let in_rows = (row.saturating_sub(1)..(row + 2).min(3)).len();
+                assert_eq!(wide.count(0..3) as usize, expected.len() * in_rows);
+                let (from, to) = (expected[0], expected[expected.len() - 1] + 1);
+                assert!(wide.has_all(from..to, row) && all.has_all(left..right, row));
+                assert!(bits.has_all(from..to, row) == (from + 1 == to));
+                wide.keep(&bits);
+                assert_eq!(wide, bits);
                 assert!(
                     (0..columns_in_all).all(|at| bits.has(at, row) == (at == column) && all.has(at, row))
                 );

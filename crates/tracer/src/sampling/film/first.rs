@@ -3,6 +3,8 @@
 use core::ops::Range;
 use std::sync::LazyLock;
 
+use fearless_simd::{Level, dispatch};
+
 use super::bits::{WORD, zeroed};
 use super::pixel::{ONE, quantised};
 use crate::parallel::CHANNELS;
@@ -75,26 +77,46 @@ impl First {
         };
         let band = Band { colors, objects, limit };
         let (mut flags, mut apart) = (vec![0; objects.len()], vec![0; width]);
-        for row in (0..objects.len()).step_by(width) {
-            band.mark(&mut flags, &mut apart[1..], (row, row + 1));
-            let below = row + width;
-            if below < objects.len() {
-                band.mark(&mut flags, &mut apart, (row, below));
-                band.mark(&mut flags, &mut apart[1..], (row, below + 1));
-                band.mark(&mut flags, &mut apart[1..], (row + 1, below));
-            }
-        }
         let inner = (rows.start - top) * width;
-        let words = into.chunks_exact_mut(width.div_ceil(WORD));
-        for (words, flags) in words.zip(flags[inner..].chunks_exact(width)) {
-            for (word, flags) in words.iter_mut().zip(flags.chunks(WORD)) {
-                *word |= packed(flags);
+        // With the machine's widest instructions: the comparisons are the same with any.
+        dispatch!(Level::new(), _simd => {
+            for row in (0..objects.len()).step_by(width) {
+                band.mark(&mut flags, &mut apart[1..], (row, row + 1));
+                let below = row + width;
+                if below < objects.len() {
+                    band.mark(&mut flags, &mut apart, (row, below));
+                    band.mark(&mut flags, &mut apart[1..], (row, below + 1));
+                    band.mark(&mut flags, &mut apart[1..], (row + 1, below));
+                }
             }
+            let words = into.chunks_exact_mut(width.div_ceil(WORD));
+            for (words, flags) in words.zip(flags[inner..].chunks_exact(width)) {
+                for (word, flags) in words.iter_mut().zip(flags.chunks(WORD)) {
+                    *word |= packed(flags);
+                }
+            }
+        });
+    }
+
+    /// Writes the nearest of 256 levels of pixels that lie side by side, without any curve.
+    #[inline(always)]
+    pub(super) fn put_levels(&self, places: Range<usize>, bytes: &mut [u8]) {
+        let [red, green, blue] = self.colors.each_ref().map(|plane| &plane[places.clone()]);
+        let (pixels, _) = bytes.as_chunks_mut::<CHANNELS>();
+        for (pixel, ((&red, &green), &blue)) in pixels.iter_mut().zip(red.iter().zip(green).zip(blue)) {
+            *pixel = [level(red), level(green), level(blue)];
         }
     }
 }
 
+/// The nearest of 256 levels of a [`quantised`] channel: of 65,536 levels, of which 257 are a step.
+#[inline(always)]
+pub(super) const fn level(channel: u16) -> u8 {
+    ((channel as u32 * 255 + 32_895) >> 16) as u8
+}
+
 /// At most 64 flags as bits, the first the lowest: whether they are not zero.
+#[inline(always)]
 fn packed(flags: &[u16]) -> u64 {
     let mut set = [0; WORD];
     for (set, &flag) in set.iter_mut().zip(flags) {
@@ -121,6 +143,7 @@ struct Band<'a> {
 
 impl Band<'_> {
     /// Marks the pixels from two places on that differ from each other, as many as there is memory for.
+    #[inline(always)]
     fn mark(&self, flags: &mut [u16], apart: &mut [u16], places: (usize, usize)) {
         let runs = [places.0, places.1].map(|place| place..place + apart.len());
         let [[red, green, blue], [red_2, green_2, blue_2]] =
@@ -147,6 +170,16 @@ impl FirstRows<'_> {
             plane[place] = channel as u16;
         }
         self.objects[place] = object as u16;
+    }
+
+    /// The same for pixels side by side.
+    #[inline(always)]
+    pub(crate) fn put_run(&mut self, place: usize, colors: [&[u32]; CHANNELS], objects: &[u32]) {
+        let put = |plane: &mut [u16], of: &[u32]| {
+            plane[place..place + of.len()].iter_mut().zip(of).for_each(|(into, &of)| *into = of as u16);
+        };
+        self.colors.iter_mut().zip(colors).for_each(|(plane, levels)| put(plane, levels));
+        put(self.objects, objects);
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Pixels that get some number of samples whatever their first ones show.
 
-use super::bits::Bits;
+use super::bits::{Bits, WORD};
 use super::first::First;
 use crate::parallel::CHANNELS;
 
@@ -8,7 +8,7 @@ use crate::parallel::CHANNELS;
 const SAME: u16 = 16;
 
 /// Sets of pixels, each with the number of samples that its pixels get at least.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(crate) struct Floors {
     pub(super) sets: Vec<(u32, Bits)>,
 }
@@ -30,19 +30,33 @@ impl Floors {
         Some(Self { sets: sets.collect::<Option<_>>()? })
     }
 
-    /// Puts the pixels in which two pictures differ into the sets that `choose` names.
-    pub(crate) fn add(&mut self, a: &First, b: &First, choose: impl Fn(Difference) -> Option<usize>) {
-        let Some(columns) = self.sets.first().map(|(_, bits)| bits.columns) else { return };
-        for place in 0..a.objects.len() {
-            let difference = if a.objects[place] != b.objects[place] {
-                Difference::Object(b.objects[place])
-            } else if (0..CHANNELS).any(|k| a.colors[k][place].abs_diff(b.colors[k][place]) > SAME) {
-                Difference::Color
-            } else {
-                continue;
-            };
-            if let Some(set) = choose(difference) {
-                self.sets[set].1.put(place % columns, place / columns);
+    /// Puts the pixels in which two pictures differ into the sets that `choose` names: all of them, or of some.
+    pub(crate) fn add(
+        &mut self,
+        (a, b): (&First, &First),
+        some: Option<&Bits>,
+        choose: impl Fn(Difference) -> Option<usize>,
+    ) {
+        let Some((stride, columns)) = self.sets.first().map(|(_, bits)| (bits.stride, bits.columns)) else {
+            return;
+        };
+        for at in 0..self.sets[0].1.words.len() {
+            let (row, word) = (at / stride, at % stride);
+            let mut bits = some.map_or(self.sets[0].1.inside(word), |some| some.words[at]);
+            while bits != 0 {
+                let column = word * WORD + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let place = row * columns + column;
+                let difference = if a.objects[place] != b.objects[place] {
+                    Difference::Object(b.objects[place])
+                } else if (0..CHANNELS).any(|k| a.colors[k][place].abs_diff(b.colors[k][place]) > SAME) {
+                    Difference::Color
+                } else {
+                    continue;
+                };
+                if let Some(set) = choose(difference) {
+                    self.sets[set].1.put(column, row);
+                }
             }
         }
     }

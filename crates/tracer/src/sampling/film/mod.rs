@@ -18,6 +18,7 @@ mod plan;
 use glam::DVec3;
 use rayfold_scene::{Samples, Tone};
 
+pub(crate) use self::bits::{BitRows, Bits};
 use self::chain::SampleSchedule;
 pub(crate) use self::cover::CoverTile;
 use self::cover::{CoverRows, Layer};
@@ -30,8 +31,13 @@ pub(crate) use self::plan::{Judged, PassTargets, Work};
 use crate::parallel::CHANNELS;
 
 /// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
-/// it in the first look, one more for each time that it is decided who goes on, and those in which it is counted what varies.
-pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32;
+/// it in the first look, one more for each time that it is decided who goes on, those in which it is counted what varies, and
+/// those that are near something.
+pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32 + BESIDE as u32;
+
+/// So many pixels beside those whose first rays come near narrow objects count as near them as well, where something moves: as
+/// many as have first samples at all moments.
+pub(crate) const BESIDE: usize = 3;
 
 /// The samples that each pixel gets where they are not clamped: in fewer, what is rare and bright is seen by none.
 const FEWEST: u32 = 16;
@@ -49,6 +55,8 @@ pub(crate) struct Film {
     /// The cover, in scenes without background.
     cover: Option<Layer>,
     plan: Plan,
+    /// What the first look notes, if it is to note something.
+    near: Option<Bits>,
 }
 
 /// A row of tiles.
@@ -61,6 +69,8 @@ pub(crate) struct Band<'a> {
     pub(crate) cover: Option<CoverRows<'a>>,
     /// The state of its pixels, noted when samples are added.
     pub(crate) judged: Judged<'a>,
+    /// Those of its pixels that are near something.
+    pub(crate) near: Option<BitRows<'a>>,
 }
 
 impl Film {
@@ -97,7 +107,7 @@ impl Film {
         } else {
             None
         };
-        Some(Self { size, side, first, tiles, cover, plan })
+        Some(Self { size, side, first, tiles, cover, plan, near: None })
     }
 
     /// Gives pixels some number of samples in any case.
@@ -117,6 +127,24 @@ impl Film {
         self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), cover))
     }
 
+    /// Leaves all but some pixels out of the pass that [`Self::plan`] planned.
+    pub(crate) fn want_only(&mut self, some: &Bits) {
+        self.plan.want_only(some);
+    }
+
+    /// Lets the first look note which pixels are near something; `None` where there is no memory for it.
+    pub(crate) fn watch(&mut self) -> Option<()> {
+        self.near = Some(Bits::none(self.size)?);
+        Some(())
+    }
+
+    /// Takes the pixels that the first look noted, and so many beside them on all sides; none if they were taken before.
+    pub(crate) fn near(&mut self, beside: usize) -> Option<Bits> {
+        let mut near = self.near.take()?;
+        (0..beside).for_each(|_| near.widen());
+        Some(near)
+    }
+
     /// Returns the work of the pass that [`Self::plan`] planned, and of those after it.
     pub(crate) fn work(&self) -> Work {
         self.plan.work()
@@ -128,16 +156,22 @@ impl Film {
         let columns = self.size.0.div_ceil(self.side.0);
         let tiles = self.tiles.chunks_mut(columns).zip(judged);
         let mut bands: Vec<Band<'_>> = match &mut self.first {
-            None => tiles.map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged }).collect(),
+            None => tiles
+                .map(|(tiles, judged)| Band { tiles, first: None, cover: None, judged, near: None })
+                .collect(),
             Some(first) => {
                 let first = first.bands(self.size.0 * self.side.1).map(Some);
-                let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged };
+                let band = |((tiles, judged), first)| Band { tiles, first, cover: None, judged, near: None };
                 tiles.zip(first).map(band).collect()
             }
         };
         if let Some(cover) = &mut self.cover {
             let rows = cover.rows(columns, self.size.0 * self.side.1);
             bands.iter_mut().zip(rows).for_each(|(band, rows)| band.cover = Some(rows));
+        }
+        if let Some(near) = &mut self.near {
+            let rows = near.bands(self.side.1);
+            bands.iter_mut().zip(rows).for_each(|(band, rows)| band.near = Some(rows));
         }
         (bands, wanted)
     }
@@ -166,6 +200,27 @@ impl Film {
         } else {
             self.each_of_row(row, each);
         }
+    }
+
+    /// Writes the levels of a row so far, without any curve.
+    #[inline(always)]
+    pub(crate) fn put_levels(&self, row: usize, bytes: &mut [u8]) {
+        let (columns, (across, down)) = (self.size.0, self.side);
+        let (pixels, _) = bytes.as_chunks_mut::<CHANNELS>();
+        let Some(first) = &self.first else {
+            let mut pixels = pixels.iter_mut();
+            return self.each_of_row(row, |color| {
+                if let Some(pixel) = pixels.next() {
+                    *pixel = color.levels();
+                }
+            });
+        };
+        first.put_levels(row * columns..(row + 1) * columns, pixels.as_flattened_mut());
+        let first_tile = row / down * columns.div_ceil(across);
+        self.plan.each_with_many(row, |column| {
+            let sums = &self.tiles[first_tile + column / across];
+            pixels[column] = Color::Mean(sums[row % down * across + column % across].mean()).levels();
+        });
     }
 
     /// The covers of a row so far, from the left, in each channel of a colour; none where all is covered.
@@ -243,8 +298,7 @@ impl Color {
     #[inline(always)]
     pub(crate) fn levels(&self) -> [u8; CHANNELS] {
         match self {
-            // Of 65,536 levels, of which 257 are a step.
-            Self::Sample(color) => color.map(|channel| ((u32::from(channel) + 128) / 257) as u8),
+            Self::Sample(color) => color.map(first::level),
             Self::Mean(mean) => mean.to_array().map(|channel| (255.0 * channel + 0.5) as u8),
         }
     }
@@ -391,7 +445,7 @@ mod tests {
         };
         let mut floors = Floors::new((2, 2), &[8, 16]).unwrap();
         let (a, b) = (look([0, 1, 1, 1], [900; 4]), look([0, 1, 7, 1], [900, 910, 900, 920]));
-        floors.add(&a, &b, |difference| Some(usize::from(difference == Difference::Color)));
+        floors.add((&a, &b), None, |difference| Some(usize::from(difference == Difference::Color)));
         let of = |set: usize| [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| floors.sets[set].1.has(x, y));
         assert_eq!((of(0), of(1)), ([false, false, true, false], [false, false, false, true]));
     }
@@ -487,6 +541,12 @@ mod tests {
                 counts = next;
             }
             assert_eq!(self::counts(&film), counts, "seed {seed}");
+            for row in 0..size.1 as usize {
+                let (mut levels, mut put) = (vec![], vec![0; CHANNELS * width]);
+                film.each_of_row(row, |color| levels.extend(color.levels()));
+                film.put_levels(row, &mut put);
+                assert_eq!(put, levels, "seed {seed}, row {row}");
+            }
         }
     }
 

@@ -11,7 +11,7 @@
 use rayfold_scene::Tone;
 use rayon::prelude::*;
 
-use super::bits::{BitRows, Bits, widened};
+use super::bits::{BitRows, Bits, WORD, widened};
 use super::chain::{SampleSchedule, Verdict};
 use super::density::Density;
 use super::first::First;
@@ -166,6 +166,19 @@ impl Plan {
         self.at_least.first().is_some_and(|many| many.has(column, row))
     }
 
+    /// Calls `each` with the columns of the pixels of a row that have the second number of the chain.
+    #[inline(always)]
+    pub(super) fn each_with_many(&self, row: usize, mut each: impl FnMut(usize)) {
+        let words = self.at_least.first().map_or(&[][..], |many| many.row(row));
+        for (word, &bits) in words.iter().enumerate() {
+            let mut bits = bits;
+            while bits != 0 {
+                each(word * WORD + bits.trailing_zeros() as usize);
+                bits &= bits - 1;
+            }
+        }
+    }
+
     /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
     pub(super) fn split(&mut self, rows: usize) -> (PassTargets<'_>, impl Iterator<Item = Judged<'_>>) {
         let is_first_look = self.stage == Stage::First && self.chain.has_error();
@@ -174,6 +187,11 @@ impl Plan {
         let mut varying = self.varying.bands(rows);
         let judged = move |unsettled| Judged { unsettled, varying: varying.next() };
         (wanted, self.unsettled.bands(rows).map(judged))
+    }
+
+    /// Leaves all but some pixels out of a pass.
+    pub(super) fn want_only(&mut self, some: &Bits) {
+        self.wanted.keep(some);
     }
 
     /// The numbers of samples from and to which pixels of a place of the chain go in this pass, if they do.
