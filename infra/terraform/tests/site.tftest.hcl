@@ -29,7 +29,7 @@ run "off" {
   }
   assert {
     condition     = output.site_url == null && output.site_bucket == null && output.site_domain_name == null && output.person_role_arn == null
-    error_message = "nothing of the page may be told by default"
+    error_message = "the outputs may name no page by default"
   }
 }
 
