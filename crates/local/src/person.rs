@@ -1,8 +1,5 @@
 //! People who sign in: temporary credentials with the rights of a person, as Cognito and the stack's role give them on AWS.
 
-use aws_sdk_sts::config::{BehaviorVersion, Credentials, Region};
-use aws_sdk_sts::error::DisplayErrorContext;
-use aws_smithy_http_client::Builder;
 use rayfold_pipeline::store::Connection;
 
 use crate::error::{Error, Result};
@@ -24,28 +21,10 @@ pub async fn sign_in(owner: &Connection, identity: &str, bucket: &str) -> Result
     if !identity.chars().all(|c| c.is_ascii_alphanumeric() || ":-.".contains(c)) {
         return Err(failed(format!("{identity:?} is no identity")));
     }
-    let config = aws_sdk_sts::Config::builder()
-        .behavior_version(BehaviorVersion::latest())
-        .region(Region::new(owner.region.clone()))
-        .endpoint_url(&owner.endpoint)
-        .credentials_provider(Credentials::new(&owner.access_key, &owner.secret_key, None, None, "owner"))
-        .http_client(Builder::new().build_http())
-        .build();
-    let answer = aws_sdk_sts::Client::from_conf(config)
-        .assume_role()
-        .role_arn("arn:aws:iam::000000000000:role/rayfold-person")
-        .role_session_name("person")
-        .duration_seconds(SECONDS)
-        .policy(rights(identity, bucket))
-        .send()
-        .await
-        .map_err(|error| failed(DisplayErrorContext(error).to_string()))?;
-    let given = answer.credentials().ok_or_else(|| failed("the answer is empty".into()))?;
-    Ok(Connection {
-        access_key: given.access_key_id().to_owned(),
-        secret_key: given.secret_access_key().to_owned(),
-        session_token: Some(given.session_token().to_owned()),
-        ..owner.clone()
+    let given = owner.session("rayfold-person", &rights(identity, bucket), SECONDS).await;
+    given.map_err(|error| {
+        let source = std::error::Error::source(&error).map(ToString::to_string);
+        failed(source.unwrap_or_else(|| error.to_string()))
     })
 }
 
