@@ -30,8 +30,8 @@ const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 /// The first version of Node with all features that the tests use.
 const NODE: u32 = 20;
 
-/// The tests of the page without a server.
-const OF_THE_SITE: &str = "tests/site.mjs";
+/// The tests of the page without a server, alone and beside the bucket of `rayfold dev`.
+const OF_THE_SITE: [&str; 2] = ["tests/site.mjs", "tests/site-runs.mjs"];
 const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
 
 #[test]
@@ -46,7 +46,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
     // One after the other, because each uses all cores.
     node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
     let site = match site() {
-        Ok(site) => Some(node.arg(OF_THE_SITE).env("SITE", site)).is_some(),
+        Ok(site) => Some(node.args(OF_THE_SITE).env("SITE", site)).is_some(),
         Err(missing) => {
             note(&format!("the page without a server was NOT TESTED: {missing}"));
             false

@@ -9,6 +9,32 @@ locals {
   bucket_arn = one(concat(aws_s3_bucket.this[*].arn, [for name in var.existing_bucket[*] : "arn:${local.partition}:s3:::${name}"]))
 }
 
+locals {
+  tls_statements = {
+    for use, arn in merge(
+      { for arn in aws_s3_bucket.this[*].arn : "objects" => arn },
+      { for arn in aws_s3_bucket.site[*].arn : "site" => arn },
+      ) : use => [
+      {
+        Sid       = "TlsOnly"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "s3:*"
+        Resource  = [arn, "${arn}/*"]
+        Condition = { Bool = { "aws:SecureTransport" = "false" } }
+      },
+      {
+        Sid       = "Tls12OrNewer"
+        Effect    = "Deny"
+        Principal = "*"
+        Action    = "s3:*"
+        Resource  = [arn, "${arn}/*"]
+        Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
+      },
+    ]
+  }
+}
+
 resource "aws_s3_bucket" "this" {
   count = local.made_here
 
@@ -45,25 +71,8 @@ resource "aws_s3_bucket_policy" "this" {
   bucket = aws_s3_bucket.this[0].bucket
 
   policy = jsonencode({
-    Version = "2012-10-17"
-    Statement = concat([
-      {
-        Sid       = "TlsOnly"
-        Effect    = "Deny"
-        Principal = "*"
-        Action    = "s3:*"
-        Resource  = [aws_s3_bucket.this[0].arn, "${aws_s3_bucket.this[0].arn}/*"]
-        Condition = { Bool = { "aws:SecureTransport" = "false" } }
-      },
-      {
-        Sid       = "Tls12OrNewer"
-        Effect    = "Deny"
-        Principal = "*"
-        Action    = "s3:*"
-        Resource  = [aws_s3_bucket.this[0].arn, "${aws_s3_bucket.this[0].arn}/*"]
-        Condition = { NumericLessThan = { "s3:TlsVersion" = "1.2" } }
-      },
-    ], var.bucket_policy_statements)
+    Version   = "2012-10-17"
+    Statement = concat(local.tls_statements["objects"], var.bucket_policy_statements)
   })
 
   # Both write the bucket's policy state; at the same time S3 answers with a conflict.

@@ -17,10 +17,10 @@ resource "aws_budgets_budget" "this" {
     values = [format("user:Application$%s", local.tags.Application)]
   }
 
-  # Another region may have a stack of the same name, with a budget of its own.
+  # Another region may have a stack of the same name, with a budget of its own. CloudFront is of no region.
   cost_filter {
     name   = "Region"
-    values = [local.region]
+    values = concat([local.region], var.site ? ["global"] : [])
   }
 
   dynamic "notification" {

@@ -190,21 +190,28 @@ locals {
     operator = ["kms:Decrypt", "kms:GenerateDataKey"]
   }
 
+  # As an uploader, `person` encrypts and decrypts (people.tf).
+  key_statements_of_people = {
+    for user, key_actions in merge(local.users, { person = local.users.uploader }) : user => concat(
+      [for arn in var.kms_key_arn[*] : {
+        Sid       = "UseTheKeyThroughTheBucket"
+        Effect    = "Allow"
+        Action    = key_actions
+        Resource  = arn
+        Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
+      }],
+      local.former_key_statements.people,
+    )
+  }
+
   user_policies = {
-    for user, key_actions in local.users : user => jsonencode({
+    for user in keys(local.users) : user => jsonencode({
       Version = "2012-10-17"
       Statement = concat(
         jsondecode(templatefile("${path.module}/policies/${user}.json.tftpl", {
           bucket_arn = local.bucket_arn
         })).Statement,
-        [for arn in var.kms_key_arn[*] : {
-          Sid       = "UseTheKeyThroughTheBucket"
-          Effect    = "Allow"
-          Action    = key_actions
-          Resource  = arn
-          Condition = { StringEquals = { "kms:ViaService" = [local.kms_s3] } }
-        }],
-        local.former_key_statements.people,
+        local.key_statements_of_people[user],
       )
     })
   }

@@ -1,6 +1,6 @@
 # What the other files share. The stack: bucket.tf (objects and their lifecycle), functions.tf (the functions and
 # what wakes them), failures.tf (where failed events go), sweep.tf (the schedule), iam.tf (who may do what), kms.tf,
-# alarms.tf, budget.tf, dashboard.tf, destroy.tf (a check before destruction).
+# alarms.tf, budget.tf, dashboard.tf, destroy.tf (a check before destruction), site.tf (the studio's page).
 
 data "aws_caller_identity" "current" {}
 

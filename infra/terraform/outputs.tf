@@ -57,3 +57,23 @@ output "dashboard_url" {
   description = "Address of the dashboard, null without one"
   value       = one([for name in aws_cloudwatch_dashboard.this[*].dashboard_name : "https://${local.region}.${local.console}/cloudwatch/home?region=${local.region}#dashboards/dashboard/${name}"])
 }
+
+output "site_url" {
+  description = "Address of the studio's page, null without one"
+  value       = one(local.site_url)
+}
+
+output "site_domain_name" {
+  description = "CloudFront's name for the page, for an alias or CNAME of your own domain; null without a page"
+  value       = one(aws_cloudfront_distribution.site[*].domain_name)
+}
+
+output "site_bucket" {
+  description = "Name of the bucket of the page, null without one"
+  value       = one(aws_s3_bucket.site[*].bucket)
+}
+
+output "person_role_arn" {
+  description = "ARN of the role of people who sign in on the page, for the identity pool; null without `people`"
+  value       = one(aws_iam_role.person[*].arn)
+}

@@ -374,6 +374,92 @@ variable "sweep_minutes" {
   }
 }
 
+# The studio's page
+
+variable "site" {
+  description = "Whether to serve the studio's static page from a bucket of its own behind CloudFront"
+  type        = bool
+  default     = false
+  nullable    = false
+
+  validation {
+    condition     = !var.site || length(var.name) <= 30
+    error_message = "With site, name may have at most 30 characters, for the name of the page's bucket."
+  }
+}
+
+variable "site_folder" {
+  description = "Folder of the page; null takes what `cargo xtask site` wrote"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = !var.site || fileexists("${coalesce(var.site_folder, "${path.module}/../../target/site")}/studio.html")
+    error_message = "The page is missing: `cargo xtask site` builds it, or name its folder as site_folder."
+  }
+}
+
+variable "site_domain" {
+  description = "Domain of the page, and the ARN of an ACM certificate for it in us-east-1; null takes CloudFront's own domain. Point the domain at the output `site_domain_name`"
+  type        = object({ name = string, certificate_arn = string })
+  default     = null
+
+  validation {
+    condition     = var.site_domain == null ? true : can(regex("^arn:[a-z-]+:acm:us-east-1:[0-9]{12}:certificate/", var.site_domain.certificate_arn))
+    error_message = "site_domain.certificate_arn must be the ARN of an ACM certificate in us-east-1: CloudFront takes no other."
+  }
+  validation {
+    condition     = var.site_domain == null ? true : can(regex("^[a-z0-9-]+([.][a-z0-9-]+)+$", var.site_domain.name))
+    error_message = "site_domain.name must be a domain, such as studio.example.com."
+  }
+}
+
+variable "site_price_class" {
+  description = "Where CloudFront serves the page from: `PriceClass_100` (North America, Europe and Israel), `PriceClass_200` or `PriceClass_All`"
+  type        = string
+  default     = "PriceClass_100"
+  nullable    = false
+
+  validation {
+    condition     = contains(["PriceClass_100", "PriceClass_200", "PriceClass_All"], var.site_price_class)
+    error_message = "site_price_class must be PriceClass_100, PriceClass_200 or PriceClass_All."
+  }
+}
+
+variable "login_prefix" {
+  description = "First part of the domain of Cognito's sign-in page, for people who submit from the page, each to a folder of their own; null lets nobody in. It goes with `people`"
+  type        = string
+  default     = null
+
+  validation {
+    condition     = var.login_prefix == null || var.site
+    error_message = "login_prefix needs the page: site = true."
+  }
+  validation {
+    condition     = var.login_prefix == null ? true : can(regex("^[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?$", var.login_prefix))
+    error_message = "login_prefix must be lower-case letters, digits and hyphens, at most 63."
+  }
+}
+
+variable "people" {
+  description = "The identity pool whose people may submit from the page, and the user pool and client by which they sign in: the output `people` of the module `sign-in`. It goes with `login_prefix`"
+  type = object({
+    identity_pool_id = string
+    user_pool_id     = string
+    client_id        = string
+  })
+  default = null
+
+  validation {
+    condition     = (var.people == null) == (var.login_prefix == null)
+    error_message = "people and login_prefix go together."
+  }
+  validation {
+    condition     = var.people == null ? true : can(regex("^[a-z0-9:-]+$", var.people.identity_pool_id))
+    error_message = "people.identity_pool_id must be an identity pool's, such as eu-central-1:11111111-2222-3333-4444-555555555555, in the region of the stack."
+  }
+}
+
 # Watching
 
 variable "alarms_enabled" {

@@ -18,7 +18,7 @@ use std::time::Duration;
 use anyhow::{Context, bail, ensure};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfold_local::invoker::Settings;
-use rayfold_local::{Error, Functions, Plan, Platform, StoreKind};
+use rayfold_local::{Error, Functions, Plan, Platform, Site, StoreKind};
 use rayfold_pipeline::SystemClock;
 use rayfold_scene::Limits;
 use tempfile::TempDir;
@@ -123,6 +123,12 @@ pub(crate) struct Args {
     /// The bucket's name
     #[arg(long, value_name = "NAME", default_value = "rayfold")]
     bucket: String,
+    /// Serve the studio's static page from this folder, which `cargo xtask site` has built; it submits to the bucket
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["folder", "endpoint"])]
+    site: Option<PathBuf>,
+    /// Where the page of --site listens; port 0 stands for any
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:0", requires = "site")]
+    site_address: SocketAddr,
 }
 
 impl Args {
@@ -250,6 +256,16 @@ async fn attend(
             return Ok(Outcome::Done);
         }
     }
+    // It ends with this function.
+    let _site = match &args.site {
+        Some(folder) => {
+            let owner = platform.server().connection();
+            let site = Site::start(folder, args.site_address, owner, &args.bucket).await?;
+            console.note(format_args!("the studio's page, for one person: {}studio.html", site.url()));
+            Some(site)
+        }
+        None => None,
+    };
     console.print(exports(platform))?;
     let end = if order.is_some() { "stops everything and removes it" } else { "stops everything" };
     console.note(format_args!("data in {}; Ctrl-C {end}", data.display()));

@@ -43,6 +43,19 @@ pub enum Error {
         "{} is the data folder of a MinIO and stays as it is: choose another folder", .0.display()
     )]
     MinioFolder(PathBuf),
+    /// The store gave no temporary credentials.
+    #[error("the store gives no temporary credentials: {reason}")]
+    NoSession {
+        /// What it said.
+        reason: String,
+    },
+    /// The folder has no page.
+    #[error("{} is not the studio's static page: `cargo xtask site` builds it ({reason})", folder.display())]
+    NoPage {
+        folder: PathBuf,
+        /// What is missing.
+        reason: String,
+    },
     /// The built-in store did not start.
     #[error(transparent)]
     Store(rayfold_bucket::Error),

@@ -2,6 +2,7 @@
 //!
 //! [`S3Server`] is the bucket's server: built in, MinIO or SeaweedFS. [`invoker`] runs the function binaries like Lambda does,
 //! and sends them the bucket's events by the shared [`routes`]. [`cluster`] runs an invoker on a bucket of any other S3 server.
+//! [`Site`] serves the studio's static page beside the bucket, as the stack does by CloudFront.
 //! A listener can receive [`observation`]s of all activity.
 //!
 //! The crate knows the pipeline's keys and store, but no scenes or pixels. Everything listens only on loopback
@@ -17,6 +18,7 @@ mod install;
 pub mod invoker;
 mod minio;
 pub mod observation;
+mod person;
 mod platform;
 mod process;
 mod program;
@@ -24,13 +26,16 @@ mod region;
 pub mod routes;
 mod s3_server;
 mod seaweedfs;
+mod site;
 
 pub use credentials::Credentials;
 pub use error::{Error, Result};
 pub use functions::Functions;
 pub use http::any_port;
+pub use person::sign_in;
 pub use platform::{Plan, Platform, notify};
 pub use program::Program;
 pub use rayfold_bucket::Webhook;
 pub use region::REGION;
 pub use s3_server::{S3Server, StoreKind};
+pub use site::Site;

@@ -9,7 +9,7 @@ const own = (name) => join(import.meta.dirname, "src", name);
 // Fixed names: three files, which the server knows.
 export default defineConfig({
   base: "./",
-  resolve: { alias: { "#connection": own("connection/socket.ts"), "#drawn": own("connection/drawn.tsx") } },
+  resolve: { alias: { "#connection": own("connection/socket.ts"), "#drawn": own("connection/drawn.tsx"), "#runs": own("connection/runs.ts") } },
   build: {
     modulePreload: false,
     cssCodeSplit: false,

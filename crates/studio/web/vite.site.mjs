@@ -11,7 +11,7 @@ const minify = { compress: true, mangle: true, codegen: { removeWhitespace: true
 export default defineConfig({
   root: join(import.meta.dirname, "site"),
   base: "./",
-  resolve: { alias: { "#connection": own("static/connection.ts"), "#drawn": own("static/drawn.tsx") } },
+  resolve: { alias: { "#connection": own("static/connection.ts"), "#drawn": own("static/drawn.tsx"), "#runs": own("static/stack/runs.ts") } },
   worker: { format: "es", rollupOptions: { output: { entryFileNames: "worker.js", minify } } },
   build: {
     outDir: join(import.meta.dirname, "../../../target/site"),

@@ -61,6 +61,7 @@ run "minimal_elsewhere" {
 
 run "complete" {
   variables {
+    site_folder = "tests/site"
     kms_key_arn = "arn:aws:kms:us-east-1:123456789012:key/11111111-2222-3333-4444-555555555555"
   }
 
@@ -79,6 +80,10 @@ run "complete" {
   assert {
     condition     = endswith(output.dashboard_url, "#dashboards/dashboard/rayfold-us-east-1")
     error_message = output.dashboard_url
+  }
+  assert {
+    condition     = startswith(output.site_url, "https://")
+    error_message = output.site_url
   }
   assert {
     condition     = keys(output.user_policy_arns) == ["operator", "uploader", "viewer"]

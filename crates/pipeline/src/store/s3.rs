@@ -18,6 +18,7 @@
 
 mod admin;
 mod answers;
+mod session;
 mod upload;
 
 use std::ops::Range;

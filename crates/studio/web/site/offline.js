@@ -3,6 +3,8 @@
 
 const VERSION = "@VERSION@";
 const FILES = ["@FILES@", location.search.slice(1)];
+/** What a host says of itself: the newest, where there is a network. */
+const OF_THE_HOST = "rayfold.json";
 
 addEventListener("install", (event) => {
   // Not from the browser's cache, which may hold files of an older version.
@@ -17,6 +19,11 @@ addEventListener("activate", (event) => {
 
 async function answer(request) {
   const cache = await caches.open(VERSION);
+  if (new URL(request.url).pathname.endsWith(`/${OF_THE_HOST}`)) {
+    const found = await fetch(request, { cache: "no-cache" }).catch(() => null);
+    if (found?.ok) await cache.put(request, found.clone());
+    return found ?? (await cache.match(request)) ?? new Response("{}");
+  }
   const kept = await cache.match(request, { ignoreSearch: true });
   if (kept) return kept;
   const found = await fetch(request);

@@ -140,7 +140,7 @@ function hear(tell: ServerMessage): void {
     if (tell.tables) tables.value = tell.tables;
     if (tell.examples) examples.value = tell.examples;
     if (tell.canCreate !== undefined) canCreate.value = tell.canCreate;
-    if (tell.canSubmit !== undefined) canSubmit.value = tell.canSubmit;
+    if (tell.canSubmit) canSubmit.value = true;
     if (tell.presets) presets.value = tell.presets;
     if (tell.files) files.value = tell.files;
     if (tell.lines) lines.value = tell.lines;

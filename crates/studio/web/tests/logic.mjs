@@ -9,7 +9,7 @@ import { createServer } from "vite";
 const root = join(import.meta.dirname, "..");
 let server;
 before(async () => {
-  server = await createServer({ root, configFile: false, resolve: { alias: { "#connection": join(root, "src/connection/socket.ts"), "#drawn": join(root, "src/connection/drawn.tsx") } }, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
+  server = await createServer({ root, configFile: false, resolve: { alias: { "#connection": join(root, "src/connection/socket.ts"), "#drawn": join(root, "src/connection/drawn.tsx"), "#runs": join(root, "src/connection/runs.ts") } }, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
 });
 after(() => server?.close());
 const load = (path) => server.ssrLoadModule(`/src/${path}`);
@@ -119,4 +119,62 @@ test("a selection that stays is the same array", async (t) => {
   assert.equal(after([1, 2]), first);
   assert.deepEqual(after([2, 1]), [2, 1]);
   assert.deepEqual(after([]), []);
+});
+
+test("the state of a run follows from its manifest, its outputs and its scripts", async () => {
+  const { summary, isBehind, faults, frameFile, frameUpdate } = await load("static/stack/standing.ts");
+  const frame = (script, state, more = {}) => ({ script, version: "v1", state, ...more });
+  const manifest = {
+    status: "done", generation: "g", total: 2, done: 2, failed: 0, settings: { version: "s", value: { frames: 2 } },
+    gif: { generation: "g", version: "e" }, frames: [frame("1", "done", { pixels: 3 }), frame("2", "done", { pixels: 3, version: "v2+f" })],
+  };
+  const gif = { ending: "gif", etag: "e", size: 9, generation: "g" };
+  const of = (now, outputs = [gif], behind = false) => summary("film", now, outputs, behind);
+  assert.deepEqual(of(manifest).files, [{ ending: "gif", format: "GIF", bytes: 9, version: "e", current: true }]);
+  assert.ok(of(manifest).settled);
+  assert.ok(!of(manifest, [gif], true).settled, "newer scripts wait to be seen");
+  for (const old of [{ ...gif, generation: "f" }, { ...gif, etag: "copied" }]) assert.ok(!of(manifest, [old]).settled && !of(manifest, [old]).files[0].current);
+  assert.ok(!of(manifest, []).settled, "its GIF is still to come");
+  assert.equal(of({ ...manifest, total: 1, settings: { value: { frames: 5 } } }).total, 5, "those to come are awaited");
+  assert.equal(of(null).status, "new");
+  assert.equal(of("{").status, "unreadable");
+  for (const [status, settled] of [["waiting", false], ["rendering", false], ["failed", true], ["refused", true]]) assert.equal(of({ ...manifest, status }).settled, settled, status);
+
+  const there = new Map([["1.txt", "v1"], ["2.txt", "v2"], ["animation.json", "s"], ["model.obj", "m"]]);
+  assert.ok(!isBehind(manifest, there));
+  for (const [name, version] of [["1.txt", "new"], ["3.txt", "v3"], ["animation.json", "t"]]) assert.ok(isBehind(manifest, new Map([...there, [name, version]])), name);
+  for (const name of ["1.txt", "animation.json"]) assert.ok(isBehind(manifest, new Map([...there].filter(([other]) => other !== name))), `${name} is gone`);
+
+  const reason = { message: "m", diagnostics: [{ line: 2, column: 3, message: "unknown", expected: "Sphere" }], omitted: 4 };
+  const failed = { ...manifest, rejected: [{ key: "scripts/x", problem: "p" }], frames: [frame("1", "failed", { part: 2, reason }), frame("2", "waiting")] };
+  assert.deepEqual(faults("film", failed), {
+    faults: [
+      { what: "scripts/x", message: "p", help: "" },
+      { what: "1.txt, frame 2", script: "1", part: 2, place: [2, 3], message: "unknown", help: "Sphere" },
+      { what: "1.txt, frame 2", script: "1", part: 2, message: "and 4 more", help: "" },
+      { what: "2.txt", script: "2", message: "no reason is known yet", help: "" },
+    ],
+    moreFaults: 0,
+  });
+  assert.deepEqual(frameUpdate(failed.frames[1]), { script: "2", version: "v1", state: "pending" });
+  assert.equal(frameFile("a b", "x+y.z", "3", null), "a b@x~2by~2ez-p3.png");
+  assert.equal(frameFile("1", "v", "3", "7"), "1@v-p3/7.png");
+});
+
+// The example of the documentation of AWS has other headers: this is its method, in another implementation.
+test("requests to S3 are signed", async () => {
+  const { createHash, createHmac } = await import("node:crypto");
+  const { signed, encoded } = await load("static/stack/sign.ts");
+  const keys = { accessKey: "AKID", secretKey: "secret", sessionToken: "token" };
+  const url = new URL(`https://b.s3.eu-central-1.amazonaws.com/scripts/${encoded("eu:1 (a)!")}/1.txt?list-type=2&prefix=${encoded("a/*")}`);
+  const headers = await signed({ method: "PUT", url, body: new Uint8Array([1, 2]) }, keys, "eu-central-1", new Date("2026-03-04T05:06:07.890Z"));
+  const sha = (content) => createHash("sha256").update(content).digest("hex");
+  const mac = (key, text) => createHmac("sha256", key).update(text).digest();
+  const content = sha(Buffer.from([1, 2]));
+  const names = "host;x-amz-content-sha256;x-amz-date;x-amz-security-token";
+  const canonical = `PUT\n/scripts/eu%3A1%20%28a%29%21/1.txt\nlist-type=2&prefix=a%2F%2A\nhost:b.s3.eu-central-1.amazonaws.com\nx-amz-content-sha256:${content}\nx-amz-date:20260304T050607Z\nx-amz-security-token:token\n\n${names}\n${content}`;
+  const scope = "20260304/eu-central-1/s3/aws4_request";
+  const key = scope.split("/").reduce((key, part) => mac(key, part), "AWS4secret");
+  const signature = mac(key, `AWS4-HMAC-SHA256\n20260304T050607Z\n${scope}\n${sha(canonical)}`).toString("hex");
+  assert.equal(headers.authorization, `AWS4-HMAC-SHA256 Credential=AKID/${scope}, SignedHeaders=${names}, Signature=${signature}`);
 });

@@ -1,5 +1,5 @@
 # A stack as a team would run it: a key from examples/key, an access log, alarms and a budget that reach somebody, rights for people.
-# Build the packages first: cargo xtask package --architecture arm64
+# Build packages and page first: cargo xtask package --architecture arm64, cargo xtask site
 
 provider "aws" {
   region = var.region
@@ -55,6 +55,10 @@ module "rayfold" {
     monthly_usd = 50
     topic_arns  = [aws_sns_topic.alarms.arn]
   }
+
+  # The studio's page, without sign-in: examples/people has that
+  site        = true
+  site_folder = var.site_folder
 
   depends_on = [aws_s3_bucket_policy.access_log]
 }

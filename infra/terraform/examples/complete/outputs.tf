@@ -27,3 +27,8 @@ output "user_policy_arns" {
   description = "ARNs of the policies for people, by `viewer`, `uploader` and `operator`"
   value       = { for user, policy in aws_iam_policy.user : user => policy.arn }
 }
+
+output "site_url" {
+  description = "Address of the studio's page"
+  value       = module.rayfold.site_url
+}

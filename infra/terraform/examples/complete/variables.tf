@@ -27,3 +27,9 @@ variable "kms_key_arn" {
   type        = string
   default     = null
 }
+
+variable "site_folder" {
+  description = "Folder of the studio's page; null takes what `cargo xtask site` wrote"
+  type        = string
+  default     = null
+}

@@ -84,3 +84,39 @@ override_resource {
   target = aws_scheduler_schedule_group.this
   values = { arn = "arn:aws:scheduler:eu-central-1:123456789012:schedule-group/demo" }
 }
+
+override_resource {
+  target = aws_s3_bucket.site[0]
+  values = { arn = "arn:aws:s3:::demo-site-123456789012-eu-central-1" }
+}
+
+override_resource {
+  target = aws_cloudfront_distribution.site[0]
+  values = {
+    arn         = "arn:aws:cloudfront::123456789012:distribution/EDFDVBD6EXAMPLE"
+    domain_name = "d111111abcdef8.cloudfront.net"
+  }
+}
+
+override_resource {
+  target = aws_cloudfront_response_headers_policy.site[0]
+  values = { id = "headers" }
+}
+
+override_resource {
+  target = aws_cloudfront_cache_policy.site[0]
+  values = { id = "cache" }
+}
+
+override_resource {
+  target = aws_cloudfront_origin_access_control.site[0]
+  values = { id = "access" }
+}
+
+override_resource {
+  target = aws_iam_role.person[0]
+  values = {
+    id  = "demo-eu-central-1-person"
+    arn = "arn:aws:iam::123456789012:role/demo-eu-central-1-person"
+  }
+}

@@ -1,8 +1,8 @@
 //! Sets a bucket up where no other program does: on AWS that is Terraform's part, on a laptop it is ours.
 
 use aws_sdk_s3::types::{
-    Event, FilterRule, FilterRuleName, NotificationConfiguration, NotificationConfigurationFilter,
-    QueueConfiguration, S3KeyFilter,
+    CorsConfiguration, CorsRule, Event, FilterRule, FilterRuleName, NotificationConfiguration,
+    NotificationConfigurationFilter, QueueConfiguration, S3KeyFilter,
 };
 
 use super::S3Store;
@@ -66,6 +66,30 @@ impl S3Store {
         let request = self.client.put_bucket_notification_configuration().bucket(&self.bucket);
         let answer = request.notification_configuration(configuration).send().await;
         answer.map(drop).map_err(|error| error_of(&self.bucket, error))
+    }
+
+    /// Lets the pages of an origin, such as `http://127.0.0.1:8000`, use the bucket from a browser. Their requests are signed as
+    /// all others are.
+    ///
+    /// # Errors
+    /// Fails like the store.
+    pub async fn allow_page(&self, origin: &str) -> Result<()> {
+        let refused = |source: aws_sdk_s3::error::BuildError| Error::Refused {
+            key: self.bucket.clone(),
+            source: source.into(),
+        };
+        let all = |names: &[&str]| Some(names.iter().map(|&name| name.to_owned()).collect());
+        let rule = CorsRule::builder()
+            .allowed_origins(origin)
+            .set_allowed_methods(all(&["DELETE", "GET", "HEAD", "PUT"]))
+            .set_allowed_headers(all(&["authorization", "content-type", "x-amz-*"]))
+            .set_expose_headers(all(&["ETag", "x-amz-meta-generation"]))
+            .max_age_seconds(3600)
+            .build()
+            .map_err(refused)?;
+        let rules = CorsConfiguration::builder().cors_rules(rule).build().map_err(refused)?;
+        let request = self.client.put_bucket_cors().bucket(&self.bucket).cors_configuration(rules);
+        request.send().await.map(drop).map_err(|error| error_of(&self.bucket, error))
     }
 
     /// Whether the bucket can be listed: the cheapest request that fails where the others would.

@@ -15,6 +15,7 @@ export type Send = (text: string) => boolean;
 /** A small picture that the studio draws. */
 export interface Drawing {
   readonly src: string | undefined;
+  readonly alt?: string;
   readonly width?: number;
   readonly height?: number;
   readonly loading?: "lazy";

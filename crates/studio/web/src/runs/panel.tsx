@@ -6,6 +6,9 @@ import { signal } from "@preact/signals";
 import type { JSX } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 
+import { Drawn } from "#drawn";
+import { isOwner } from "#runs";
+
 import { List } from "../parts/list";
 import {
   address,
@@ -132,7 +135,7 @@ function Submit(): JSX.Element {
           )}
           <p>
             <button class="main" disabled={waiting.value || (gone.length > 0 && !mayDelete.value)}>
-              {waiting.value ? "Please wait" : now ? "Submit" : "Estimate the cost"}
+              {waiting.value ? "Please wait" : now ? "Submit" : isOwner ? "Estimate the cost" : "Compare with the bucket"}
             </button>
           </p>
         </form>
@@ -145,43 +148,50 @@ function dollars(usd: number): string {
   return usd < 0.00005 ? "less than 0.0001" : usd.toFixed(4);
 }
 
-function Cost({ offer: { estimate, folder, upload, unchanged } }: { readonly offer: Offer }): JSX.Element {
+function Cost({ offer: { estimate, frames, folder, upload, unchanged } }: { readonly offer: Offer }): JSX.Element {
+  const count = estimate?.frames ?? frames;
   return (
     <>
       <p>
-        {estimate.frames} {estimate.frames === 1 ? "frame" : "frames"} of {estimate.size.join(" × ")} pixels, {estimate.drawingMs.toFixed(1)} ms each on one
-        thread of this machine. To {folder}: {upload} {upload === 1 ? "file" : "files"} to upload, {unchanged} there already.
+        {count} {count === 1 ? "frame" : "frames"}
+        {estimate && ` of ${estimate.size.join(" × ")} pixels, ${estimate.drawingMs.toFixed(1)} ms each on one thread of this machine`}. To {folder}: {upload} {upload === 1 ? "file" : "files"} to upload, {unchanged} there already.
       </p>
-      <table class="cost">
-        <caption>Cost on AWS, in US dollars ({estimate.prices}; free allowances left out). On this machine it costs nothing.</caption>
-        <thead>
-          <tr>
-            <th scope="col">For</th>
-            <th scope="col">US dollars</th>
-          </tr>
-        </thead>
-        <tbody>
-          {estimate.sections.map((section) => (
-            <tr key={section.title}>
-              <th scope="row">
-                <details>
-                  <summary>{section.title}</summary>
-                  <ul>
-                    {section.lines.map((line) => (
-                      <li key={line.item}>
-                        {line.item}: {Number(line.amount.toPrecision(4))}
-                        {line.unit && ` ${line.unit}`}, {dollars(line.usd)}
-                      </li>
-                    ))}
-                  </ul>
-                </details>
-              </th>
-              <td>{dollars(section.usd)}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
+      {estimate && <Bill estimate={estimate} />}
     </>
+  );
+}
+
+function Bill({ estimate }: { readonly estimate: NonNullable<Offer["estimate"]> }): JSX.Element {
+  return (
+    <table class="cost">
+      <caption>Cost on AWS, in US dollars ({estimate.prices}; free allowances left out). On this machine it costs nothing.</caption>
+      <thead>
+        <tr>
+          <th scope="col">For</th>
+          <th scope="col">US dollars</th>
+        </tr>
+      </thead>
+      <tbody>
+        {estimate.sections.map((section) => (
+          <tr key={section.title}>
+            <th scope="row">
+              <details>
+                <summary>{section.title}</summary>
+                <ul>
+                  {section.lines.map((line) => (
+                    <li key={line.item}>
+                      {line.item}: {Number(line.amount.toPrecision(4))}
+                      {line.unit && ` ${line.unit}`}, {dollars(line.usd)}
+                    </li>
+                  ))}
+                </ul>
+              </details>
+            </th>
+            <td>{dollars(section.usd)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
   );
 }
 
@@ -288,7 +298,7 @@ function Result({ run: now, first }: { readonly run: Run; readonly first: RunFil
     resource("file", { run: now.run, output: file.ending, version: file.version });
   return (
     <figure class="gif">
-      {shown && <img src={source(shown)} alt={`The animation ${now.run}`} />}
+      {shown && <Drawn src={source(shown)} alt={`The animation ${now.run}`} />}
       <figcaption>
         {first.current ? `The finished ${first.format}` : `The previous ${first.format}; a newer one is being made`}
         <span class="buttons">
@@ -297,9 +307,11 @@ function Result({ run: now, first }: { readonly run: Run; readonly first: RunFil
               Download {file.format} ({size(file.bytes)})
             </a>
           ))}
-          <a class="button" href={resource("frames.zip", { run: now.run })} download={`${name}-frames.zip`}>
-            Download frames
-          </a>
+          {isOwner && (
+            <a class="button" href={resource("frames.zip", { run: now.run })} download={`${name}-frames.zip`}>
+              Download frames
+            </a>
+          )}
         </span>
       </figcaption>
     </figure>
@@ -317,9 +329,11 @@ function Faults({ run: now }: { readonly run: Run }): JSX.Element {
       </ul>
       {now.moreFaults > 0 && <p>and {now.moreFaults} more</p>}
       <p>
-        <button type="button" disabled={waiting.value} onClick={() => void retry(now.run)}>
-          Retry all that failed
-        </button>{" "}
+        {isOwner && (
+          <button type="button" disabled={waiting.value} onClick={() => void retry(now.run)}>
+            Retry all that failed
+          </button>
+        )}{" "}
         A script with an error fails again: fix it and submit again. Only changed scripts are rendered.
       </p>
     </section>
@@ -333,7 +347,7 @@ function FaultRow({ run, fault }: { readonly run: string; readonly fault: FaultI
       {fault.place ? `, line ${fault.place[0]}, column ${fault.place[1]}` : ""}: {fault.message}. {fault.help && <i>{fault.help}</i>}{" "}
       <span class="buttons">
         {fault.place && <Place script={fault.script} place={fault.place} />}
-        {fault.script !== undefined && (
+        {isOwner && fault.script !== undefined && (
           <button type="button" disabled={waiting.value} onClick={() => void retry(run, fault)}>
             Retry this frame
           </button>
@@ -373,7 +387,7 @@ function Cell({ run, number, frame }: { readonly run: string; readonly number: n
     <div class={`cell ${frame.state}`} data-frame={number} data-state={frame.state}>
       {frame.state === "done" ? (
         <a href={picture(run, frame)} download={`frame${number}.png`} title={`Download frame ${number}`}>
-          <img src={picture(run, frame)} alt={`Frame ${number}`} loading="lazy" />
+          <Drawn src={picture(run, frame)} alt={`Frame ${number}`} loading="lazy" />
         </a>
       ) : (
         <span class="no-picture">{frame.state === "failed" ? "failed" : "awaited"}</span>

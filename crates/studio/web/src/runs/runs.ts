@@ -3,6 +3,8 @@
 
 import { computed, signal } from "@preact/signals";
 
+import { ask, watch } from "#runs";
+
 import type { FaultInfo, FrameUpdate, RunState, RunUpdate, Summary } from "../protocol";
 import { notice, state } from "../store";
 
@@ -41,13 +43,16 @@ export interface Section {
 }
 
 export interface Offer {
+  /** Nothing where it is not known. */
   readonly estimate: {
     readonly frames: number;
     readonly size: readonly [number, number];
     readonly drawingMs: number;
     readonly prices: string;
     readonly sections: readonly Section[];
-  };
+  } | null;
+  /** Where there is no estimate. */
+  readonly frames?: number;
   readonly folder: string;
   readonly upload: number;
   readonly unchanged: number;
@@ -65,7 +70,7 @@ export const waiting = signal(false);
 /** The default name under which the project is submitted. */
 export const ownName = computed(() => (state.value?.title ?? "").replace(/\.txt$/, ""));
 
-let source: EventSource | null = null;
+let stop: (() => void) | null = null;
 
 export function address(of: View): string {
   return of.what === "run" ? `#run=${encodeURIComponent(of.run)}` : of.what === "closed" ? "#" : `#${of.what === "list" ? "runs" : "submit"}`;
@@ -102,17 +107,10 @@ export function picture(of: string, { script, version, part, pixels }: FrameUpda
 async function asked(what: string, body?: object): Promise<unknown> {
   refusal.value = null;
   waiting.value = true;
-  try {
-    const sent = body === undefined ? {} : { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
-    const answer = await fetch(what, sent);
-    const text = await answer.text();
-    if (answer.ok) return text === "" ? {} : (JSON.parse(text) as unknown);
-    refusal.value = text.startsWith("{") ? (JSON.parse(text) as Refusal) : { why: text };
-  } catch {
-    refusal.value = { why: "the studio does not answer: does it still run?" };
-  } finally {
-    waiting.value = false;
-  }
+  const { ok, text } = await ask(what, body);
+  waiting.value = false;
+  if (ok) return text === "" ? {} : (JSON.parse(text) as unknown);
+  refusal.value = text.startsWith("{") ? (JSON.parse(text) as Refusal) : { why: text };
   return null;
 }
 
@@ -147,17 +145,13 @@ function receive(update: RunUpdate): void {
 function look(): void {
   const next = viewOf(location.hash);
   view.value = next;
-  source?.close();
-  source = null;
+  stop?.();
+  stop = null;
   run.value = null;
   refusal.value = null;
   offer.value = null;
   if (next.what === "list" || next.what === "submit") void fetchList();
-  if (next.what === "run") {
-    // The browser reconnects automatically, and then receives all frames.
-    source = new EventSource(resource("events", { run: next.run }));
-    source.onmessage = (message: MessageEvent<string>) => receive(JSON.parse(message.data) as RunUpdate);
-  }
+  if (next.what === "run") stop = watch(resource("events", { run: next.run }), receive);
 }
 
 export function follow(): void {

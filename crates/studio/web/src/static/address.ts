@@ -4,6 +4,7 @@
 //   #example=NAME   a copy of an example of the site
 //   #scene=DATA     a project in the address itself (`link.ts`)
 //   #folder         the folder on the disk that was chosen last
+//   #submit, #runs, #run=NAME   the project that was opened last, and runs in the bucket (`../runs/runs.ts`)
 
 import { chosenFolder } from "./disk";
 import { unlinked } from "./link";
@@ -18,7 +19,7 @@ export function addressOf(name: string): string {
 /** Notes that a project is open: the address is its own, and it is opened next time. */
 export function opened(name: string): void {
   localStorage.setItem(LAST, name);
-  if (location.hash !== "#tour") history.replaceState(null, "", addressOf(name));
+  if (!/^#(tour$|submit$|runs$|run=)/.test(location.hash)) history.replaceState(null, "", addressOf(name));
 }
 
 /** Returns what the address names. */

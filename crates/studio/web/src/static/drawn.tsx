@@ -4,9 +4,9 @@ import type { JSX } from "preact";
 import { useEffect, useState } from "preact/hooks";
 
 import type { Drawing } from "../connection/listener";
-import { get } from "./connection";
+import { get } from "./files";
 
-export function Drawn({ src, ...of }: Drawing): JSX.Element {
+export function Drawn({ src, alt = "", ...of }: Drawing): JSX.Element {
   const [shown, setShown] = useState("");
   useEffect(() => {
     let address = "";
@@ -23,5 +23,5 @@ export function Drawn({ src, ...of }: Drawing): JSX.Element {
       URL.revokeObjectURL(address);
     };
   }, [src]);
-  return <img alt="" src={shown || undefined} {...of} />;
+  return <img alt={alt} src={shown || undefined} {...of} />;
 }

@@ -1,7 +1,7 @@
 // Files that the page hands to the user.
 
 import { notice } from "../store";
-import { get } from "./connection";
+import { get } from "./files";
 
 export function save(content: Uint8Array<ArrayBuffer>, name: string): void {
   const link = document.createElement("a");

@@ -1,0 +1,126 @@
+// The state of a run for the page, from its manifest (docs/manifest.md) and the listing of its scripts. Contains values only; the
+// program computes the same in `runs/updates.rs`.
+
+import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../../protocol";
+
+/** The most faults that are listed. */
+const FAULTS = 100;
+
+const FORMATS: Readonly<Record<string, string>> = { gif: "GIF", webp: "WebP", apng: "APNG", y4m: "Y4M" };
+
+interface Reason {
+  readonly message: string;
+  readonly diagnostics?: readonly { readonly line: number; readonly column: number; readonly message: string; readonly expected?: string; readonly help?: string }[];
+  readonly omitted?: number;
+}
+
+interface Frame {
+  readonly script: string;
+  readonly version: string;
+  readonly part?: number;
+  readonly state: "pending" | "done" | "waiting" | "failed";
+  readonly pixels?: number;
+  readonly reason?: Reason;
+}
+
+interface Made {
+  readonly generation: string;
+  readonly version: string;
+}
+
+export interface Manifest {
+  readonly status: "empty" | "waiting" | "rendering" | "failed" | "refused" | "done";
+  readonly generation: string;
+  readonly total: number;
+  readonly done: number;
+  readonly failed: number;
+  readonly settings: { readonly version?: string; readonly value?: { readonly frames?: number; readonly outputs?: readonly string[] }; readonly fault?: Reason };
+  readonly rejected?: readonly { readonly key: string; readonly problem: string }[];
+  readonly refusal?: { readonly reason?: Reason };
+  readonly excess?: Reason;
+  readonly gif?: Made;
+  readonly outputs?: Readonly<Record<string, Made>>;
+  readonly frames: readonly Frame[];
+}
+
+/** An output as the bucket has it. */
+export interface Output {
+  readonly ending: string;
+  readonly etag: string;
+  readonly size: number;
+  readonly generation: string | null;
+}
+
+/** The endings of the files that are made of an animation. */
+export const outputsOf = (manifest: Manifest): readonly string[] => manifest.settings.value?.outputs ?? ["gif"];
+
+/** Whether the manifest is about other scripts or settings than those that are there, by name. Files that scripts name are not looked at. */
+export function isBehind({ frames, settings }: Manifest, there: ReadonlyMap<string, string>): boolean {
+  const seen = new Map(frames.map(({ script, version }) => [`${script}.txt`, version.split("+")[0]]));
+  if (settings.version !== undefined) seen.set("animation.json", settings.version);
+  const own = [...there].filter(([name]) => name.endsWith(".txt") || name === "animation.json");
+  return own.length !== seen.size || own.some(([name, version]) => seen.get(name) !== version);
+}
+
+/** The state of a run; `manifest` is the text of its manifest if it cannot be read. */
+export function summary(run: string, manifest: Manifest | string | null, outputs: readonly Output[], behind: boolean): Summary {
+  if (manifest === null || typeof manifest === "string") {
+    return { run, status: manifest === null ? "new" : "unreadable", done: 0, failed: 0, total: 0, behind: false, settled: false, files: [] };
+  }
+  const isCurrent = ({ ending, etag, generation }: Output): boolean => {
+    const made = ending === "gif" ? manifest.gif : manifest.outputs?.[ending];
+    const isOther = made?.generation === manifest.generation && made.version !== etag;
+    return !behind && generation === manifest.generation && !isOther;
+  };
+  const files = outputs.map((output): RunFile => ({
+    ending: output.ending,
+    format: FORMATS[output.ending] ?? output.ending,
+    bytes: output.size,
+    version: output.etag,
+    current: manifest.status === "done" && isCurrent(output),
+  }));
+  const isComplete = outputsOf(manifest).every((ending) => files.some((file) => file.ending === ending && file.current));
+  const settled = { empty: files.length === 0, waiting: false, rendering: false, failed: true, refused: true, done: isComplete }[manifest.status];
+  const total = Math.max(manifest.total, manifest.settings.value?.frames ?? 0);
+  return { run, status: manifest.status, done: manifest.done, failed: manifest.failed, total, behind, settled: settled && !behind, files };
+}
+
+export function frameUpdate({ script, version, part, state, pixels }: Frame): FrameUpdate {
+  return { script, version, ...(part !== undefined && { part }), state: state === "waiting" ? "pending" : state, ...(pixels !== undefined && { pixels }) };
+}
+
+function faultsOf(what: string, reason: Reason | undefined, frame?: Frame): FaultInfo[] {
+  const own = frame ? { script: frame.script, ...(frame.part !== undefined && { part: frame.part }) } : {};
+  const fault = (message: string): FaultInfo => ({ what, ...own, message, help: "" });
+  if (!reason) return [fault("no reason is known yet")];
+  if (!reason.diagnostics?.length) return [fault(reason.message)];
+  const all = reason.diagnostics.map(({ line, column, message, expected, help }): FaultInfo => ({
+    ...fault(message),
+    place: [line, column],
+    help: help ?? expected ?? "",
+  }));
+  return reason.omitted ? [...all, fault(`and ${reason.omitted} more`)] : all;
+}
+
+/** The faults that keep a run from being done, and how many are not listed. */
+export function faults(run: string, manifest: Manifest): { readonly faults: readonly FaultInfo[]; readonly moreFaults: number } {
+  const all = [
+    ...(manifest.rejected ?? []).map(({ key, problem }): FaultInfo => ({ what: key, message: problem, help: "" })),
+    ...(manifest.settings.fault ? faultsOf("animation.json", manifest.settings.fault) : []),
+    ...(manifest.excess ? faultsOf(run, manifest.excess) : []),
+    ...manifest.frames
+      .filter(({ state }) => state === "failed" || state === "waiting")
+      .flatMap((frame) => faultsOf(frame.part === undefined ? `${frame.script}.txt` : `${frame.script}.txt, frame ${frame.part}`, frame.reason, frame)),
+    ...(manifest.refusal ? faultsOf(`the GIF of ${run}`, manifest.refusal.reason) : []),
+  ];
+  return { faults: all.slice(0, FAULTS), moreFaults: Math.max(0, all.length - FAULTS) };
+}
+
+/** The key of a drawn frame, below the folder of frames of its animation. */
+export function frameFile(script: string, version: string, pixels: string, part: string | null): string {
+  const escaped = Array.from(new TextEncoder().encode(version), (byte) => {
+    const sign = String.fromCharCode(byte);
+    return /[\w-]/.test(sign) ? sign : `~${byte.toString(16).padStart(2, "0")}`;
+  });
+  return `${script}@${escaped.join("")}-p${pixels}${part === null ? "" : `/${part}`}.png`;
+}

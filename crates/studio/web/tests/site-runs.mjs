@@ -1,0 +1,226 @@
+// The page without a program, served by `rayfold dev --site` beside its bucket: a person submits and sees runs, with the rights
+// that people have in a stack. `node --test`, with RAYFOLD (the program), CHROMIUM and SITE (the folder); RAYFOLD_FUNCTIONS where
+// the functions are not beside the program.
+
+import assert from "node:assert/strict";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { chromium } from "playwright-core";
+
+import { expected, film, linked } from "./host.mjs";
+import { start } from "./processes.mjs";
+
+/** Longer than a bucket takes on a loaded machine, in milliseconds. */
+const PATIENCE = 600_000;
+
+const { CHROMIUM: executablePath, RAYFOLD: program, SITE: site } = process.env;
+
+async function freePort() {
+  const server = createServer();
+  await new Promise((done) => server.listen(0, "127.0.0.1", done));
+  const { port } = server.address();
+  await new Promise((done) => server.close(done));
+  return port;
+}
+
+let browser, dev, data, address;
+before(async () => {
+  // A page that the test has changed counts as one from afar, which Chromium keeps from this machine's ports.
+  browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-features=LocalNetworkAccessChecks"] });
+  data = mkdtempSync(join(tmpdir(), "rayfold-dev-"));
+  address = `127.0.0.1:${await freePort()}`;
+  dev = start(program, ["dev", "--data", data, "--address", "127.0.0.1:0", "--site", site, "--site-address", address]);
+  await dev.said((text) => text.includes("aws s3 sync"));
+});
+after(async () => {
+  await browser?.close();
+  dev?.server.kill("SIGINT");
+  await dev?.ended;
+  rmSync(data, { recursive: true, force: true });
+});
+
+async function open(t, files) {
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, acceptDownloads: true });
+  t.after(() => context.close());
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  const faults = [];
+  page.on("pageerror", (error) => faults.push(String(error)));
+  await page.goto(`http://${address}/studio.html${linked("film", files)}`);
+  await page.waitForFunction(() => document.querySelector("canvas")?.dataset.final === "true");
+  return { page, faults };
+}
+
+/** Opens a link of the page by its fragment, as its menu does. */
+const show = (page, hash) => page.evaluate((hash) => (location.hash = hash), hash);
+
+async function submit(page, name) {
+  await show(page, "#submit");
+  await page.getByLabel("Name of the run").fill(name);
+  await page.getByRole("button", { name: "Compare with the bucket" }).click();
+  await page.getByText(/to upload/).waitFor();
+  await page.getByRole("button", { name: "Submit", exact: true }).click();
+  await page.waitForURL((url) => url.hash === `#run=${encodeURIComponent(name)}`);
+}
+
+const becomes = (page, status) =>
+  page.locator(`.standing [role=status][data-status=${status}][data-settled=true]`).waitFor({ timeout: PATIENCE });
+
+async function gif(page) {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: /Download GIF/ }).click()]);
+  return readFileSync(await download.path());
+}
+
+test("a person submits, sees the frames and the GIF of the command, and finds the run again", async (t) => {
+  const { page, faults } = await open(t, [["film.txt", film]]);
+  await page.getByRole("button", { name: "More output" }).click();
+  await page.locator("#more-output").getByRole("link", { name: "Submit", exact: true }).waitFor();
+  await page.keyboard.press("Escape");
+  await submit(page, "films/first");
+  await becomes(page, "done");
+  assert.equal(await page.locator(".cell[data-state=done]").count(), 6);
+  await page.waitForFunction(() => document.querySelector(".cell img")?.naturalWidth === 160);
+  await page.waitForFunction(() => document.querySelector("figure.gif img")?.naturalWidth === 160);
+  assert.ok((await gif(page)).equals(expected(t, [["film.txt", film]])), "the same bytes");
+
+  await page.reload();
+  await becomes(page, "done");
+  await show(page, "#runs");
+  await page.getByRole("link", { name: "films/first" }).waitFor();
+  await page.getByText(/done: 6 of 6 frames/).waitFor();
+  assert.deepEqual(faults, []);
+});
+
+test("what is submitted again is compared, and scripts that the page lacks are deleted only if the person agrees", async (t) => {
+  const script = (at) => film.replace("Frames 6", "Frames 2").replace("Sphere 1 ", `Sphere 1.${at} `);
+  const { page } = await open(t, [["a.txt", script(1)], ["b.txt", script(2)]]);
+  await submit(page, "second");
+  await becomes(page, "done");
+  const other = await open(t, [["a.txt", script(1)]]);
+  await show(other.page, "#submit");
+  await other.page.getByLabel("Name of the run").fill("second");
+  await other.page.getByRole("button", { name: "Compare with the bucket" }).click();
+  await other.page.getByText(/1 file to upload, 1 there already/).waitFor();
+  const send = other.page.getByRole("button", { name: "Submit", exact: true });
+  assert.ok(await send.isDisabled());
+  await other.page.getByRole("checkbox", { name: /Delete a script of the bucket/ }).check();
+  await send.click();
+  await becomes(other.page, "done");
+  await other.page.getByText(/done: 2 of 2 frames/).waitFor();
+});
+
+test("a script with an error is not sent, and a name that leads elsewhere is refused", async (t) => {
+  const { page } = await open(t, [["film.txt", film]]);
+  for (const name of ["../others", "a//b", "."]) {
+    await show(page, "#submit");
+    await page.getByLabel("Name of the run").fill(name);
+    await page.getByRole("button", { name: "Compare with the bucket" }).click();
+    await page.getByRole("alert").getByText(/is no name of a run/).waitFor();
+    await show(page, "");
+  }
+  const faulty = await open(t, [["film.txt", film], ["wrong.txt", film.replace("Sphere", "Spere")]]);
+  await show(faulty.page, "#submit");
+  await faulty.page.getByRole("button", { name: "Compare with the bucket" }).click();
+  await faulty.page.getByRole("alert").getByText(/wrong.txt has an error/).waitFor();
+});
+
+test("the credentials of the page end at the person's folder", async (t) => {
+  const { page } = await open(t, [["film.txt", film]]);
+  const { endpoint } = await page.evaluate(() => fetch("rayfold.json").then((answer) => answer.json()));
+  const given = await page.evaluate(() => fetch("/credentials", { method: "POST" }).then((answer) => answer.json()));
+  const { createServer: vite } = await import("vite");
+  const server = await vite({ root: join(import.meta.dirname, ".."), configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
+  t.after(() => server.close());
+  const { signed, encoded } = await server.ssrLoadModule("/src/static/stack/sign.ts");
+  const status = async (method, key, query = "") => {
+    const url = new URL(`${endpoint}/${key.split("/").map(encoded).join("/")}${query}`);
+    const body = method === "PUT" ? { body: new Uint8Array([1]) } : {};
+    return (await fetch(url, { method, headers: await signed({ method, url, ...body }, given, "us-east-1"), ...body })).status;
+  };
+  const list = (prefix) => status("GET", "", `?list-type=2&prefix=${encoded(prefix)}`);
+  assert.equal(await list(`scripts/${given.identity}/`), 200);
+  assert.equal(await status("PUT", `scripts/${given.identity}/mine/1.txt`), 200);
+  assert.equal(await status("DELETE", `scripts/${given.identity}/mine/1.txt`), 204);
+  for (const prefix of ["", "scripts/", `scripts/${given.identity}`, "scripts/local:1/", `frames/${given.identity}/`]) assert.equal(await list(prefix), 403, prefix);
+  for (const key of ["scripts/a/1.txt", "scripts/local:1/a/1.txt", "manifests/a.json", `manifests/${given.identity}.json`, `parts/${given.identity}/a`]) {
+    for (const method of ["GET", "HEAD", "PUT", "DELETE"]) assert.equal(await status(method, key), 403, `${method} ${key}`);
+  }
+});
+
+// Cognito's part is played here: its pages and answers are as its documentation describes them, and nobody asked Cognito.
+test("a person signs in on another page, comes back, and submits with the credentials of the identity", async (t) => {
+  const LOGIN = "https://demo.auth.eu-central-1.amazoncognito.com";
+  const IDENTITY = "https://cognito-identity.eu-central-1.amazonaws.com/";
+  const signIn = { region: "eu-central-1", identityPoolId: "eu-central-1:pool", userPoolId: "eu-central-1_Pool", clientId: "client", loginUrl: LOGIN };
+  const own = `http://${address}`;
+  const { credentials: _, ...config } = await (await fetch(`${own}/rayfold.json`)).json();
+  const given = await (await fetch(`${own}/credentials`, { method: "POST", headers: { origin: own } })).json();
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, serviceWorkers: "block" });
+  t.after(() => context.close());
+  const asked = [];
+  const json = (route, value) => route.fulfill({ json: value, headers: { "access-control-allow-origin": own } });
+  await context.route("**/rayfold.json", (route) => route.fulfill({ json: { ...config, signIn } }));
+  // As Terraform writes it.
+  await context.route("**/studio.html*", async (route) => {
+    const answer = await route.fetch();
+    const policy = (text) => text.replace("connect-src 'self'", `connect-src 'self' ${IDENTITY.slice(0, -1)} ${LOGIN}`);
+    const headers = answer.headers();
+    await route.fulfill({ body: policy(await answer.text()), headers: { ...headers, "content-security-policy": policy(headers["content-security-policy"]) } });
+  });
+  let challenge = "";
+  let state = "right";
+  await context.route(`${LOGIN}/oauth2/authorize?*`, (route) => {
+    const query = new URL(route.request().url()).searchParams;
+    assert.deepEqual([query.get("response_type"), query.get("client_id"), query.get("code_challenge_method")], ["code", "client", "S256"]);
+    challenge = query.get("code_challenge");
+    const back = new URL(query.get("redirect_uri"));
+    back.search = new URLSearchParams({ code: "code", state: state === "right" ? query.get("state") : "another" });
+    asked.push("password");
+    return route.fulfill({ contentType: "text/html", body: `<a href="${back.href.replace("&", "&amp;")}">Sign in</a>` });
+  });
+  await context.route(`${LOGIN}/oauth2/token`, async (route) => {
+    const query = new URLSearchParams(route.request().postData());
+    const digest = Buffer.from(await crypto.subtle.digest("SHA-256", Buffer.from(query.get("code_verifier"))));
+    assert.equal(digest.toString("base64url"), challenge, "the page that asked is the one that redeems");
+    asked.push("token");
+    const claims = Buffer.from(JSON.stringify({ exp: Date.now() / 1000 + 3600 })).toString("base64url");
+    return json(route, { id_token: `e30.${claims}.signature` });
+  });
+  await context.route(IDENTITY, (route) => {
+    const what = route.request().headers()["x-amz-target"].split(".")[1];
+    const body = route.request().postDataJSON();
+    assert.deepEqual(Object.keys(body.Logins), ["cognito-idp.eu-central-1.amazonaws.com/eu-central-1_Pool"]);
+    asked.push(what);
+    if (what === "GetId") return json(route, { IdentityId: given.identity });
+    return json(route, { IdentityId: given.identity, Credentials: { AccessKeyId: given.accessKey, SecretKey: given.secretKey, SessionToken: given.sessionToken } });
+  });
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  const blocked = [];
+  page.on("console", (message) => /Content Security Policy/.test(message.text()) && blocked.push(message.text()));
+  const drawn = () => page.waitForFunction(() => document.querySelector("canvas")?.dataset.final === "true");
+  await page.goto(`${own}/studio.html${linked("film", [["film.txt", film]])}`);
+  await drawn();
+  assert.deepEqual(asked, [], "nobody is asked before there is a need");
+  // An answer to another question than the page's is not used, and the browser is not sent away again by itself.
+  state = "wrong";
+  await show(page, "#submit");
+  await page.getByRole("link", { name: "Sign in" }).click();
+  await page.getByRole("alert").getByText(/nobody was signed in/).waitFor();
+  assert.deepEqual(asked, ["password"]);
+  state = "right";
+  await show(page, "#runs");
+  await page.getByRole("link", { name: "Sign in" }).click();
+  await page.getByRole("heading", { name: "Runs in rayfold" }).waitFor();
+  await drawn();
+  await submit(page, "signed");
+  await becomes(page, "done");
+  assert.equal(asked.filter((what) => what === "token").length, 1);
+  assert.deepEqual(asked.slice(-3), ["token", "GetId", "GetCredentialsForIdentity"]);
+  assert.equal(new URL(page.url()).search, "", "the code is gone from the address");
+  assert.deepEqual(blocked, []);
+});

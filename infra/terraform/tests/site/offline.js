@@ -1,0 +1,1 @@
+const VERSION = "rayfold-0123456789abcdef";
