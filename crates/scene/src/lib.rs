@@ -43,7 +43,7 @@ pub use form::{
 };
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;
-pub use model::shapes::*;
+pub use model::shapes::{Instance, Mesh, Motion, Object, Outline, Placement, Source};
 pub use model::{
     Axes, Background, Camera, Clause, Coefficients, Depth, DirectionalLight, Finish, Fog, Glass, Image,
     ImageMap, Indirect, InvalidValue, Lamp, Lens, Light, Look, Material, Parameter, Pattern, PictureFile,
@@ -56,6 +56,14 @@ pub use rayfold_assets as assets;
 pub use script::{Origin, Script, ShotSummary};
 pub use settings::{AnimationSettings, ParsedSettings, SETTINGS_FIELDS, fraction, parse_settings};
 pub use shared_slice::SharedSlice;
+
+/// Exports the shapes.
+macro_rules! export {
+    (shapes { $($module:ident::$Shape:ident: $summary:literal;)* }) => {
+        $(pub use model::shapes::$Shape;)*
+    };
+}
+model::with_shapes! { export! {} }
 
 /// The example of the README is compiled and run with the tests.
 #[cfg(doctest)]
