@@ -213,7 +213,10 @@ fn each_pass_is_a_picture_and_the_last_is_the_one_that_is_drawn() {
         let options = RenderOptions::default();
         Drawing::exposed(exposure, &options)
             .unwrap()
-            .draw_progressively(|image| Ok(passes.push(image()?.into_rgb8())))
+            .draw_progressively(|image| {
+                passes.push(image()?.into_rgb8());
+                Ok(())
+            })
             .unwrap()
             .into_rgb8()
     });

@@ -73,7 +73,12 @@ mod tests {
         let options = RenderOptions { progress: Some(&progress), ..Default::default() };
         let drawing = Drawing::new(&scene, &options).unwrap();
         let mut seen = vec![];
-        let image = drawing.draw_progressively(|_| Ok(seen.push(progress.get()))).unwrap();
+        let image = drawing
+            .draw_progressively(|_| {
+                seen.push(progress.get());
+                Ok(())
+            })
+            .unwrap();
         assert_eq!(seen[0].0, PIXELS, "the first pass is a sample of each pixel");
         assert!(seen.len() > 3 && seen.is_sorted_by(|(before, _), (done, _)| before < done), "{seen:?}");
         assert!(seen.iter().all(|(done, total)| done <= total && *total <= 1024 * PIXELS), "{seen:?}");
