@@ -144,7 +144,7 @@ test("every clause of a material is switched on and off, and a sphere shows it",
     }
   }
   // The last clause stays.
-  await switches.filter({ hasText: "colour" }).click();
+  await page.getByRole("group", { name: "Clauses" }).getByRole("button", { name: "colour", exact: true }).click();
   await page.getByText("needs one clause").waitFor();
   studio.check();
 });
