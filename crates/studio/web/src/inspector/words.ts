@@ -1,7 +1,7 @@
 // Parameters in people's words. One that is not here has the name of the language.
 
 const WORDS: Readonly<Record<string, string>> = {
-  "ambient coefficient": "colour in shadow",
+  "ambient coefficient": "shadow colour",
   "diffuse coefficient": "colour",
   "mirror coefficient": "mirror",
   "glass coefficient": "clearness",
@@ -69,7 +69,7 @@ const NAMES: Readonly<Record<string, string>> = {
   Camera: "through a window",
   Look: "looks at a target",
   Orthocamera: "parallel",
-  ambient: "colour in shadow",
+  ambient: "shadow colour",
   diffuse: "colour",
   shine: "highlight",
 };
