@@ -389,7 +389,7 @@ mod tests {
         assert!(drawn(&painter, &pictures, pinhole(1, ball)).len() > 2, "its time is not known at first");
         let again = drawn(&painter, &pictures, pinhole(2, &ball.replace("0.7", "0.6")));
         assert!(again.iter().all(|picture| size(picture) == [96, 64]), "no sketch");
-        assert!(again.len() < 6, "{} passes were sent", again.len());
+        assert!(again.len() < 10, "{} passes were sent", again.len());
         painter.close();
     }
 
