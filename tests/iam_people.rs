@@ -45,7 +45,7 @@ const KEYS: [(&str, [bool; 3]); 12] = [
     ("checkpoints/{}/hello.state", [false, false, false]),
 ];
 
-/// What belongs to nobody who signs in: animations of the stack's own people, and what is beside the folders.
+/// Objects that belong to nobody who signs in: animations of the stack's own people, and what is beside the folders.
 const KEYS_OF_NOBODY: [&str; 5] = [
     "scripts/hello/1.txt",
     "manifests/hello.json",

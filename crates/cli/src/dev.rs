@@ -126,7 +126,7 @@ pub(crate) struct Args {
     /// Serve the studio's static page from this folder, which `cargo xtask site` has built; it submits to the bucket
     #[arg(long, value_name = "DIR", conflicts_with_all = ["folder", "endpoint"])]
     site: Option<PathBuf>,
-    /// Where the page of --site listens; port 0 stands for any
+    /// Serve the page of --site at this address; port 0 stands for any
     #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:0", requires = "site")]
     site_address: SocketAddr,
 }

@@ -46,14 +46,14 @@ pub enum Error {
     /// The store gave no temporary credentials.
     #[error("the store gives no temporary credentials: {reason}")]
     NoSession {
-        /// What it said.
+        /// The store's answer.
         reason: String,
     },
     /// The folder has no page.
     #[error("{} is not the studio's static page: `cargo xtask site` builds it ({reason})", folder.display())]
     NoPage {
         folder: PathBuf,
-        /// What is missing.
+        /// The missing part.
         reason: String,
     },
     /// The built-in store did not start.

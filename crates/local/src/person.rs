@@ -4,7 +4,7 @@ use rayfold_pipeline::store::Connection;
 
 use crate::error::{Error, Result};
 
-/// What a person may do, as Terraform reads it.
+/// The rights of a person, as Terraform reads them.
 const RIGHTS: &str = include_str!("../../../infra/terraform/policies/person.json.tftpl");
 
 /// The seconds for which the credentials are of use, as on AWS.

@@ -26,7 +26,7 @@ const PERSON: &str = "local:00000000-0000-0000-0000-000000000000";
 const PAGE: &str = "studio.html";
 const CONFIG: &str = "rayfold.json";
 
-/// Where the page asks for credentials.
+/// The path at which the page asks for credentials.
 const CREDENTIALS: &str = "/credentials";
 
 /// The start of the page's content policy, and the part that names whom the page may talk to.
@@ -102,7 +102,7 @@ impl Site {
     }
 }
 
-/// What the server answers from.
+/// The files and the settings that the server answers with.
 struct Desk {
     folder: PathBuf,
     /// The content of `rayfold.json`.

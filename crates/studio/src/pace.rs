@@ -17,7 +17,7 @@ pub(crate) const REST: Duration = Duration::from_millis(80);
 /// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
 pub(crate) const PATIENCE: f64 = 0.1;
 
-/// The shortest time between two pictures of one that gets finer. Each takes time to be made and shown.
+/// The shortest time between two views of an unfinished picture. Each takes time to be made and shown.
 pub(crate) const APART: Duration = Duration::from_millis(200);
 
 /// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.

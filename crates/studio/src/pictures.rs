@@ -3,8 +3,9 @@
 //! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request of another
 //! picture. While something moves, a rendering is completed, in a smaller size if it would take too long ([`Pace`]), so
 //! that there is always a picture. It then has one ray per pixel, or a few where light goes round, whatever the script
-//! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few pixels with as few rays, then more. A picture with several rays
-//! per pixel is shown after each pass over it. What moved is at rest soon after the last request, even while it is held.
+//! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few
+//! pixels with as few rays, then more. A picture with several rays per pixel is shown after its passes, at most five times a
+//! second ([`APART`]). What moved is at rest soon after the last request, even while it is held.
 //! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
 //! waits behind another is outdated when it is shown.
 

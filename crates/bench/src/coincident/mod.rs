@@ -2,9 +2,9 @@
 //! script.
 //!
 //! Each random script has two solids that share a surface: faces, caps, discs, planes, triangles, the sides of
-//! cylinders and cones, spheres, tori, capsules and boxes with round edges. They are axis-aligned or rotated, near and far, given by their numbers or in
-//! groups, opaque or of glass. They are seen directly, in mirrors and through panes, with light and shadows. The
-//! comparison needs no tracer that handles coincidence: the picture must equal that of a script in which the winning
+//! cylinders and cones, spheres, tori, capsules and boxes with round edges. They are axis-aligned or rotated, near and
+//! far, given by their numbers or in groups, opaque or of glass. They are seen directly, in mirrors and through panes,
+//! with light and shadows. The comparison needs no tracer that handles coincidence: the picture must equal that of a script in which the winning
 //! solid is thicker by a millionth, so that nothing coincides. Only pixels away from all outlines are compared, that
 //! is, those whose neighbours have the same colour in the second picture.
 

@@ -48,8 +48,8 @@ impl Solid {
         line
     }
 
-    /// Returns the solid rotated and then moved. Returns `None` for a box of either kind, which is axis-aligned, unless the rotation
-    /// is the identity.
+    /// Returns the solid rotated and then moved. Returns `None` for a box of either kind, which is axis-aligned, unless
+    /// the rotation is the identity.
     pub(super) fn placed(&self, turn: DMat3, shift: DVec3) -> Option<Self> {
         let place = |point: &DVec3| shift + turn * *point;
         Some(match self {

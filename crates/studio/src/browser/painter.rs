@@ -13,7 +13,9 @@ use rayfold_scene::Screen;
 
 use super::drawer::{Rows, Sketch};
 use crate::clock::Instant;
-use crate::pace::{Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller};
+use crate::pace::{
+    APART, Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller,
+};
 use crate::packing::{Packer, Picture, Quality};
 use crate::wanted::Wanted;
 
@@ -22,9 +24,6 @@ const PIECE: f64 = 0.1;
 
 /// The rows of a tile of the tracer.
 const TILE: u32 = 16;
-
-/// The pause between two views of an unfinished picture.
-const GLIMPSE: Duration = Duration::from_millis(250);
 
 #[derive(Debug)]
 pub(super) struct Painter {
@@ -151,7 +150,7 @@ impl Painter {
             if let Some(drawing) = self.drawing.take() {
                 self.complete(drawing, send);
             }
-        } else if drawing.effort.is_none() && drawing.seen.elapsed() > GLIMPSE {
+        } else if drawing.effort.is_none() && drawing.seen.elapsed() > APART {
             let (number, image, took) =
                 (drawing.wanted.number, drawing.image.clone(), drawing.asked.elapsed());
             drawing.seen = Instant::now();

@@ -1,4 +1,4 @@
-//! Which rays of pixels, or those that go on from them, come near some boxes, whatever they hit.
+//! Finds the pixels whose rays, or the rays that go on from them, come near some boxes, whatever they hit.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;

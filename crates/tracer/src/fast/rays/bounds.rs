@@ -60,29 +60,22 @@ impl<S: Simd, E: Real> Crossing<S, E> {
         wider: Lanes<S, E>,
     ) -> Mask<S, E> {
         let (low, high) = (Vec3::<S, E>::splat(simd, low), Vec3::<S, E>::splat(simd, high));
-        let (inverse, shift) = (self.inverse, self.shift);
-        let (ax, bx) = (
-            (low.x - wider).fused_mul_add(inverse.x, shift.x),
-            (high.x + wider).fused_mul_add(inverse.x, shift.x),
-        );
-        let (ay, by) = (
-            (low.y - wider).fused_mul_add(inverse.y, shift.y),
-            (high.y + wider).fused_mul_add(inverse.y, shift.y),
-        );
-        let (az, bz) = (
-            (low.z - wider).fused_mul_add(inverse.z, shift.z),
-            (high.z + wider).fused_mul_add(inverse.z, shift.z),
-        );
-        let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz)).max(constant::<S, E>(simd, 0.0));
-        let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz));
-        enter.simd_le(leave * constant::<S, E>(simd, 1.0 + LATE_IN_TREE * E::ROUNDOFF))
+        let low = Vec3::<S, E>::new(low.x - wider, low.y - wider, low.z - wider);
+        let high = Vec3::<S, E>::new(high.x + wider, high.y + wider, high.z + wider);
+        let (enter, leave) = self.between(simd, low, high);
+        enter.simd_le(leave)
     }
 
     /// Returns the distances at which the rays enter a [padded] box and the largest at which they can leave it. The
     /// interval of a box contains that of each box within it, because rounding is monotonic.
     #[inline(always)]
     pub(crate) fn span(&self, simd: S, low: [E; 3], high: [E; 3]) -> (Lanes<S, E>, Lanes<S, E>) {
-        let (low, high) = (Vec3::splat(simd, low), Vec3::splat(simd, high));
+        self.between(simd, Vec3::splat(simd, low), Vec3::splat(simd, high))
+    }
+
+    /// Returns [`Self::span`] where each ray has a box of its own.
+    #[inline(always)]
+    fn between(&self, simd: S, low: Vec3<S, E>, high: Vec3<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
         let (inverse, shift) = (self.inverse, self.shift);
         let (ax, bx) = (low.x.fused_mul_add(inverse.x, shift.x), high.x.fused_mul_add(inverse.x, shift.x));
         let (ay, by) = (low.y.fused_mul_add(inverse.y, shift.y), high.y.fused_mul_add(inverse.y, shift.y));

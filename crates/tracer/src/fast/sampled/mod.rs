@@ -64,7 +64,7 @@ struct Moment<E> {
     bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
-    /// What is watched in the first look.
+    /// The boxes that are watched in the first look.
     watch: Option<Watch<E>>,
 }
 

@@ -123,8 +123,8 @@ impl<'a> Scouts<'a> {
         (!joined.is_empty()).then_some(joined)
     }
 
-    /// Which pixels of some rows get how many samples in any case; none if there are no such pixels. Only `some`
-    /// can be, if they are known.
+    /// Finds the pixels of some rows that get a number of samples in any case, and that number; none if there are no such
+    /// pixels. If `some` are given, only they can be such pixels.
     pub(super) fn floors(
         &self,
         rows: Range<u32>,

@@ -90,7 +90,7 @@ pub(super) struct Workspace<'a, E> {
     coordinates: [[f64; ROOM]; 3],
     /// What the rays from the camera meet.
     objects: [u32; ROOM],
-    /// Which of them came near what is watched, or rays that go on from them.
+    /// Whether each of them, or a ray that goes on from it, came near a watched box.
     is_near: [bool; ROOM],
 }
 
@@ -125,7 +125,7 @@ pub(super) struct Drawn<'a, 'b> {
     pub(super) cover: Option<CoverTile<'a, 'b>>,
     /// The state of the pixels of its row of tiles.
     pub(super) judged: &'a mut Judged<'b>,
-    /// Those of its row of tiles whose rays come near what is watched.
+    /// The pixels of its row of tiles whose rays come near a watched box.
     pub(super) near: Option<&'a mut BitRows<'b>>,
 }
 

@@ -114,7 +114,7 @@ impl Shape {
                 Some(placed) if !placed.is_lost(center * scale) => {
                     Some(placed.on_the_side_of(instance, center, scale))
                 }
-                _ => Self::at_the_eye(instance, center, scale),
+                placed => Self::at_the_eye(instance, center, scale).or(placed),
             },
             _ => None,
         }

@@ -172,7 +172,7 @@ impl FirstRows<'_> {
         self.objects[place] = object as u16;
     }
 
-    /// The same for pixels side by side.
+    /// Puts the first samples of pixels that lie side by side.
     #[inline(always)]
     pub(crate) fn put_run(&mut self, place: usize, colors: [&[u32]; CHANNELS], objects: &[u32]) {
         let put = |plane: &mut [u16], of: &[u32]| {

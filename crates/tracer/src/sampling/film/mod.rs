@@ -55,7 +55,7 @@ pub(crate) struct Film {
     /// The cover, in scenes without background.
     cover: Option<Layer>,
     plan: Plan,
-    /// What the first look notes, if it is to note something.
+    /// The pixels that the first look has found near something, if it is to note them.
     near: Option<Bits>,
 }
 
@@ -69,7 +69,7 @@ pub(crate) struct Band<'a> {
     pub(crate) cover: Option<CoverRows<'a>>,
     /// The state of its pixels, noted when samples are added.
     pub(crate) judged: Judged<'a>,
-    /// Those of its pixels that are near something.
+    /// The pixels of the band that are near something.
     pub(crate) near: Option<BitRows<'a>>,
 }
 
