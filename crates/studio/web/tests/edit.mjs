@@ -195,6 +195,7 @@ test("a material and a group are renamed wherever they are named", async (t) => 
   const text = `${HEAD}Material gold diffuse .5 .4 .1\nGroup pair\nSphere .5 0 0 0 gold\nEnd\nUse pair 1 0 0\nSphere 1 -1 0 0 gold\nTrace\n`;
   const studio = await open(t, { text });
   const { page } = studio;
+  await studio.settled();
   for (const [selector, old, name] of [[".item.material", "gold", "brass"], [".item.group", "pair", "couple"]]) {
     await clickRow(page, selector, { hasText: old });
     await page.getByRole("listbox").focus();
