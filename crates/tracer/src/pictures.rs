@@ -33,15 +33,46 @@ impl Panorama {
 
     /// Returns the light that comes from where a ray with this unit direction goes.
     pub(crate) fn along(&self, direction: DVec3) -> DVec3 {
-        let (sine, cosine) = self.turn;
-        let DVec3 { x, y, z } = direction;
-        let (x, z) = (x * cosine - z * sine, x * sine + z * cosine);
+        let DVec3 { x, y, z } = self.turned(direction);
         let u = 0.5 + libm::atan2(x, -z) / TAU;
         let v = libm::atan2(libm::hypot(x, z), y) / PI;
+        self.strength * self.level([u, v])
+    }
+
+    /// Returns the level at a place on the picture, without the factor of the sky.
+    pub(crate) fn level(&self, place: [f64; 2]) -> DVec3 {
+        mean(&self.picture, place, false, |column, row| self.picture.level(column, row, self.is_linear))
+    }
+
+    /// Returns the direction of a place on the picture, in the picture's axes.
+    pub(crate) fn direction([u, v]: [f64; 2]) -> DVec3 {
+        let (around, down) = ((u - 0.5) * TAU, v * PI);
+        let across = libm::sin(down);
+        DVec3::new(across * libm::sin(around), libm::cos(down), -across * libm::cos(around))
+    }
+
+    /// Returns a direction of the scene in the picture's axes.
+    pub(crate) fn turned(&self, direction: DVec3) -> DVec3 {
+        let (sine, cosine) = self.turn;
+        let DVec3 { x, y, z } = direction;
+        DVec3::new(x * cosine - z * sine, y, x * sine + z * cosine)
+    }
+
+    /// Returns a direction in the picture's axes as one of the scene.
+    pub(crate) fn turned_back(&self, direction: DVec3) -> DVec3 {
+        let (sine, cosine) = self.turn;
+        let DVec3 { x, y, z } = direction;
+        DVec3::new(x * cosine + z * sine, y, z * cosine - x * sine)
+    }
+
+    /// Returns the picture, and whether its levels are decoded to linear light.
+    pub(crate) fn picture(&self) -> (&Arc<Picture>, bool) {
+        (&self.picture, self.is_linear)
+    }
+
+    /// Returns the factor of the picture's light.
+    pub(crate) fn strength(&self) -> f64 {
         self.strength
-            * mean(&self.picture, [u, v], false, |column, row| {
-                self.picture.level(column, row, self.is_linear)
-            })
     }
 }
 

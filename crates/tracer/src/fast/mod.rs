@@ -46,6 +46,8 @@ use crate::fast::shapes::shape::Robust;
 use crate::meshes::Shared;
 use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::parts;
+use crate::reference::windows;
+use crate::sampling::guide::Guide;
 use crate::sampling::rough::Energies;
 use crate::{Exposure, Precision, RenderError, RenderOptions};
 
@@ -329,6 +331,11 @@ fn sampled_backend<'a>(
         return Ok(None);
     }
     let moments = exposure.moments();
+    let guides = if parts::BUILT.paths {
+        Guide::of(&moments, windows(&moments[0]))
+    } else {
+        vec![None; moments.len()]
+    };
     let (moments, faces): (Vec<Scene>, Vec<_>) = moments
         .iter()
         .map(|moment| {
@@ -337,9 +344,9 @@ fn sampled_backend<'a>(
         })
         .unzip();
     let energies = if parts::BUILT.paths { Energies::of(&moments) } else { Energies::default() };
-    let geometries = moments.iter().zip(&faces).map(|(moment, faces)| {
+    let geometries = moments.iter().zip(&faces).zip(guides).map(|((moment, faces), guide)| {
         let geometry = Geometry::with_faces(moment, faces.as_ref(), options.tree);
-        geometry.map(|geometry| geometry.with_energies(&energies))
+        geometry.map(|geometry| geometry.with_paths(&energies, guide))
     });
     let Ok(geometries) = geometries.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let precisions = geometries.iter().zip(&moments);

@@ -25,6 +25,7 @@ mod shading;
 mod shapes;
 mod tone;
 mod whole;
+mod windows;
 mod world;
 
 use core::ops::Range;
@@ -47,6 +48,7 @@ pub(crate) use shapes::{
     Place, has_inside, is_flat_at, normal_and_width, power, triangle_normal, turns_axes_to_axes,
 };
 pub(crate) use tone::{encoded, levels};
+pub(crate) use windows::windows;
 
 use crate::camera::Ray;
 use crate::meshes::{Colors, Expanded, Faces, Shared, expanded, mesh};

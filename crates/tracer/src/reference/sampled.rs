@@ -11,11 +11,13 @@ use rayon::prelude::*;
 
 use super::shading::{PathNumbers, Seen, Shader};
 use super::tone;
+use super::windows::windows;
 use super::world::World;
 use crate::camera::Ray;
 use crate::cover::Lit;
 use crate::meshes::{Expanded, Shared};
 use crate::parallel::{CHANNELS, bands, bands_of};
+use crate::sampling::guide::Guide;
 use crate::sampling::paths::{Way, choice, choice_dimension, direction_dimension};
 use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
 use crate::sampling::rough::Energies;
@@ -26,6 +28,7 @@ use crate::{Exposure, RenderError, RenderOptions};
 struct Moment<'a> {
     world: World<'a>,
     energies: Energies,
+    guide: Option<Guide>,
     dimensions: &'a Dimensions,
     bounces: u32,
 }
@@ -122,12 +125,13 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
     let scenes = exposure.moments();
     let dimensions = Dimensions::new(&scenes);
     let energies = Energies::of(&scenes);
+    let guides = Guide::of(&scenes, windows(&scenes[0]));
     let bounces = options.bounces(scene);
     let scenes: Vec<Expanded> =
         scenes.iter().map(|scene| Expanded::new(Cow::Borrowed(scene), Shared::NONE)).collect();
-    let moments = scenes.iter().map(|scene| {
+    let moments = scenes.iter().zip(guides).map(|(scene, guide)| {
         let energies = energies.clone();
-        Moment { world: World::of(scene), energies, dimensions: &dimensions, bounces }
+        Moment { world: World::of(scene), energies, guide, dimensions: &dimensions, bounces }
     });
     let moments: Vec<Moment> = moments.collect();
     let middles = moments[0].world.middles();
@@ -181,8 +185,8 @@ impl Moment<'_> {
             (number(first), number(first + 1))
         };
         let goes_round = scene.goes_round();
-        let paths =
-            goes_round.then_some(PathNumbers { direction: &direction, choice, energies: &self.energies });
+        let (energies, guide) = (&self.energies, self.guide.as_ref());
+        let paths = goes_round.then_some(PathNumbers { direction: &direction, choice, energies, guide });
         let seen = Shader { world: &self.world, lights: &lights, cancel: options.cancel, paths }
             .seen(ray, self.bounces);
         if goes_round { seen } else { clamped(seen) }
@@ -257,8 +261,10 @@ pub fn estimate(exposure: Exposure, samples: u32, seed: u64) -> Estimate {
         let time = independent(seed, u64::MAX, first.into(), 0);
         let at = exposure.at(time);
         let energies = Energies::of(core::slice::from_ref(&at));
+        let guide = Guide::of(core::slice::from_ref(&at), windows(&at)).pop().flatten();
         let of_moment = Expanded::new(Cow::Owned(at), Shared::NONE);
-        let moment = Moment { world: World::of(&of_moment), energies, dimensions: &dimensions, bounces };
+        let moment =
+            Moment { world: World::of(&of_moment), energies, guide, dimensions: &dimensions, bounces };
         sums.par_iter_mut().enumerate().for_each(|(place, sum)| {
             let place = place as u64;
             let pixel = ((place % u64::from(width)) as u32, (place / u64::from(width)) as u32);

@@ -13,6 +13,7 @@ use super::shapes::Surface;
 use super::world::{World, glass};
 use crate::camera::Ray;
 use crate::meshes::Shading;
+use crate::sampling::guide::{Aims, Guide};
 use crate::sampling::paths::{Way, scattered};
 use crate::sampling::rough::{Energies, Microfacets};
 
@@ -46,6 +47,8 @@ pub(super) struct PathNumbers<'a> {
     pub(super) choice: &'a dyn Fn(u32, Way) -> f64,
     /// The microfacets of rough objects.
     pub(super) energies: &'a Energies,
+    /// Where scattered rays find light.
+    pub(super) guide: Option<&'a Guide>,
 }
 
 /// A path from the camera.
@@ -168,9 +171,18 @@ impl Shader<'_> {
         {
             let factor = coefficients.diffuse() * tint;
             if let Some((next, factor)) = self.sent(path, factor, Way::Scattered) {
-                let direction = scattered((numbers.direction)(path.hits), normal, face);
-                let seen = self.seen_along(Ray { origin: start, direction }, Path { clear: None, ..next });
-                color = held(color + factor * seen.color);
+                let uv = (numbers.direction)(path.hits);
+                let rays = match numbers.guide {
+                    Some(guide) => {
+                        guide.scattered(uv, world.in_scene(start), (normal, face), &mut Aims::default())
+                    }
+                    None => [(scattered(uv, normal, face), 1.0), (DVec3::Y, 0.0)],
+                };
+                for (direction, share) in rays.into_iter().filter(|&(_, share)| share > 0.0) {
+                    let next = Path { clear: None, weight: held(next.weight * share), ..next };
+                    let seen = self.seen_along(Ray { origin: start, direction }, next);
+                    color = held(color + factor * share * seen.color);
+                }
             }
         }
         if path.bounces == 0 {

@@ -32,6 +32,11 @@ pub(super) struct World<'a> {
 }
 
 impl<'a> World<'a> {
+    /// Returns a point in the coordinates of the scene.
+    pub(super) fn in_scene(&self, point: DVec3) -> DVec3 {
+        point + self.center
+    }
+
     /// Makes the world with the eye at the origin, so that coordinates are small for objects that are near. Keeps the
     /// coordinates of the script if the scene cannot be moved, or if rounding would move the eye through a surface.
     pub(super) fn of(expanded: &'a Expanded) -> Self {

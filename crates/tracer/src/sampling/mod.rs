@@ -5,10 +5,13 @@
 //! alone: what stands still from frame to frame does not flicker. [`places`] maps numbers to places, [`film`] sums
 //! up and says where more rays are due. Nothing here knows how rays are traced.
 
+pub(crate) mod cube_table;
 pub(crate) mod film;
+pub(crate) mod guide;
 pub(crate) mod paths;
 pub(crate) mod places;
 pub(crate) mod rough;
+mod sky_table;
 mod sobol;
 
 use rayfold_scene::{Camera, Light, Scene};

@@ -1,9 +1,12 @@
 //! The surfaces of a scene in which light goes round.
 
+use glam::DVec3;
 use rayfold_scene::{Glass, Object, Scene};
 
 use crate::fast::placement::geometry::Geometry;
 use crate::reference;
+use crate::sampling::guide::{Aims, Guide};
+use crate::sampling::paths::scattered;
 use crate::sampling::rough::Microfacets;
 
 /// The surfaces of a scene in which light goes round.
@@ -13,6 +16,11 @@ pub(crate) struct Paths {
     glass: Vec<Option<(Glass, bool)>>,
     /// The microfacets of each object that is rough; empty if none is.
     rough: Vec<Option<Microfacets>>,
+    /// Where scattered rays find light.
+    guide: Option<Guide>,
+    /// The origin and the scale of the kernels' coordinates in the scene.
+    center: DVec3,
+    scale: f64,
 }
 
 impl Paths {
@@ -34,7 +42,9 @@ impl Paths {
             if rough.iter().all(Option::is_none) {
                 rough.clear();
             }
-            Self { glass: scene.objects.iter().enumerate().map(glass).collect(), rough }
+            let glass = scene.objects.iter().enumerate().map(glass).collect();
+            let &Geometry { center, scale, .. } = geometry;
+            Self { glass, rough, guide: geometry.guide.clone(), center, scale }
         })
     }
 
@@ -48,6 +58,22 @@ impl Paths {
     #[inline(always)]
     pub(crate) fn microfacets(&self, order: usize) -> Option<&Microfacets> {
         self.rough.get(order)?.as_ref()
+    }
+
+    /// Returns the rays that a surface scatters at a place: their directions, and the factors with which they count, of which 0
+    /// stands for no ray.
+    #[inline(always)]
+    pub(crate) fn scattered(
+        &self,
+        numbers: (f64, f64),
+        place: DVec3,
+        (normal, face): (DVec3, DVec3),
+        aims: &mut Aims,
+    ) -> [(DVec3, f64); 2] {
+        match &self.guide {
+            Some(guide) => guide.scattered(numbers, place / self.scale + self.center, (normal, face), aims),
+            None => [(scattered(numbers, normal, face), 1.0), (DVec3::Y, 0.0)],
+        }
     }
 
     /// Returns whether any object is rough.

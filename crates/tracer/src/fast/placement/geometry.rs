@@ -24,6 +24,7 @@ use crate::fast::shapes::{Shape, Solid, reach};
 use crate::fast::shared::SharedSurfaces;
 use crate::meshes::Faces;
 use crate::parallel::{map, map_numbered};
+use crate::sampling::guide::Guide;
 use crate::sampling::places::spread;
 use crate::sampling::rough::Energies;
 use crate::scale::below_inverse;
@@ -46,6 +47,8 @@ pub(crate) struct Geometry {
     pub(crate) is_finished: bool,
     /// The microfacets of rough objects, where light goes round.
     pub(crate) energies: Energies,
+    /// Where scattered rays find light.
+    pub(crate) guide: Option<Guide>,
     /// Whether light goes round.
     pub(crate) goes_round: bool,
     /// Whether there is fog.
@@ -145,6 +148,7 @@ impl Geometry {
             lens: lens.map(|lens| lens.scaled(scale)),
             is_finished,
             energies: Energies::default(),
+            guide: None,
             goes_round: scene.goes_round(),
             is_foggy: scene.fog.get().is_some(),
             shared: None,
@@ -159,8 +163,8 @@ impl Geometry {
 
 impl Geometry {
     /// Adds the microfacets of rough objects.
-    pub(crate) fn with_energies(self, energies: &Energies) -> Self {
-        Self { energies: energies.clone(), ..self }
+    pub(crate) fn with_paths(self, energies: &Energies, guide: Option<Guide>) -> Self {
+        Self { energies: energies.clone(), guide, ..self }
     }
 
     /// Gives all triangles in one plane the same plane numbers, if it matters which of them is visible.

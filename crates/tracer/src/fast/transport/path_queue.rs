@@ -6,6 +6,7 @@
 
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
+use crate::sampling::guide::Aims;
 use crate::sampling::paths::Way;
 
 /// The number of rays in a full batch.
@@ -48,11 +49,13 @@ pub(crate) struct PathQueues<E> {
     waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
     /// The turns of the rays of the current batch.
     turns: [Turns; ROOM],
+    /// Room for where a surface sees light.
+    pub(super) aims: Aims,
 }
 
 impl<E: Real> PathQueues<E> {
     pub(crate) fn new() -> Self {
-        Self { waiting: vec![], turns: [Turns::default(); ROOM] }
+        Self { waiting: vec![], turns: [Turns::default(); ROOM], aims: Aims::default() }
     }
 
     /// Starts with a batch of camera rays.

@@ -12,7 +12,7 @@ use crate::fast::rays::bounce::{Column, Hits, RayBatch};
 use crate::fast::transport::path_queue::{PathRay, Turns};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::reference::{Refraction, refract};
-use crate::sampling::paths::{Way, choice, direction_dimension, scattered};
+use crate::sampling::paths::{Way, choice, direction_dimension};
 use crate::sampling::{Dimensions, Points};
 
 /// The random numbers of a tile's paths.
@@ -51,6 +51,7 @@ pub(crate) fn spawn_paths<E: Real>(
 ) {
     let is_foggy = scene.fog().is_some();
     let has_faces = !hits.face[0].is_empty();
+    let mut aims = core::mem::take(&mut waiting.paths.aims);
     for &(at, _) in &hits.packets {
         for lane in at..at + lanes {
             let pixel = queue.pixel.0[lane];
@@ -71,7 +72,8 @@ pub(crate) fn spawn_paths<E: Real>(
                     weight *= hits.clearness[lane].widen();
                 }
                 from.send(waiting, Way::Scattered, weight, -1.0, |from| {
-                    (start, scattered(from.numbers(), normal, face))
+                    let rays = paths.scattered(from.numbers(), start, (normal, face), &mut aims);
+                    rays.map(|(direction, share)| (start, direction, share))
                 });
             }
             let order = hits.order.0[lane].to_index();
@@ -89,6 +91,7 @@ pub(crate) fn spawn_paths<E: Real>(
             );
         }
     }
+    waiting.paths.aims = aims;
 }
 
 /// Sends the mirrored and refracted rays of one hit, at `start` with these normals of its face and of its shading.
@@ -135,9 +138,9 @@ fn send_onward<E: Real>(
             let left = left * (1.0 - mirrored);
             let clear = if clear > 0.0 { clear * left * mean(glass) } else { -1.0 };
             let weight = weight * glass.color() * left;
-            from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
+            from.send(waiting, Way::Refracted, weight, clear, |_| [(start - 2.0 * offset * face, bent, 1.0)]);
         }
-        from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| (start, towards));
+        from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| [(start, towards, 1.0)]);
         return;
     }
     let normal = if has_faces { read_of(&hits.onward, lane) } else { normal };
@@ -147,9 +150,9 @@ fn send_onward<E: Real>(
         mirror += mirrored * weight;
         let clear = if clear > 0.0 { clear * (1.0 - mirrored) * mean(glass) } else { -1.0 };
         let weight = weight * glass.color() * (1.0 - mirrored);
-        from.send(waiting, Way::Refracted, weight, clear, |_| (start - 2.0 * offset * face, bent));
+        from.send(waiting, Way::Refracted, weight, clear, |_| [(start - 2.0 * offset * face, bent, 1.0)]);
     }
-    from.send(waiting, Way::Mirrored, mirror, -1.0, |_| (start, reflected(direction, normal)));
+    from.send(waiting, Way::Mirrored, mirror, -1.0, |_| [(start, reflected(direction, normal), 1.0)]);
 }
 
 /// The hit from which rays go on.
@@ -167,15 +170,16 @@ impl<E: Real> Origin<'_, E> {
         self.numbers.direction(self.slot, self.turns.hits())
     }
 
-    /// Adds a ray of this weight, if it is followed. `place` gives its start and its direction.
+    /// Adds rays of this weight, if they are followed. `place` gives their starts, their directions, and further factors, which have no
+    /// part in whether they are followed: a ray that is aimed at bright light has a small one.
     #[inline(always)]
-    fn send(
+    fn send<const COUNT: usize>(
         &self,
         waiting: &mut RayQueues<E>,
         way: Way,
         weight: DVec3,
         clear: f64,
-        place: impl FnOnce(&Self) -> (DVec3, DVec3),
+        place: impl FnOnce(&Self) -> [(DVec3, DVec3, f64); COUNT],
     ) {
         let Self { slot, pixel, turns, numbers } = *self;
         let chance = way.chance(weight);
@@ -183,21 +187,25 @@ impl<E: Real> Origin<'_, E> {
         if chance < 1.0 && choice(seed, sample, turns.hits(), way) >= chance {
             return;
         }
-        let (origin, direction) = place(self);
         let narrow = |v: DVec3| v.to_array().map(E::narrow);
         let turns = match way {
             Way::Scattered => Turns { scattered: turns.scattered + 1, ..turns },
             Way::Mirrored | Way::Refracted => Turns { bounced: turns.bounced + 1, ..turns },
         };
-        let ray = PathRay {
-            origin: narrow(origin),
-            direction: narrow(direction),
-            weight: narrow(weight / chance),
-            pixel,
-            clear: E::narrow(clear),
-            turns,
-        };
-        waiting.paths.push(way, ray);
+        for (origin, direction, share) in place(self) {
+            if share == 0.0 {
+                continue;
+            }
+            let ray = PathRay {
+                origin: narrow(origin),
+                direction: narrow(direction),
+                weight: narrow(weight / chance * share),
+                pixel,
+                clear: E::narrow(clear),
+                turns,
+            };
+            waiting.paths.push(way, ray);
+        }
     }
 }
 
