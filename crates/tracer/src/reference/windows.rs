@@ -29,7 +29,12 @@ pub(crate) fn windows(scene: &Scene) -> Option<Windows> {
     if scene.indirect_bounces() == 0 {
         return None;
     }
-    let is_opaque = |object: &&Object| !matches!(object, Object::Mesh(_)) && glass(object).is_none();
+    let is_mesh = |object: &Object| match object {
+        Object::Mesh(_) => true,
+        Object::Instance(instance) => matches!(instance.object(), Object::Mesh(_)),
+        _ => false,
+    };
+    let is_opaque = |object: &&Object| !is_mesh(object) && glass(object).is_none();
     let size = |object: &Object| {
         object.bounds().map_or(f64::INFINITY, |[low, high]| {
             let DVec3 { x, y, z } = high - low;
