@@ -174,6 +174,14 @@ pub(super) fn widened(row: &[u64], word: usize) -> u64 {
     at | at << 1 | at >> 1 | before | after
 }
 
+/// The bits between two that lie on opposite sides of them, in three rows.
+#[inline(always)]
+pub(super) fn between([above, at, below]: [&Vec<u64>; 3], word: usize) -> u64 {
+    let left = |row: &[u64]| row[word] << 1 | if word > 0 { row[word - 1] >> (WORD - 1) } else { 0 };
+    let right = |row: &[u64]| row[word] >> 1 | row.get(word + 1).map_or(0, |after| after << (WORD - 1));
+    left(at) & right(at) | above[word] & below[word] | left(above) & right(below) | right(above) & left(below)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

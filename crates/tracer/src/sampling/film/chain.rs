@@ -20,6 +20,20 @@ const SLOPE_OF_PATHS: f64 = -0.5;
 /// ([`super::density`]), the fewer others there are that have less.
 pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 0.9];
 
+/// What the samples of a pixel show may reach into an even neighbour, and be missed by as many samples of that one. The error
+/// of the neighbour is then about the pixel's deviation divided by the number of samples to this power: the more samples, the
+/// smaller is the part that they miss, and the chance that they do.
+pub(super) const MISSED: f64 = 1.5;
+
+/// An even neighbour goes on if that error is more than so many times the one that is asked for.
+pub(super) const CALM: f64 = 0.4;
+
+/// No samples that are clamped deviate by more levels.
+const MOST: f64 = 256.0;
+
+/// A pixel is even if its samples deviate by less than so many times the error that is asked for.
+pub(super) const EVEN: f64 = 0.5;
+
 /// A pixel varies if its error after [`SECOND`] samples is estimated at more than so many times the one that is asked for.
 pub(super) const VARYING: f64 = 1.5;
 
@@ -37,6 +51,10 @@ pub(super) struct SampleSchedule {
     /// The largest variance of the samples of a settled pixel, by how much varies around it and by the logarithm of their
     /// number to the base 2.
     limits: [[f64; u32::BITS as usize]; SPARED.len()],
+    /// The largest variance of the samples of a pixel beside which even ones of each number from the second on do not go on.
+    calm: Vec<f64>,
+    /// The largest variance of the samples of an even pixel.
+    even: f64,
     /// The largest variance of the [`SECOND`] samples of a pixel that does not vary.
     still: f64,
 }
@@ -45,6 +63,10 @@ pub(super) struct SampleSchedule {
 pub(crate) struct Verdict {
     /// Whether it needs more of them.
     pub(crate) is_unsettled: bool,
+    /// Even neighbours with so many of the numbers of the chain, from the second on, go on.
+    pub(crate) reach: usize,
+    /// Whether they differ.
+    pub(crate) is_uneven: bool,
     /// Whether it counts as varying where that is counted.
     pub(crate) is_varying: bool,
 }
@@ -58,7 +80,14 @@ impl SampleSchedule {
             limit * limit
         };
         let limits = spared.map(|spared| core::array::from_fn(|at| limit(spared, 1 << at)));
-        Self { samples, step, tone, is_unclamped, limits, still: limit(VARYING, SECOND) }
+        // Where light goes round neighbours always go on.
+        let numbers = (0..u32::BITS - 2)
+            .map(|at| SECOND << at)
+            .take_while(|&count| count == SECOND || count < samples.most());
+        let calm = numbers.map(|count| CALM * samples.error() * libm::pow(f64::from(count), MISSED));
+        let calm = calm.take_while(|&calm| calm < MOST && !is_unclamped).map(|calm| calm * calm).collect();
+        let even = limit(EVEN, 1);
+        Self { samples, step, tone, is_unclamped, limits, calm, even, still: limit(VARYING, SECOND) }
     }
 
     /// Whether samples are not clamped.
@@ -120,12 +149,20 @@ impl SampleSchedule {
     #[inline(never)]
     pub(super) fn verdict(&self, pixel: &Pixel, density: usize) -> Verdict {
         let count = pixel.count();
-        let is_asked = count < self.most() && count.is_power_of_two();
-        let variance = if is_asked { self.variance(pixel) } else { 0.0 };
+        let is_number = count == self.most() || count.is_power_of_two();
+        let variance = if is_number { self.variance(pixel) } else { 0.0 };
+        let is_asked = is_number && count < self.most();
         Verdict {
             is_unsettled: is_asked && variance > self.limits[density][count.trailing_zeros() as usize],
-            is_varying: variance > self.still,
+            reach: self.calm.iter().take_while(|&&calm| variance > calm).count(),
+            is_uneven: variance > self.even,
+            is_varying: is_asked && variance > self.still,
         }
+    }
+
+    /// How many numbers of the chain, from the second on, a pixel can reach ([`Verdict::reach`]).
+    pub(super) fn reaches(&self) -> usize {
+        self.calm.len()
     }
 
     #[inline(always)]

@@ -70,6 +70,11 @@ impl Density {
         self.sets.iter().filter(|set| set.has(column, row)).count()
     }
 
+    /// The pixels around which much varies.
+    pub(super) fn dense(&self) -> &Bits {
+        &self.sets[0]
+    }
+
     /// The sets whose pixels go on from so many samples.
     pub(super) fn above(&self, count: u32) -> impl Iterator<Item = &Bits> {
         self.sets.iter().zip(FLOORS).filter(move |(_, floor)| *floor > count).map(|(bits, _)| bits)

@@ -306,7 +306,7 @@ impl Color {
 
 #[cfg(test)]
 mod tests {
-    use super::chain::{SLOPE, SPARED, VARYING};
+    use super::chain::{CALM, EVEN, MISSED, SLOPE, SPARED, VARYING};
     use super::density;
     use super::plan::{CONTRAST, MAX_ROUNDS};
     use super::*;
@@ -390,7 +390,7 @@ mod tests {
                 _ => 0.5,
             };
             expose(&mut film, noise);
-            assert_eq!(counts(&film)[..8], [64, 64, 32, 16, 8, 4, 1, 1]);
+            assert_eq!(counts(&film)[..8], [64, 64, 8, 1, 1, 1, 1, 1]);
         }
     }
 
@@ -504,7 +504,8 @@ mod tests {
                     + usize::from(3 * varying >= 2 * all)
             };
             let mut density = vec![0; counts.len()];
-            let mut varying = vec![false; counts.len()];
+            let (mut varying, mut variances) = (vec![false; counts.len()], vec![0.0; counts.len()]);
+            let mut uneven = varying.clone();
             for round in 0..MAX_ROUNDS {
                 if round == 1 {
                     density = (0..counts.len()).map(|place| share(&varying, place)).collect();
@@ -512,12 +513,27 @@ mod tests {
                 let next: Vec<u32> = (0..counts.len())
                     .map(|place| {
                         let is_given = [1, 4, 8][density[place]];
+                        let gives = |other: usize| {
+                            let many = if density[other] > 0 { 2 } else { 8 };
+                            let waits = unsettled[other] && (uneven[place] || density[other] > 0);
+                            let calm = CALM * f64::from(counts[place].max(4)).powf(MISSED);
+                            (variances[other] > calm * calm || waits) && counts[other] >= counts[place]
+                                || counts[other] > many * counts[place].max(2)
+                        };
+                        let waits = |(dx, dy): (i64, i64)| {
+                            let at = ((place % width) as i64 + dx, (place / width) as i64 + dy);
+                            let is_inside =
+                                (0..width as i64).contains(&at.0) && (0..i64::from(size.1)).contains(&at.1);
+                            let other = (at.1 * width as i64 + at.0) as usize;
+                            is_inside && unsettled[other] && counts[other] >= counts[place]
+                        };
+                        let is_between = [(1, 0), (0, 1), (1, 1), (1, -1)]
+                            .into_iter()
+                            .any(|(dx, dy)| waits((dx, dy)) && waits((-dx, -dy)));
                         let goes_on = unsettled[place]
                             || counts[place] < is_given
-                            || around(place).any(|other| {
-                                unsettled[other] && counts[other] >= counts[place]
-                                    || counts[other] > 2 * counts[place].max(2)
-                            });
+                            || is_between
+                            || around(place).any(gives);
                         match counts[place] {
                             count if !goes_on => count,
                             1 => 4.min(most),
@@ -534,6 +550,8 @@ mod tests {
                         let limit = SPARED[density[place]] * f64::from(count).powf(-SLOPE);
                         let variance = pixel(place, count).variance(tone);
                         unsettled[place] = count < most && variance > limit * limit;
+                        variances[place] = variance;
+                        uneven[place] = count < most && variance > EVEN * EVEN;
                         let still = VARYING * f64::from(count).powf(-SLOPE);
                         varying[place] = count < most && variance > still * still;
                     }

@@ -1,7 +1,16 @@
 //! Which pixels get how many samples in the next pass.
 //!
-//! The numbers of samples that a pixel can have are a chain. A pixel goes on to the next of them if its error is estimated to
-//! be too large, if that of a neighbour with at least as many samples is, or if a neighbour is two or more ahead on the chain.
+//! The numbers of samples that a pixel can have are a chain. A pixel goes on to the next of them
+//!
+//! - if its error is estimated to be too large,
+//! - if that of a neighbour with at least as many samples is, and its own samples differ,
+//! - if a neighbour with at least as many samples varies so much that as many of its own may have missed a part of it,
+//! - if it lies between two neighbours with at least as many samples, on opposite sides, whose errors are too large,
+//! - if a neighbour is more than [`AHEAD`] numbers ahead on the chain.
+//!
+//! Beside a neighbour around which much varies ([`Density`]), or where light goes round, it goes on if the neighbour's error is too large, whatever its own
+//! samples show, and if the neighbour is more than one number ahead.
+//!
 //! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
 //! bias of asking a pixel about itself shrinks to that of asking many.
 //!
@@ -11,7 +20,7 @@
 use rayfold_scene::Tone;
 use rayon::prelude::*;
 
-use super::bits::{BitRows, Bits, WORD, widened};
+use super::bits::{BitRows, Bits, WORD, between, widened};
 use super::chain::{SampleSchedule, Verdict};
 use super::density::Density;
 use super::first::First;
@@ -21,6 +30,9 @@ use crate::parts;
 
 /// So many times the error that is asked for, two neighbours with a sample each may differ by.
 pub(super) const CONTRAST: f64 = 1.5;
+
+/// A neighbour that is more than so many numbers of the chain ahead makes a pixel go on: it has 16 times as many samples.
+const AHEAD: usize = 3;
 
 /// How often it is decided who goes on, at most, so that no pixel depends on one that is farther away, and a band can be drawn
 /// by itself. The example scenes take up to 34 of them (docs/decisions/frames-in-bands.md).
@@ -80,6 +92,8 @@ pub(crate) struct Work {
 /// The state of the pixels of some rows once they have got their samples.
 pub(crate) struct Judged<'a> {
     unsettled: BitRows<'a>,
+    spreading: Vec<BitRows<'a>>,
+    uneven: BitRows<'a>,
     /// While it counts.
     varying: Option<BitRows<'a>>,
 }
@@ -90,6 +104,11 @@ impl Judged<'_> {
     pub(crate) fn set(&mut self, column: usize, row: usize, verdict: &Verdict, of_cover: Option<&Verdict>) {
         let any = |of: fn(&Verdict) -> bool| of(verdict) || of_cover.is_some_and(of);
         self.unsettled.set(column, row, any(|verdict| verdict.is_unsettled));
+        let reach = of_cover.map_or(verdict.reach, |cover| verdict.reach.max(cover.reach));
+        for (at, bits) in self.spreading.iter_mut().enumerate() {
+            bits.set(column, row, at < reach);
+        }
+        self.uneven.set(column, row, any(|verdict| verdict.is_uneven));
         if let Some(varying) = &mut self.varying {
             varying.set(column, row, any(|verdict| verdict.is_varying));
         }
@@ -101,6 +120,11 @@ pub(super) struct Plan {
     chain: SampleSchedule,
     /// Whose error is too large.
     unsettled: Bits,
+    /// Who varies so much that even neighbours may have missed a part of it, by the numbers of samples of those, from the second
+    /// of the chain on.
+    spreading: Vec<Bits>,
+    /// Whose samples differ.
+    uneven: Bits,
     /// Who counts as varying; empty once that was counted.
     varying: Bits,
     /// Who gets some number of samples in any case.
@@ -133,8 +157,9 @@ impl Plan {
     pub(super) fn new(size: (usize, usize), chain: SampleSchedule) -> Option<Self> {
         let none = || Bits::none(size);
         Some(Self {
-            chain,
             unsettled: none()?,
+            spreading: (0..chain.reaches()).map(|_| none()).collect::<Option<_>>()?,
+            uneven: none()?,
             varying: none()?,
             floors: Floors::default(),
             density: None,
@@ -143,6 +168,7 @@ impl Plan {
             done: 0,
             rounds: 0,
             wanted: none()?,
+            chain,
             stage: Stage::Begins,
         })
     }
@@ -185,8 +211,13 @@ impl Plan {
         let density = self.density.as_ref();
         let wanted = PassTargets { chain: &self.chain, density, pixels: &self.wanted, is_first_look };
         let mut varying = self.varying.bands(rows);
-        let judged = move |unsettled| Judged { unsettled, varying: varying.next() };
-        (wanted, self.unsettled.bands(rows).map(judged))
+        let mut uneven = self.uneven.bands(rows);
+        let mut spreading: Vec<_> = self.spreading.iter_mut().map(|bits| bits.bands(rows)).collect();
+        let judged = move |unsettled| {
+            let spreading = spreading.iter_mut().filter_map(Iterator::next).collect();
+            Some(Judged { unsettled, spreading, uneven: uneven.next()?, varying: varying.next() })
+        };
+        (wanted, self.unsettled.bands(rows).map_while(judged))
     }
 
     /// Leaves all but some pixels out of a pass.
@@ -314,58 +345,64 @@ impl Plan {
             let ends = number == self.chain.most();
             let always: Vec<&Bits> =
                 self.floors.above(number).chain(self.density.iter().flat_map(|d| d.above(number))).collect();
-            let (unsettled, at_least) = (&self.unsettled, &self.at_least);
+            let (unsettled, uneven) = (&self.unsettled, &self.uneven);
+            let spreading = self.spreading.get(at.saturating_sub(1));
+            let at_least = &self.at_least;
+            let is_unclamped = self.chain.is_unclamped();
+            let dense = self.density.as_ref().map(Density::dense);
             let have = at.checked_sub(1).map(|before| &at_least[before]);
-            let (further, ahead) = (at_least.get(at), at_least.get(at + 1));
+            let further = at_least.get(at);
+            let (soon, ahead) = (at_least.get(at + 1), at_least.get(at + AHEAD));
             let stride = unsettled.stride;
             self.going[at].words.par_chunks_mut(stride * BAND).enumerate().for_each(|(band, words)| {
                 words.fill(0);
                 if ends {
                     return;
                 }
-                // Whoever may make others go on, in three rows.
-                let mut active = [(); 3].map(|()| vec![0; stride]);
-                let (mut near, mut bound) = (vec![0; stride], vec![0; stride]);
-                let look = |active: &mut Vec<u64>, row: Option<usize>| match row
-                    .filter(|&row| row < unsettled.rows())
-                {
-                    None => active.fill(0),
-                    Some(row) => {
-                        active.copy_from_slice(unsettled.row(row));
-                        if let Some(have) = have {
-                            active.iter_mut().zip(have.row(row)).for_each(|(active, have)| *active &= have);
-                        }
-                        if let Some(ahead) = ahead {
-                            active
-                                .iter_mut()
-                                .zip(ahead.row(row))
-                                .for_each(|(active, ahead)| *active |= ahead);
-                        }
+                // Those that are unsettled, and those that make any neighbour go on, in three rows.
+                let mut open = [(); 3].map(|()| vec![0; stride]);
+                let mut active = open.clone();
+                let of =
+                    |bits: Option<&Bits>, row: usize, word: usize| bits.map_or(0, |bits| bits.row(row)[word]);
+                let look = |open: &mut [u64], active: &mut [u64], row: Option<usize>| {
+                    let Some(row) = row.filter(|&row| row < unsettled.rows()) else {
+                        open.fill(0);
+                        return active.fill(0);
+                    };
+                    for (word, (open, active)) in open.iter_mut().zip(active).enumerate() {
+                        let has = have.map_or(u64::MAX, |have| have.row(row)[word]);
+                        *open = unsettled.row(row)[word] & has;
+                        let dense = if is_unclamped { u64::MAX } else { of(dense, row, word) };
+                        *active = of(spreading, row, word) & has
+                            | (*open | of(soon, row, word)) & dense
+                            | of(ahead, row, word);
                     }
                 };
                 let top = band * BAND;
-                look(&mut active[1], top.checked_sub(1));
-                look(&mut active[2], Some(top));
+                look(&mut open[1], &mut active[1], top.checked_sub(1));
+                look(&mut open[2], &mut active[2], Some(top));
                 for (row, words) in (top..).zip(words.chunks_exact_mut(stride)) {
+                    open.rotate_left(1);
                     active.rotate_left(1);
-                    look(&mut active[2], Some(row + 1));
-                    let [above, here, below] = &active;
-                    let mut any = 0;
-                    for (((near, above), here), below) in near.iter_mut().zip(above).zip(here).zip(below) {
-                        *near = above | here | below;
-                        any |= *near;
-                    }
-                    bound.fill(0);
-                    for bits in &always {
-                        bound.iter_mut().zip(bits.row(row)).for_each(|(bound, bits)| *bound |= bits);
-                    }
-                    if any == 0 && bound.iter().all(|&word| word == 0) {
+                    look(&mut open[2], &mut active[2], Some(row + 1));
+                    let is_any = |bits: &[u64]| bits.iter().any(|&word| word != 0);
+                    if !open.iter().chain(&active).any(|bits| is_any(bits))
+                        && !always.iter().any(|bits| is_any(bits.row(row)))
+                    {
                         continue;
                     }
                     for (word, going) in words.iter_mut().enumerate() {
                         let have = have.map_or(unsettled.inside(word), |have| have.row(row)[word]);
-                        let further = further.map_or(0, |further| further.row(row)[word]);
-                        *going = (widened(&near, word) | bound[word]) & have & !further;
+                        let may = have & !of(further, row, word);
+                        if may == 0 {
+                            continue;
+                        }
+                        let around =
+                            |rows: &[Vec<u64>; 3]| rows.iter().fold(0, |all, row| all | widened(row, word));
+                        let differ = uneven.row(row)[word];
+                        let always = always.iter().fold(0, |all, bits| all | bits.row(row)[word]);
+                        let own = open[1][word] | always | between(open.each_ref(), word);
+                        *going = (own | around(&active) | around(&open) & differ) & may;
                     }
                 }
             });
