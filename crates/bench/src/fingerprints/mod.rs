@@ -34,6 +34,8 @@ use rayon::prelude::*;
 
 use self::folders::find;
 use self::machines::Machine;
+#[cfg(feature = "bucket")]
+pub(crate) use self::machines::in_small;
 use crate::backends::levels;
 
 /// The options of the subcommand.
@@ -54,6 +56,9 @@ pub struct Args {
     /// With `--check`: draw them on another kind of machine, too, which is emulated
     #[arg(long, value_enum, requires = "check", value_name = "MACHINE")]
     on: Vec<Machine>,
+    /// With `--on`: draw the random scripts alone, and not on this machine, by a program that is sooner built
+    #[arg(long, requires = "on")]
+    slice: bool,
     /// Write that table anew
     #[arg(long, conflicts_with_all = ["folders", "seed", "check"])]
     write: bool,
@@ -77,7 +82,7 @@ pub fn run(args: &Args) -> Result<()> {
         return machines::write(args.random);
     }
     if args.check {
-        return machines::check(args.random, &args.on);
+        return machines::check(args.random, &args.on, args.slice);
     }
     let mut scripts = Vec::new();
     for folder in &args.folders {
