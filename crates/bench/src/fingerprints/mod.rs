@@ -34,8 +34,6 @@ use rayon::prelude::*;
 
 use self::folders::find;
 use self::machines::Machine;
-#[cfg(feature = "bucket")]
-pub(crate) use self::machines::in_small;
 use crate::backends::levels;
 
 /// The options of the subcommand.
