@@ -6,6 +6,7 @@
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -126,11 +127,27 @@ fn card(root: &Path, examples: &Path, name: &str) -> anyhow::Result<String> {
     let picture = ["gif", "png"].map(|ending| format!("{name}.{ending}"));
     let picture = picture.iter().find(|file| images.join(file).is_file());
     let picture = picture.with_context(|| format!("docs/images has no picture of {name}"))?;
-    fs::copy(images.join(picture), examples.join(picture))?;
-    Ok(format!(
-        "<li><a href=\"{STUDIO}#example={name}\"><img src=\"examples/{picture}\" alt=\"\" loading=\"lazy\" \
-         width=\"320\" height=\"240\" /><span>{name}</span></a></li>\n        "
-    ))
+    let (from, copy) = (images.join(picture), examples.join(picture));
+    fs::copy(&from, &copy)?;
+    let mut shown =
+        format!("<img src=\"examples/{picture}\" alt=\"\" loading=\"lazy\" width=\"320\" height=\"240\" />");
+    if picture.ends_with(".gif") {
+        first_frame(&from).with_context(|| picture.clone())?.save(copy.with_extension("png"))?;
+        shown = format!(
+            "<picture><source media=\"(prefers-reduced-motion: reduce)\" srcset=\"examples/{name}.png\" />{shown}</picture>"
+        );
+    }
+    Ok(format!("<li><a href=\"{STUDIO}#example={name}\">{shown}<span>{name}</span></a></li>\n        "))
+}
+
+/// Returns the first picture of a GIF, for people who want none that move.
+fn first_frame(gif: &Path) -> anyhow::Result<image::RgbaImage> {
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = options.read_info(BufReader::new(fs::File::open(gif)?))?;
+    let frame = decoder.read_next_frame()?.context("it has no frame")?;
+    let (width, height) = (frame.width.into(), frame.height.into());
+    image::RgbaImage::from_raw(width, height, frame.buffer.to_vec()).context("its frame is cut off")
 }
 
 /// Returns the names of the files that the browser keeps from the start, as the items of a list in JavaScript, and a version
@@ -175,6 +192,8 @@ mod tests {
                 "{name}"
             );
             assert!(card(&root, folder.path(), &name).unwrap().contains(&format!("#example={name}\"")));
+            let still = image::open(folder.path().join(format!("{name}.png"))).unwrap();
+            assert!(still.width() >= 240, "{name}");
         }
     }
 

@@ -54,6 +54,9 @@ pub struct Args {
     /// With `--check`: draw them on another kind of machine, too, which is emulated
     #[arg(long, value_enum, requires = "check", value_name = "MACHINE")]
     on: Vec<Machine>,
+    /// With `--on`: draw the random scripts alone, and not on this machine, by a program that is sooner built
+    #[arg(long, requires = "on")]
+    slice: bool,
     /// Write that table anew
     #[arg(long, conflicts_with_all = ["folders", "seed", "check"])]
     write: bool,
@@ -77,7 +80,7 @@ pub fn run(args: &Args) -> Result<()> {
         return machines::write(args.random);
     }
     if args.check {
-        return machines::check(args.random, &args.on);
+        return machines::check(args.random, &args.on, args.slice);
     }
     let mut scripts = Vec::new();
     for folder in &args.folders {

@@ -17,7 +17,7 @@ after(async () => {
   host?.close();
 });
 
-async function open(t, where) {
+async function open(t, where, shown) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
   await page.setViewport({ width: 1400, height: 900 });
@@ -34,8 +34,8 @@ async function open(t, where) {
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
   t.after(() => context.close());
   await page.goto(host.address + where);
-  const drawn = () => page.waitForSelector("canvas[data-final=true]", { timeout: 120_000 });
-  await drawn();
+  const drawn = (what = "canvas[data-final=true]") => page.waitForSelector(what, { timeout: 120_000 });
+  await drawn(shown);
   return { page, drawn, check: () => assert.deepEqual(faults, []) };
 }
 
@@ -71,6 +71,21 @@ test("in Firefox curves and samples become the command's GIF, and an object is d
   await page.mouse.move(box.x + box.width * 0.4, box.y + box.height / 2, { steps: 8 });
   await page.mouse.up();
   assert.notEqual(await text(), before);
+  check();
+});
+
+test("in Firefox the start page shows an example playing, and a click opens it", async (t) => {
+  const { page, drawn, check } = await open(t, "", "img");
+  const hello = await page.waitForSelector("::-p-aria(hello)");
+  const looks = new Set();
+  for (let look = 0; look < 20 && looks.size < 3; look++) {
+    looks.add(await hello.screenshot({ encoding: "base64" }));
+    await new Promise((done) => setTimeout(done, 100));
+  }
+  assert.equal(looks.size, 3, "pictures that were seen");
+  await hello.click();
+  await drawn();
+  assert.match(page.url(), /studio\.html#project=hello$/);
   check();
 });
 

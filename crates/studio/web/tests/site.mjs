@@ -40,8 +40,8 @@ after(async () => {
   host?.close();
 });
 
-async function open(t, where) {
-  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, acceptDownloads: true });
+async function open(t, where, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, acceptDownloads: true, ...options });
   const page = await context.newPage();
   const faults = [];
   page.on("pageerror", (error) => faults.push(String(error)));
@@ -110,6 +110,32 @@ test("the page says that a worker failed, and a new one draws", async (t) => {
   await drawn();
   check();
 });
+
+for (const reducedMotion of ["no-preference", "reduce"]) {
+  const isStill = reducedMotion === "reduce";
+  test(`the start page shows each example ${isStill ? "still, where people want that" : "playing"}, and a click opens it`, async (t) => {
+    const { page, drawn, check } = await open(t, "", { reducedMotion });
+    const shown = page.locator("li img");
+    assert.equal(await shown.count(), all.length);
+    for (const image of await shown.all()) {
+      await image.scrollIntoViewIfNeeded();
+      await image.evaluate((image) => image.decode());
+      if (isStill) assert.match(await image.evaluate((image) => image.currentSrc), /\.png$/);
+    }
+    const hello = page.getByRole("link", { name: "hello" });
+    await hello.scrollIntoViewIfNeeded();
+    const looks = new Set();
+    for (let look = 0; look < 20 && looks.size < 3; look++) {
+      looks.add(String(await hello.screenshot()));
+      await page.waitForTimeout(100);
+    }
+    assert.equal(looks.size, isStill ? 1 : 3, "pictures that were seen");
+    await hello.click();
+    await page.waitForURL(/studio\.html#project=hello$/);
+    await drawn();
+    check();
+  });
+}
 
 const all = readdirSync(join(site, "examples")).filter((file) => file.endsWith(".zip")).map((file) => file.replace(".zip", ""));
 // One of plain objects, one with a model, and one with letters and samples.
