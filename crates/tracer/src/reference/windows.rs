@@ -77,7 +77,7 @@ pub(crate) fn windows(scene: &Scene) -> Option<Windows> {
         parts.extend((0..SIDE * SIDE).map(|at| (brights[at], face, at)));
     }
     let brightest = parts.iter().fold(0.0, |most: f64, part| most.max(part.0));
-    if open > MAX_OPEN * all || !(brightest > 0.0) {
+    if open > MAX_OPEN * all || brightest == 0.0 {
         return None;
     }
     let is_window = |face: usize, at: usize| parts[face * SIDE * SIDE + at].0 > BRIGHT * brightest;

@@ -91,7 +91,7 @@ impl Guide {
         let by_cosine = scattered((u, v), normal, face);
         // The chance of a second ray. It is no number without light.
         let share = lit / (lit + OPENNESS * self.around);
-        if !(share > 0.0) {
+        if share.is_nan() || share == 0.0 {
             return [(by_cosine, 1.0), (by_cosine, 0.0)];
         }
         let part = |direction: DVec3| {
