@@ -42,14 +42,11 @@ fn the_page_does_in_a_browser_what_it_promises() {
         Err(missing) => return note(&format!("the page was NOT TESTED: {missing}")),
     };
     let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
-    let mut files = TESTS.to_vec();
-    let mut settings = vec![("RAYFOLD", program.to_owned()), ("CHROMIUM", browser)];
+    let mut node = Command::new("node");
+    // One after the other, because each uses all cores.
+    node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
     let site = match site() {
-        Ok(site) => {
-            files.extend(OF_THE_SITE);
-            settings.push(("SITE", site));
-            true
-        }
+        Ok(site) => Some(node.args(OF_THE_SITE).env("SITE", site)).is_some(),
         Err(missing) => {
             note(&format!("the page without a server was NOT TESTED: {missing}"));
             false
@@ -57,32 +54,18 @@ fn the_page_does_in_a_browser_what_it_promises() {
     };
     match found(&FIREFOX) {
         Ok(firefox) => {
-            files.push(IN_FIREFOX);
-            files.extend(site.then_some(OF_THE_SITE_IN_FIREFOX));
-            settings.push(("FIREFOX", firefox));
+            node.arg(IN_FIREFOX).env("FIREFOX", firefox);
+            node.args(site.then_some(OF_THE_SITE_IN_FIREFOX));
         }
         Err(missing) => note(&format!("the page was NOT TESTED in Firefox: {missing}")),
     }
     if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
         // The functions were built with this test. Without them `rayfold dev` builds them itself.
-        settings.push(("RAYFOLD_FUNCTIONS", beside.to_owned()));
+        node.env("RAYFOLD_FUNCTIONS", beside);
     }
-    let passes = |file: &str| {
-        let mut node = Command::new("node");
-        node.args(["--test", "--test-reporter=spec", file]).envs(settings.iter().cloned());
-        node.current_dir(&web).stdin(Stdio::null()).status().expect("node runs").success()
-    };
-    // One after the other, because each uses all cores.
-    files.retain(|file| !passes(file));
-    // A browser on a busy machine now and then misses a click. A test that passes at its second try is named, not failed.
-    files.retain(|file| {
-        let passed = passes(file);
-        if passed {
-            note(&format!("FLAKY: {file} failed once and then passed: see above for the test and why"));
-        }
-        !passed
-    });
-    assert!(files.is_empty(), "tests of the page failed twice: {}", files.join(", "));
+    node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", browser).stdin(Stdio::null());
+    let status = node.status().expect("node runs");
+    assert!(status.success(), "see above which of the page's tests failed");
 }
 
 /// Prints a line; `eprintln!` would print nothing in a test that passes.

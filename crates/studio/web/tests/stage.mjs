@@ -127,16 +127,13 @@ export async function over(page, x, y) {
   return [box.x + x * box.width, box.y + y * box.height];
 }
 
-/** Clicks on a row of the outliner, until it is selected. Only rows in sight are made, and the list may change while one is looked for. */
+/** Clicks on a row of the outliner. Only rows in sight are made, and the list may change while one is looked for. */
 export async function clickRow(page, selector, { modifiers, ...options } = {}) {
   const found = page.locator(selector, options).first();
   const list = page.getByRole("listbox");
   let top = 0;
   await until(async () => {
-    if ((await found.count()) > 0) {
-      const clicked = await found.click({ modifiers, timeout: 2000 }).then(() => true, () => false);
-      return clicked && (modifiers !== undefined || (await found.getAttribute("aria-selected", { timeout: 2000 }).catch(() => null)) === "true");
-    }
+    if ((await found.count()) > 0) return found.click({ modifiers, timeout: 2000 }).then(() => true, () => false);
     const end = await list.evaluate((list, top) => ((list.scrollTop = top), list.scrollHeight), top);
     top = top < end ? top + 100 : 0;
     return false;

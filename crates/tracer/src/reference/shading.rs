@@ -47,7 +47,7 @@ pub(super) struct PathNumbers<'a> {
     pub(super) choice: &'a dyn Fn(u32, Way) -> f64,
     /// The microfacets of rough objects.
     pub(super) energies: &'a Energies,
-    /// Where scattered rays find light.
+    /// The guide of scattered rays to bright light.
     pub(super) guide: Option<&'a Guide>,
 }
 

@@ -1,4 +1,4 @@
-//! The windows of a room: where the surroundings are seen through the box around a scene's large objects.
+//! The windows of a room: the parts of the box around a scene's large objects through which the surroundings are seen.
 
 use glam::DVec3;
 use rayfold_scene::{Object, Scene};
@@ -7,7 +7,8 @@ use super::shapes;
 use super::world::glass;
 use crate::camera::Ray;
 use crate::pictures::Panorama;
-use crate::sampling::guide::{Part, Windows};
+use crate::sampling::guide::{Part, Windows, half_area};
+use crate::sampling::sky_table::brightness;
 
 /// The number of panes along an edge of the box, and of rays through each.
 const SIDE: usize = 8;
@@ -29,88 +30,90 @@ pub(crate) fn windows(scene: &Scene) -> Option<Windows> {
     if scene.indirect_bounces() == 0 {
         return None;
     }
+    let walls = walls(scene);
+    let boxes = walls.iter().filter_map(|wall| wall.bounds());
+    let room = boxes.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])?;
+    let faces = brightness_of_faces(scene, &walls, room);
+    let area = |face: usize| Pane::new(face, 0, room).area();
+    let open = |face: usize| faces[face].iter().filter(|&&bright| bright > 0.0).count() as f64 * area(face);
+    let all: f64 = (0..6).map(|face| area(face) * (SIDE * SIDE) as f64).sum();
+    let brightest = faces.iter().flatten().fold(0.0, |most: f64, &bright| most.max(bright));
+    if (0..6).map(open).sum::<f64>() > MAX_OPEN * all || brightest == 0.0 {
+        return None;
+    }
+    let windows = faces.iter().enumerate();
+    let windows = windows.flat_map(|(face, panes)| joined(face, panes, BRIGHT * brightest, room));
+    Some(Windows::new(room, windows.collect()))
+}
+
+/// Returns the largest objects that are no meshes and no glass.
+fn walls(scene: &Scene) -> Vec<&Object> {
     let is_mesh = |object: &Object| match object {
         Object::Mesh(_) => true,
         Object::Instance(instance) => matches!(instance.object(), Object::Mesh(_)),
         _ => false,
     };
     let is_opaque = |object: &&Object| !is_mesh(object) && glass(object).is_none();
-    let size = |object: &Object| {
-        object.bounds().map_or(f64::INFINITY, |[low, high]| {
-            let DVec3 { x, y, z } = high - low;
-            x * y + y * z + z * x
-        })
-    };
+    let size = |object: &Object| object.bounds().map_or(f64::INFINITY, half_area);
     let mut objects: Vec<(f64, &Object)> =
         scene.objects.iter().filter(is_opaque).map(|object| (size(object), object)).collect();
     objects.sort_by(|a, b| b.0.total_cmp(&a.0));
     objects.truncate(MAX_OBJECTS);
-    let boxes = objects.iter().filter_map(|(_, object)| object.bounds());
-    let bounds = boxes.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])?;
+    objects.into_iter().map(|(_, object)| object).collect()
+}
+
+/// Returns, for each face of a room, how bright each of its panes is, as seen from places in the room.
+fn brightness_of_faces(scene: &Scene, walls: &[&Object], room: [DVec3; 2]) -> Vec<Vec<f64>> {
     let panorama = Panorama::of(scene);
-    let brightness = |origin: DVec3, through: DVec3| {
+    let along = |origin: DVec3, through: DVec3| {
         let direction = (through - origin).normalize();
         let ray = Ray { origin, direction };
-        let is_hidden = objects.iter().any(|(_, object)| shapes::distance(object, ray).is_some());
-        let color = match &panorama {
-            _ if is_hidden => DVec3::ZERO,
+        if walls.iter().any(|wall| shapes::distance(wall, ray).is_some()) {
+            return 0.0;
+        }
+        brightness(match &panorama {
             Some(panorama) => panorama.along(direction),
             None => scene.surroundings().along(direction),
-        };
-        color.abs().element_sum() / 3.0
+        })
     };
-    let sides = bounds[1] - bounds[0];
-    let (mut parts, mut open, mut all) = (vec![], 0.0, 0.0);
-    for face in 0..6 {
-        let pane = |pane: usize| Pane::new(face, pane, bounds);
-        let bright = |at: usize| {
-            let rays = (0..RAYS).map(|ray| {
-                let [a, b, c, d, e] = numbers(at * RAYS + ray);
-                brightness(bounds[0] + sides * DVec3::new(a, b, c), pane(at).point(d, e))
-            });
-            rays.sum::<f64>() / RAYS as f64
-        };
-        let brights: Vec<f64> = (0..SIDE * SIDE).map(bright).collect();
-        let area = pane(0).area();
-        all += area * (SIDE * SIDE) as f64;
-        open += area * brights.iter().filter(|&&bright| bright > 0.0).count() as f64;
-        parts.extend((0..SIDE * SIDE).map(|at| (brights[at], face, at)));
-    }
-    let brightest = parts.iter().fold(0.0, |most: f64, part| most.max(part.0));
-    if open > MAX_OPEN * all || brightest == 0.0 {
-        return None;
-    }
-    let is_window = |face: usize, at: usize| parts[face * SIDE * SIDE + at].0 > BRIGHT * brightest;
+    let of_pane = |face: usize, at: usize| {
+        let pane = Pane::new(face, at, room);
+        let rays = (0..RAYS).map(|ray| {
+            let [a, b, c, d, e] = numbers(at * RAYS + ray);
+            along(room[0] + (room[1] - room[0]) * DVec3::new(a, b, c), pane.point(d, e))
+        });
+        rays.sum::<f64>() / RAYS as f64
+    };
+    (0..6).map(|face| (0..SIDE * SIDE).map(|at| of_pane(face, at)).collect()).collect()
+}
+
+/// Joins the panes of a face that are brighter than `least` to rectangles.
+fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<Part> {
+    let mut taken = [false; SIDE * SIDE];
     let mut found = vec![];
-    for face in 0..6 {
-        let mut taken = [false; SIDE * SIDE];
-        for at in 0..SIDE * SIDE {
-            if taken[at] || !is_window(face, at) {
-                continue;
-            }
-            // The pane and those on its right, and the rows below that are windows as well.
-            let (column, row) = (at % SIDE, at / SIDE);
-            let is_free = |column: usize, row: usize| {
-                !taken[row * SIDE + column] && is_window(face, row * SIDE + column)
-            };
-            let right = (column..SIDE).take_while(|&column| is_free(column, row)).count();
-            let down = (row..SIDE)
-                .take_while(|&row| (column..column + right).all(|column| is_free(column, row)))
-                .count();
-            let mut sum = 0.0;
-            for at in (row..row + down)
-                .flat_map(|row| (column..column + right).map(move |column| row * SIDE + column))
-            {
-                taken[at] = true;
-                sum += parts[face * SIDE * SIDE + at].0;
-            }
-            let last = (row + down - 1) * SIDE + column + right - 1;
-            let (first, last) = (Pane::new(face, at, bounds), Pane::new(face, last, bounds));
-            let bounds = [first.point(0.0, 0.0), last.point(1.0, 1.0)];
-            found.push(Part { brightness: sum / (right * down) as f64, bounds });
+    for at in 0..SIDE * SIDE {
+        let is_free = |column: usize, row: usize| {
+            let at = row * SIDE + column;
+            !taken[at] && panes[at] > least
+        };
+        let (column, row) = (at % SIDE, at / SIDE);
+        let right = (column..SIDE).take_while(|&column| is_free(column, row)).count();
+        if right == 0 {
+            continue;
         }
+        let is_row_free = |row: &usize| (column..column + right).all(|column| is_free(column, *row));
+        let down = (row..SIDE).take_while(is_row_free).count();
+        let mut sum = 0.0;
+        for row in row..row + down {
+            let row = row * SIDE + column..row * SIDE + column + right;
+            taken[row.clone()].fill(true);
+            sum = panes[row].iter().fold(sum, |sum, bright| sum + bright);
+        }
+        let last = (row + down - 1) * SIDE + column + right - 1;
+        let bounds = [Pane::new(face, at, room).point(0.0, 0.0), Pane::new(face, last, room).point(1.0, 1.0)];
+        found.push(Part { brightness: sum / (right * down) as f64, bounds });
     }
-    Some(Windows::new(bounds, found))
+    found
 }
 
 /// A part of a face of a box.

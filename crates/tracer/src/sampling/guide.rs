@@ -1,11 +1,11 @@
-//! Where scattered rays find bright light: what glows, and the bright parts of a sky's picture.
+//! A guide of scattered rays to bright light: to what glows, to windows, and to the bright parts of a sky's picture.
 //!
 //! Chance alone rarely finds a small pane that glows, or the sun of a sky. So beside the ray that a surface scatters by the cosine,
 //! another one is aimed at these. Each of the two counts for the density that the language asks for, divided by the sum of the
 //! densities of both ways of drawing: the balance heuristic of Veach and Guibas (1995). The expectation stays as it is, and no ray
 //! counts for more than it would without a guide.
 //!
-//! What glows, and the windows of a room, are drawn by cones around boxes. The sky is drawn by a table of how much brighter than the
+//! Cones around boxes hold what glows, and the windows of a room. The sky is drawn by a table of how much brighter than the
 //! mean it is, since the cosine finds the rest as well (Karlík, Šik, Vévoda, Skřivan and Křivánek, 2019).
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -16,7 +16,7 @@ use rayfold_scene::{Object, Scene};
 
 use super::paths::scattered;
 use super::places::in_cone;
-use super::sky_table::SkyTable;
+use super::sky_table::{SkyTable, brightness};
 use crate::pictures::Panorama;
 
 /// The largest number of cones. Each is asked for at each hit.
@@ -31,7 +31,7 @@ pub(crate) struct Guide {
     cones: Vec<Ball>,
     sky: Option<(Arc<SkyTable>, Panorama)>,
     windows: Option<Arc<Windows>>,
-    /// What the bright parts of the sky add to the light of a surface, about.
+    /// The light that the bright parts of the sky give a surface, about.
     sky_weight: f64,
     /// The light that a surface gets from all around, about.
     around: f64,
@@ -141,9 +141,9 @@ pub(crate) struct Aims(Vec<Seen>);
 
 /// A ball as a surface sees it.
 struct Seen {
-    /// What it adds to the light of the surface, about.
+    /// The light that it gives the surface, about.
     weight: f64,
-    /// That, in a unit of solid angle.
+    /// Its weight in a unit of solid angle.
     flux: f64,
     /// Its direction.
     axis: DVec3,
@@ -197,13 +197,15 @@ fn density(direction: DVec3, normal: DVec3, face: DVec3) -> f64 {
         return 0.0;
     }
     let cosine = normal.dot(direction);
-    // What is drawn below a face is mirrored to above it.
+    // A direction that is drawn below a face is mirrored to above it.
     let mirrored = if normal == face { 0.0 } else { cosine - 2.0 * above * normal.dot(face) };
     (cosine.max(0.0) + mirrored.max(0.0)) * FRAC_1_PI
 }
 
-fn brightness(color: DVec3) -> f64 {
-    color.abs().element_sum() / 3.0
+/// Returns half of the area of a box.
+pub(crate) fn half_area([low, high]: [DVec3; 2]) -> f64 {
+    let DVec3 { x, y, z } = high - low;
+    x * y + y * z + z * x
 }
 
 /// A part of what is bright.
@@ -242,7 +244,7 @@ fn glowing(scene: &Scene) -> Vec<Part> {
 
 /// Returns balls around what is bright: around boxes that are about as long as wide.
 fn balls(mut parts: Vec<Part>) -> Vec<Ball> {
-    // Those that give most light are the ones to find.
+    // The ones to find are those that give most light.
     parts.sort_by(|a, b| b.power().total_cmp(&a.power()));
     parts.truncate(MAX_CONES);
     while parts.len() < MAX_CONES {
@@ -265,8 +267,7 @@ fn balls(mut parts: Vec<Part>) -> Vec<Ball> {
 impl Part {
     /// Returns about how much light the surface of its box gives off.
     fn power(&self) -> f64 {
-        let DVec3 { x, y, z } = self.bounds[1] - self.bounds[0];
-        self.brightness * (x * y + y * z + z * x)
+        self.brightness * half_area(self.bounds)
     }
 
     /// Returns how much light is at stake in the halves of a long box; 0 for boxes that are short.

@@ -11,7 +11,7 @@ pub(crate) mod guide;
 pub(crate) mod paths;
 pub(crate) mod places;
 pub(crate) mod rough;
-mod sky_table;
+pub(crate) mod sky_table;
 mod sobol;
 
 use rayfold_scene::{Camera, Light, Scene};

@@ -1,10 +1,11 @@
-//! How much brighter than its mean each part of a sky's picture is.
+//! A table of how much brighter than its mean each part of a sky's picture is.
 //!
 //! Cells are wider than the picture's pixels, so that all that is bright between pixels is in a cell that counts.
 
 use core::f64::consts::{PI, TAU};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
+use glam::DVec3;
 use rayfold_scene::assets::Picture;
 
 use super::cube_table::{CubeTable, cell};
@@ -27,6 +28,11 @@ pub(crate) struct SkyTable {
     pub(crate) directions: CubeTable,
 }
 
+/// Returns how bright a colour is: the mean of its channels.
+pub(crate) fn brightness(color: DVec3) -> f64 {
+    color.abs().element_sum() / 3.0
+}
+
 /// A picture, whether its levels are decoded, and its table.
 type Known = (Weak<Picture>, bool, Option<Arc<SkyTable>>);
 
@@ -44,7 +50,7 @@ impl SkyTable {
         {
             return table.clone();
         }
-        let table = Self::new(picture.width(), |place| panorama.level(place).abs().element_sum() / 3.0);
+        let table = Self::new(picture.width(), |place| brightness(panorama.level(place)));
         let table = table.map(Arc::new);
         *last = Some((Arc::downgrade(picture), is_linear, table.clone()));
         table
@@ -84,7 +90,7 @@ impl SkyTable {
             }
         }
         let excess = cells.iter().sum::<f64>();
-        // What rounding adds to a picture of one colour is nothing to look for.
+        // In a picture of one colour rounding alone adds some.
         (excess > 1e-3 * mean).then(|| Self { mean, excess, directions: CubeTable::new(side, &cells) })
     }
 }

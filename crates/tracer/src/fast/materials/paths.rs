@@ -16,7 +16,7 @@ pub(crate) struct Paths {
     glass: Vec<Option<(Glass, bool)>>,
     /// The microfacets of each object that is rough; empty if none is.
     rough: Vec<Option<Microfacets>>,
-    /// Where scattered rays find light.
+    /// The guide of scattered rays to bright light.
     guide: Option<Guide>,
     /// The origin and the scale of the kernels' coordinates in the scene.
     center: DVec3,

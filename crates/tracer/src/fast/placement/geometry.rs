@@ -47,7 +47,7 @@ pub(crate) struct Geometry {
     pub(crate) is_finished: bool,
     /// The microfacets of rough objects, where light goes round.
     pub(crate) energies: Energies,
-    /// Where scattered rays find light.
+    /// The guide of scattered rays to bright light.
     pub(crate) guide: Option<Guide>,
     /// Whether light goes round.
     pub(crate) goes_round: bool,
@@ -162,7 +162,7 @@ impl Geometry {
 }
 
 impl Geometry {
-    /// Adds the microfacets of rough objects.
+    /// Adds the microfacets of rough objects, and the guide of scattered rays.
     pub(crate) fn with_paths(self, energies: &Energies, guide: Option<Guide>) -> Self {
         Self { energies: energies.clone(), guide, ..self }
     }

@@ -20,7 +20,7 @@ const SLOPE_OF_PATHS: f64 = -0.5;
 /// ([`super::density`]), the fewer others there are that have less.
 pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 0.9];
 
-/// What the samples of a pixel show may reach into an even neighbour, and be missed by as many samples of that one. The error
+/// An edge in a pixel may reach into an even neighbour, and be missed by as many samples of that one. The error
 /// of the neighbour is then about the pixel's deviation divided by the number of samples to this power: the more samples, the
 /// smaller is the part that they miss, and the chance that they do.
 pub(super) const MISSED: f64 = 1.5;
@@ -29,7 +29,7 @@ pub(super) const MISSED: f64 = 1.5;
 pub(super) const CALM: f64 = 0.4;
 
 /// No samples that are clamped deviate by more levels.
-const MOST: f64 = 256.0;
+const MAX_DEVIATION: f64 = 256.0;
 
 /// A pixel is even if its samples deviate by less than so many times the error that is asked for.
 pub(super) const EVEN: f64 = 0.5;
@@ -80,12 +80,13 @@ impl SampleSchedule {
             limit * limit
         };
         let limits = spared.map(|spared| core::array::from_fn(|at| limit(spared, 1 << at)));
-        // Where light goes round neighbours always go on.
+        // Neighbours always go on if light goes round.
         let numbers = (0..u32::BITS - 2)
             .map(|at| SECOND << at)
             .take_while(|&count| count == SECOND || count < samples.most());
         let calm = numbers.map(|count| CALM * samples.error() * libm::pow(f64::from(count), MISSED));
-        let calm = calm.take_while(|&calm| calm < MOST && !is_unclamped).map(|calm| calm * calm).collect();
+        let calm =
+            calm.take_while(|&calm| calm < MAX_DEVIATION && !is_unclamped).map(|calm| calm * calm).collect();
         let even = limit(EVEN, 1);
         Self { samples, step, tone, is_unclamped, limits, calm, even, still: limit(VARYING, SECOND) }
     }
@@ -160,7 +161,7 @@ impl SampleSchedule {
         }
     }
 
-    /// How many numbers of the chain, from the second on, a pixel can reach ([`Verdict::reach`]).
+    /// Returns how many numbers of the chain, from the second on, a pixel can reach ([`Verdict::reach`]).
     pub(super) fn reaches(&self) -> usize {
         self.calm.len()
     }

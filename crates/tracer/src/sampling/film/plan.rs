@@ -359,7 +359,7 @@ impl Plan {
                 if ends {
                     return;
                 }
-                // Those that are unsettled, and those that make any neighbour go on, in three rows.
+                // The unsettled pixels, and those that make any neighbour go on, in three rows.
                 let mut open = [(); 3].map(|()| vec![0; stride]);
                 let mut active = open.clone();
                 let of =
