@@ -9,10 +9,11 @@ use crate::camera::Ray;
 use crate::pictures::Panorama;
 use crate::sampling::guide::{Part, Windows, half_area};
 use crate::sampling::sky_table::brightness;
+use crate::sampling::{coordinate, pixel_seed};
 
 /// The number of panes along an edge of the box, and of rays through each.
 const SIDE: usize = 8;
-const RAYS: usize = 16;
+const RAYS: u32 = 16;
 
 /// The largest number of objects that are looked at: the largest ones, which walls are.
 const MAX_OBJECTS: usize = 32;
@@ -78,11 +79,12 @@ fn brightness_of_faces(scene: &Scene, walls: &[&Object], room: [DVec3; 2]) -> Ve
     };
     let of_pane = |face: usize, at: usize| {
         let pane = Pane::new(face, at, room);
+        let seed = pixel_seed(at as u32, face as u32);
         let rays = (0..RAYS).map(|ray| {
-            let [a, b, c, d, e] = numbers(at * RAYS + ray);
+            let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|dimension| coordinate(seed, ray, dimension));
             along(room[0] + (room[1] - room[0]) * DVec3::new(a, b, c), pane.point(d, e))
         });
-        rays.sum::<f64>() / RAYS as f64
+        rays.sum::<f64>() / f64::from(RAYS)
     };
     (0..6).map(|face| (0..SIDE * SIDE).map(|at| of_pane(face, at)).collect()).collect()
 }
@@ -139,14 +141,4 @@ impl Pane {
     fn area(&self) -> f64 {
         self.across.length() * self.down.length()
     }
-}
-
-/// Returns five numbers from 0 to 1 that fill their cube evenly: multiples of powers of the root of x⁶ = x + 1 (Roberts, 2018).
-fn numbers(at: usize) -> [f64; 5] {
-    const ROOT: f64 = 1.134_724_138_401_519_5;
-    let mut step = 1.0;
-    [0; 5].map(|_| {
-        step /= ROOT;
-        (0.5 + at as f64 * step) % 1.0
-    })
 }
