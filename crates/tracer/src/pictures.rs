@@ -33,10 +33,14 @@ impl Panorama {
 
     /// Returns the light that comes from where a ray with this unit direction goes.
     pub(crate) fn along(&self, direction: DVec3) -> DVec3 {
-        let DVec3 { x, y, z } = self.turned(direction);
+        self.strength * self.level(Self::place(self.turned(direction)))
+    }
+
+    /// Returns the place on the picture of a direction in the picture's axes.
+    pub(crate) fn place(DVec3 { x, y, z }: DVec3) -> [f64; 2] {
         let u = 0.5 + libm::atan2(x, -z) / TAU;
         let v = libm::atan2(libm::hypot(x, z), y) / PI;
-        self.strength * self.level([u, v])
+        [u, v]
     }
 
     /// Returns the level at a place on the picture, without the factor of the sky.

@@ -43,6 +43,7 @@ pub use glass::reflected;
 pub use hit::{Hit, nearest, nearest_beyond};
 pub use line::Line;
 pub use real::{Real, Vector};
+pub(crate) use sky::along as sky_along;
 pub use shapes::{edge_clearance, sphere_clearance};
 
 /// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.

@@ -7,7 +7,7 @@ use rayfold_scene::assets::Picture;
 use rayfold_scene::{Scene, Sky, Tone};
 
 /// Returns the light along a unit direction. Pictures have an error of some roundoffs of `f64`.
-pub(super) fn along(scene: &Scene, direction: DVec3) -> DVec3 {
+pub(crate) fn along(scene: &Scene, direction: DVec3) -> DVec3 {
     if let Some((fog, _)) = scene.fog.get() {
         return fog;
     }

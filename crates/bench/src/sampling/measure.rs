@@ -28,6 +28,9 @@ pub struct Args {
     /// The scene of the report on speed instead: the time to an error, at the sizes of the targets
     #[arg(long)]
     pub(super) targets: bool,
+    /// Pictures in which light goes round instead: the time to an error beside Mitsuba, for light.md
+    #[arg(long, conflicts_with_all = ["targets", "small"])]
+    pub(super) light: bool,
     /// Measure small objects instead, for sampling-small.md
     #[arg(long)]
     pub(super) small: bool,

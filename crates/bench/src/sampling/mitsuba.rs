@@ -3,14 +3,17 @@
 //!
 //! Its kernels need a newer LLVM than some systems have: 19 does, 15 lacks an instruction. `DRJIT_LIBLLVM_PATH` says where.
 
+use std::f64::consts::PI;
+
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
+use rayfold_scene::model::Finish;
 use rayfold_scene::{Camera, Light, Material, Object, Scene};
-use rayfold_tracer::MAX_BOUNCES;
 use serde_json::{Value, json};
 
 use super::curve::{Curve, Point};
 use super::measure::ROUNDS;
+use crate::oracle;
 use crate::speed::mitsuba::ask;
 
 pub(super) const NAME: &str = "Mitsuba";
@@ -33,11 +36,14 @@ pub(super) struct Truth {
     pub(super) samples: u32,
     /// Half of the root mean square by which its halves differ.
     pub(super) error: f64,
+    /// Its mean level.
+    pub(super) level: f64,
 }
 
-/// Draws the scene with each of its samplers.
-pub(super) fn draw(work: &'static str, scene: &Scene) -> Result<Drawn> {
-    let answer = ask(PROGRAM, &describe(scene)?)?;
+/// Draws the scene with each of its samplers until one has an error of `enough` levels. With `pairs` its errors are from
+/// pairs of pictures, without from a truth with many samples.
+pub(super) fn draw(work: &'static str, scene: &Scene, enough: f64, pairs: bool) -> Result<Drawn> {
+    let answer = ask(PROGRAM, &describe(scene, enough, pairs)?)?;
     eprint!("{answer}");
     read(work, &answer).with_context(|| format!("the Mitsuba peer says {answer}"))
 }
@@ -45,9 +51,13 @@ pub(super) fn draw(work: &'static str, scene: &Scene) -> Result<Drawn> {
 fn read(work: &'static str, answer: &str) -> Option<Drawn> {
     let mut lines = answer.lines();
     let words: Vec<&str> = lines.next()?.split_whitespace().collect();
-    let [version, samples, error] = words[..] else { return None };
-    let version = version.to_owned();
-    let truth = Truth { version, samples: samples.parse().ok()?, error: error.parse().ok()? };
+    let [version, samples, error, level] = words[..] else { return None };
+    let truth = Truth {
+        version: version.to_owned(),
+        samples: samples.parse().ok()?,
+        error: error.parse().ok()?,
+        level: level.parse().ok()?,
+    };
     let mut curves: Vec<Curve> = vec![];
     for line in lines {
         let (sampler, numbers) = line.split_once(' ')?;
@@ -65,32 +75,83 @@ fn read(work: &'static str, answer: &str) -> Option<Drawn> {
 
 /// The scene in numbers: light, matter and camera as they are here. Pixels are square there; they are higher by a
 /// thousandth here.
-fn describe(scene: &Scene) -> Result<Value> {
-    let Camera::Pinhole(pinhole) = scene.camera else { anyhow::bail!("only a pinhole camera is translated") };
-    let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
-    ensure!((a + b).length() < 1e-9, "only a window around the gaze is translated");
-    let width = scene.screen.width();
-    // Samples in pixels' centres there, on the window's corners here.
-    let window = (b.x - a.x) * f64::from(width) / f64::from(width.max(2) - 1);
+pub(super) fn describe(scene: &Scene, enough: f64, pairs: bool) -> Result<Value> {
+    let seen = seen(scene)?;
+    let bounces = match scene.indirect.bounces() {
+        0 => scene.depth.bounces(),
+        // Light that lamps or suns sent has one more way to go in this language.
+        indirect => indirect - 1,
+    };
     let shapes: Result<Vec<Value>> =
-        scene.objects.iter().map(|object| shape(object, pinhole.eye())).collect();
+        scene.objects.iter().map(|object| shape(object, seen.eye)).collect();
     let suns: Result<Vec<Value>> = scene.lights.iter().map(sun).collect();
     Ok(json!({
         "shapes": shapes?,
         "suns": suns?,
-        "background": scene.one_color().context("a sky is not translated")?.to_array(),
-        "bounces": MAX_BOUNCES,
-        "size": [width, scene.screen.height()],
-        "eye": pinhole.eye().to_array(),
-        "target": (pinhole.eye() + pinhole.gaze()).to_array(),
-        "up": pinhole.up().to_array(),
-        "fov": 2.0 * (0.5 * window / pinhole.distance()).atan().to_degrees(),
+        "sky": sky(scene),
+        "bounces": bounces,
+        "sampled": scene.indirect.bounces() > 0,
+        "size": [scene.screen.width(), scene.screen.height()],
+        "eye": seen.eye.to_array(),
+        "target": seen.target.to_array(),
+        "up": seen.up.to_array(),
+        "fov": 2.0 * seen.half.atan().to_degrees(),
         "lens": scene.lens.radius(),
         "focus": scene.lens.distance().unwrap_or(1.0),
-        "truth": TRUTH,
+        "truth": if pairs { TRUTH / 16 } else { TRUTH },
+        "pairs": pairs,
         "rounds": ROUNDS,
-        "enough": 0.5,
+        "enough": enough,
     }))
+}
+
+/// A camera there.
+struct Seen {
+    eye: DVec3,
+    target: DVec3,
+    up: DVec3,
+    /// Half of what it sees from side to side, for each unit of distance.
+    half: f64,
+}
+
+fn seen(scene: &Scene) -> Result<Seen> {
+    let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
+    match scene.camera {
+        Camera::Look(look) => {
+            let half = (0.5 * look.field_of_view()).to_radians().tan() * width / height;
+            Ok(Seen { eye: look.eye(), target: look.target(), up: look.up(), half })
+        }
+        Camera::Pinhole(pinhole) => {
+            let (a, b) = (pinhole.lower_left(), pinhole.upper_right());
+            ensure!((a + b).length() < 1e-9, "only a window around the gaze is translated");
+            // Samples in pixels' centres there, on the window's corners here.
+            let window = (b.x - a.x) * width / (width.max(2.0) - 1.0);
+            let target = pinhole.eye() + pinhole.gaze();
+            Ok(Seen { eye: pinhole.eye(), target, up: pinhole.up(), half: 0.5 * window / pinhole.distance() })
+        }
+        _ => anyhow::bail!("only a pinhole camera is translated"),
+    }
+}
+
+/// A colour, or the colours of a panorama.
+fn sky(scene: &Scene) -> Value {
+    if let Some(color) = scene.one_color() {
+        return json!(color.to_array());
+    }
+    let (width, height) = if scene.sky_picture().is_some() { (1024, 512) } else { (8, 256) };
+    let rows: Vec<Vec<[f64; 3]>> = (0..height)
+        .map(|y| {
+            let latitude = PI * (0.5 - (f64::from(y) + 0.5) / f64::from(height));
+            let row = (0..width).map(|x| {
+                let longitude = 2.0 * PI * ((f64::from(x) + 0.5) / f64::from(width) - 0.5);
+                let (s, c) = longitude.sin_cos();
+                let along = DVec3::new(latitude.cos() * s, latitude.sin(), -latitude.cos() * c);
+                oracle::sky_along(scene, along).to_array()
+            });
+            row.collect()
+        })
+        .collect();
+    json!(rows)
 }
 
 fn sun(light: &Light) -> Result<Value> {
@@ -108,6 +169,10 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
         Object::Cuboid(o) => {
             json!({"kind": "cube", "low": o.min().to_array(), "high": o.max().to_array()})
         }
+        Object::Disc(o) => {
+            let normal = o.normal().normalize().to_array();
+            json!({"kind": "disk", "center": o.center().to_array(), "normal": normal, "radius": o.radius()})
+        }
         Object::Triangle(o) => {
             let [u, mut v, mut w] = *o.vertices();
             // The light that it emits leaves its front alone.
@@ -117,7 +182,7 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
             let corners = [u, v, w].map(|corner| corner.to_array());
             json!({"kind": "triangle", "corners": corners})
         }
-        _ => anyhow::bail!("only spheres, boxes and triangles are translated"),
+        _ => anyhow::bail!("only spheres, boxes, discs and triangles are translated"),
     };
     if let (Value::Object(description), Value::Object(shape)) = (&mut description, shape) {
         description.extend(shape);
@@ -126,9 +191,15 @@ fn shape(object: &Object, eye: DVec3) -> Result<Value> {
 }
 
 fn surface(material: &Material) -> Result<Value> {
-    ensure!(material.finish().is_none(), "highlights, patterns and glass are not translated");
-    let colors = [material.ambient(), material.diffuse(), material.mirror()].map(|color| color.to_array());
-    Ok(json!({"ambient": colors[0], "diffuse": colors[1], "mirror": colors[2]}))
+    let (glow, rough) = material.finish().map_or((DVec3::ZERO, None), |finish| (finish.glow, finish.rough));
+    let known = Finish { glow, rough, ..Finish::default() };
+    ensure!(
+        material.finish().is_none_or(|finish| *finish == known),
+        "highlights, patterns and glass are not translated"
+    );
+    let colors = [material.ambient(), material.diffuse(), material.mirror(), glow].map(|color| color.to_array());
+    let rough = rough.map_or(0.0, |rough| rough.alpha());
+    Ok(json!({"ambient": colors[0], "diffuse": colors[1], "mirror": colors[2], "glow": colors[3], "rough": rough}))
 }
 
 #[cfg(test)]
@@ -138,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_description_has_the_whole_scene() {
-        let description = describe(&table(512, 384).unwrap()).unwrap();
+        let description = describe(&table(512, 384).unwrap(), 0.5, false).unwrap();
         assert_eq!(description["shapes"].as_array().unwrap().len(), 26);
         assert_eq!(description["suns"].as_array().unwrap().len(), 2);
         assert!((description["fov"].as_f64().unwrap() - 57.72).abs() < 0.01);
@@ -147,13 +218,13 @@ mod tests {
     #[test]
     fn what_it_says_is_read() {
         let drawn =
-            read("edges", "3.9 64 0.5\nsobol 4 0.25 2 0.125\nother 4 1 1 0\nsobol 16 1 1 0\n").unwrap();
+            read("edges", "3.9 64 0.5 80\nsobol 4 0.25 2 0.125\nother 4 1 1 0\nsobol 16 1 1 0\n").unwrap();
         assert_eq!((drawn.truth.version.as_str(), drawn.truth.samples), ("3.9", 64));
         let ways: Vec<(&str, usize)> =
             drawn.curves.iter().map(|curve| (curve.way.as_str(), curve.points.len())).collect();
         assert_eq!(ways, [("Mitsuba, sobol", 2), ("Mitsuba, other", 1)]);
         let first = drawn.curves[0].points[0];
         assert_eq!((first.ms, first.rays, first.error, first.off), (250.0, 4.0, 2.0, 0.125));
-        assert!(read("edges", "3.9 64 0.5\nsobol 4\n").is_none());
+        assert!(read("edges", "3.9 64 0.5 80\nsobol 4\n").is_none());
     }
 }

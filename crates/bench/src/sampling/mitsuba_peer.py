@@ -1,7 +1,7 @@
 """Draws a scene by Mitsuba 3's path tracer, its LLVM variant, on one thread: times and errors of its samplers.
 
-Reads a JSON object from standard input; prints its version, the samples and the error of its own truth (half of what two
-halves of it differ by), and a line for each picture: sampler, samples a pixel, processor seconds (the least of several, compiled
+Reads a JSON object from standard input; prints its version, the samples the error of its own truth (half of what two
+halves of it differ by) and its mean level, and a line for each picture: sampler, samples a pixel, processor seconds (the least of several, compiled
 before, without what a picture of 8 x 6 takes), root mean square over pixels and channels in levels, share of pixels off by more
 than 4 levels.
 
@@ -32,6 +32,10 @@ COUNTS = [4, 16, 64, 256, 1024]
 # With more samples than this only the best samplers go on.
 ALL = 64
 GO_ON = 2
+
+
+# The middle of a panorama is at -z here.
+PANORAMA = Transform()
 
 
 class Matter(mitsuba.BSDF):
@@ -118,18 +122,33 @@ def light(sun):
     return {"type": "directional", "direction": direction, "irradiance": irradiance, **weight}
 
 
+def surface_of(numbers):
+    if numbers["rough"] > 0:
+        return {"type": "roughconductor", "distribution": "ggx", "alpha": numbers["rough"], "material": "none",
+                "specular_reflectance": rgb(numbers["mirror"])}
+    if request["sampled"]:
+        return {"type": "diffuse", "reflectance": rgb(numbers["diffuse"])}
+    return {"type": "matter", "diffuse": numbers["diffuse"], "mirror": numbers["mirror"]}
+
+
 def shape(numbers, folder):
-    surface = {
-        "bsdf": {"type": "matter", "diffuse": numbers["diffuse"], "mirror": numbers["mirror"]},
+    surface = {"bsdf": surface_of(numbers)}
+    if max(numbers["glow"]) > 0:
+        surface["emitter"] = {"type": "area", "radiance": rgb(numbers["glow"])}
+    elif max(numbers["ambient"]) > 0:
         # What is seen, not sampled as a light.
-        "emitter": {"type": "area", "radiance": rgb(numbers["ambient"]), "sampling_weight": 0.0},
-    }
+        surface["emitter"] = {"type": "area", "radiance": rgb(numbers["ambient"]), "sampling_weight": 0.0}
     if numbers["kind"] == "sphere":
         return {"type": "sphere", "center": numbers["center"], "radius": numbers["radius"], **surface}
     if numbers["kind"] == "cube":
         low, high = numpy.array(numbers["low"]), numpy.array(numbers["high"])
         place = Transform().translate(((low + high) / 2).tolist()).scale(((high - low) / 2).tolist())
         return {"type": "cube", "to_world": place, **surface}
+    if numbers["kind"] == "disk":
+        towards = (numpy.array(numbers["center"]) + numpy.array(numbers["normal"])).tolist()
+        aside = [1, 0, 0] if abs(numbers["normal"][1]) > 0.5 else [0, 1, 0]
+        place = Transform().look_at(origin=numbers["center"], target=towards, up=aside).scale(numbers["radius"])
+        return {"type": "disk", "to_world": place, **surface}
     handle, path = tempfile.mkstemp(".ply", dir=folder)
     with os.fdopen(handle, "w") as file:
         axes = "".join(f"property float {axis}\n" for axis in "xyz")
@@ -141,7 +160,13 @@ def shape(numbers, folder):
 
 
 request = json.load(sys.stdin)
-sky = {"type": "constant", "radiance": rgb(request["background"]), "sampling_weight": 0.0}
+# A light that is sampled where surfaces scatter all light.
+sky = {"sampling_weight": 1.0 if request["sampled"] else 0.0}
+if isinstance(request["sky"][0], list):
+    panorama = numpy.array(request["sky"], dtype=numpy.float32)
+    sky |= {"type": "envmap", "bitmap": mitsuba.Bitmap(panorama), "to_world": PANORAMA}
+else:
+    sky |= {"type": "constant", "radiance": rgb(request["sky"])}
 path = {"type": "path", "max_depth": request["bounces"] + 2, "rr_depth": 1000}
 with tempfile.TemporaryDirectory() as folder:
     suns = {f"sun{k}": light(sun) for k, sun in enumerate(request["suns"])}
@@ -201,7 +226,7 @@ def root_mean_square(errors):
 
 count, halves = drawn("multijitter", request["truth"] // 2, request["size"], [1000, 1001])
 truth = (halves[0][1] + halves[1][1]) / 2
-print(mitsuba.__version__, 2 * count, root_mean_square(halves[0][1] - halves[1][1]) / 2, flush=True)
+print(mitsuba.__version__, 2 * count, root_mean_square(halves[0][1] - halves[1][1]) / 2, truth.mean(), flush=True)
 
 seeds = range(request["rounds"] + 1)
 # What Python does for a picture, however small.
@@ -213,6 +238,8 @@ for count in COUNTS:
         taken, pictures = drawn(sampler, count, request["size"], seeds)
         seconds = least(pictures) - start[sampler]
         off = pictures[-1][1] - truth
+        if request["pairs"]:
+            off = (pictures[-1][1] - pictures[-2][1]) / math.sqrt(2)
         errors[sampler] = root_mean_square(off)
         share = (abs(off).max(axis=2) > 4).mean()
         print(sampler, taken, seconds, errors[sampler], share, flush=True)

@@ -5,6 +5,7 @@
 
 mod curve;
 mod drawn_at_random;
+mod light;
 mod measure;
 mod mitsuba;
 mod report;
@@ -37,6 +38,9 @@ const ERRORS: [(u32, f64); 6] = [(16, 4.0), (64, 2.0), (64, 1.0), (256, 1.0), (2
 pub fn run(args: &Args) -> Result<()> {
     if args.targets {
         return targets::run(args);
+    }
+    if args.light {
+        return light::run(args);
     }
     if args.small {
         return small::run(args);

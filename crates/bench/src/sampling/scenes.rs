@@ -1,7 +1,8 @@
 //! The pictures that sampling is measured on: each effect alone, and all together.
 
 use anyhow::{Context, Result};
-use rayfold_scene::{Limits, Scene, Script, parse};
+use rayfold_scene::assets::Library;
+use rayfold_scene::{Limits, Scene, Script, parse_with_files};
 
 /// A picture and its purpose.
 pub(super) struct Effect {
@@ -19,7 +20,12 @@ pub(super) struct Picture {
 impl Picture {
     /// The first frame of a script.
     pub(super) fn new(name: &str, text: &str) -> Result<Self> {
-        let parsed = parse(name, text.as_bytes(), &Limits::default());
+        Self::with_files(name, text, &Library::none())
+    }
+
+    /// The first frame of a script that names files.
+    pub(super) fn with_files(name: &str, text: &str, library: &Library) -> Result<Self> {
+        let parsed = parse_with_files(name, text.as_bytes(), &Limits::default(), library);
         let script = parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
         let scene = script.frame(0).context("no frame")?;
         Ok(Self { script, scene })

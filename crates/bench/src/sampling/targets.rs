@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         }
         // Nothing moves in a picture of Mitsuba's; edges alone are POV-Ray's.
         if has_soft_parts && !work.moves && speed::mitsuba::is_here() {
-            let drawn = mitsuba::draw(work.name, &picture.scene)?;
+            let drawn = mitsuba::draw(work.name, &picture.scene, 0.5, false)?;
             curves.extend(drawn.curves);
             truths.push((work.name, drawn.truth));
         }

@@ -174,7 +174,8 @@ impl Shader<'_> {
                 let uv = (numbers.direction)(path.hits);
                 let rays = match numbers.guide {
                     Some(guide) => {
-                        guide.scattered(uv, world.in_scene(start), (normal, face), &mut Aims::default())
+                        let drawn = (uv, scattered(uv, normal, face));
+                        guide.scattered(drawn, world.in_scene(start), (normal, face), &mut Aims::default())
                     }
                     None => [(scattered(uv, normal, face), 1.0), (DVec3::Y, 0.0)],
                 };

@@ -7,7 +7,8 @@ use super::shapes;
 use super::world::glass;
 use crate::camera::Ray;
 use crate::pictures::Panorama;
-use crate::sampling::guide::{Part, Windows, half_area};
+use crate::sampling::bright::{Bright, half_area};
+use crate::sampling::guide::Windows;
 use crate::sampling::sky_table::brightness;
 use crate::sampling::{coordinate, pixel_seed};
 
@@ -90,7 +91,7 @@ fn brightness_of_faces(scene: &Scene, walls: &[&Object], room: [DVec3; 2]) -> Ve
 }
 
 /// Joins the panes of a face that are brighter than `least` to rectangles.
-fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<Part> {
+fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<Bright> {
     let mut taken = [false; SIDE * SIDE];
     let mut found = vec![];
     for at in 0..SIDE * SIDE {
@@ -113,7 +114,7 @@ fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<Part>
         }
         let last = (row + down - 1) * SIDE + column + right - 1;
         let bounds = [Pane::new(face, at, room).point(0.0, 0.0), Pane::new(face, last, room).point(1.0, 1.0)];
-        found.push(Part { brightness: sum / (right * down) as f64, bounds });
+        found.extend(Bright::rectangle(sum / (right * down) as f64, bounds));
     }
     found
 }

@@ -4,45 +4,144 @@
 
 use glam::DVec3;
 
-/// A density of directions that is even in each cell of the cube.
+/// The parts along an edge of a cell that is divided.
+const PARTS: usize = 8;
+
+/// A density of directions that is even in each cell of the cube, and in each part of some cells.
 #[derive(Clone, Debug)]
 pub(crate) struct CubeTable {
     /// The cells along an edge of the cube.
     side: usize,
     /// The share of all cells before each cell, and 1.
     before: Vec<f64>,
+    /// The first cell to look at for numbers in each of equal parts from 0 to 1.
+    first: Vec<u32>,
+    /// For each cell, one more than its place in `parts_before`; 0 for cells that are not divided.
+    divided: Vec<u16>,
+    /// The same shares of the parts of each of them.
+    parts_before: Vec<[f64; PARTS * PARTS + 1]>,
+}
+
+/// Returns the sum of the weights before each one, of their total, and 1.
+fn shares_before(weights: &[f64]) -> impl Iterator<Item = f64> {
+    let total: f64 = weights.iter().sum();
+    let mut sum = 0.0;
+    weights.iter().map(move |&of| (sum / total, sum += of).0).chain([1.0])
+}
+
+/// Returns the interval of such sums in which a number from 0 to 1 is, and its place there. It is not before `first`.
+fn interval(before: &[f64], first: usize, u: f64) -> (usize, f64) {
+    let mut at = first;
+    while at + 2 < before.len() && before[at + 1] <= u {
+        at += 1;
+    }
+    let [from, to] = [before[at], before[at + 1]];
+    (at, if to > from { ((u - from) / (to - from)).clamp(0.0, 1.0) } else { 0.5 })
 }
 
 impl CubeTable {
-    /// Makes a table of cells with these weights, of which not all are 0.
-    pub(crate) fn new(side: usize, cells: &[f64]) -> Self {
-        let total: f64 = cells.iter().sum();
-        let mut sum = 0.0;
-        let mut before: Vec<f64> = cells.iter().map(|&of| (sum / total, sum += of).0).collect();
-        before.push(1.0);
-        Self { side, before }
+    /// Makes a table of cells with these weights, of which not all are 0. At most `divided` cells, those with the largest weights,
+    /// and those beside them are divided: `weight` gives the weight of a direction for each unit of solid angle.
+    pub(crate) fn new(
+        side: usize,
+        mut cells: Vec<f64>,
+        divided: usize,
+        weight: impl Fn(DVec3) -> f64,
+    ) -> Self {
+        let mut order: Vec<usize> = (0..cells.len()).filter(|&cell| cells[cell] > 0.0).collect();
+        order.sort_by(|&a, &b| cells[b].total_cmp(&cells[a]).then(a.cmp(&b)));
+        order.truncate(divided);
+        let mut of: Vec<u32> = order.into_iter().flat_map(|cell| around(side, cell)).collect();
+        of.sort_unstable();
+        of.dedup();
+        let mut parts_before = vec![];
+        of.retain(|&at| {
+            let weights = weights_of_parts(side, at as usize, &weight);
+            let sum: f64 = weights.iter().sum();
+            cells[at as usize] = sum;
+            if sum > 0.0 {
+                let mut before = shares_before(&weights);
+                parts_before.push(core::array::from_fn(|_| before.next().unwrap_or(1.0)));
+            }
+            sum > 0.0
+        });
+        let mut divided = vec![0; cells.len()];
+        for (place, &at) in (1..).zip(&of) {
+            divided[at as usize] = place;
+        }
+        let before: Vec<f64> = shares_before(&cells).collect();
+        let count = cells.len();
+        let start = |part: usize| {
+            let u = part as f64 / count as f64;
+            before.partition_point(|&before| before <= u).clamp(1, count) - 1
+        };
+        let first = (0..=count).map(|part| start(part) as u32).collect();
+        Self { side, before, first, divided, parts_before }
     }
 
     /// Returns the density of a direction.
     pub(crate) fn density(&self, direction: DVec3) -> f64 {
         let (cell, [s, t]) = cell(direction, self.side);
         let share = self.before[cell + 1] - self.before[cell];
-        share / solid_angle(self.side, [s, t])
+        if share == 0.0 {
+            return 0.0;
+        }
+        let solid = solid_angle(self.side, [s, t]);
+        let Some(of) = self.divided[cell].checked_sub(1) else { return share / solid };
+        let fine = self.side * PARTS;
+        let part = place(t, fine) % PARTS * PARTS + place(s, fine) % PARTS;
+        let before = &self.parts_before[usize::from(of)];
+        share * (before[part + 1] - before[part]) * (PARTS * PARTS) as f64 / solid
     }
 
     /// Returns the direction of two numbers from 0 to 1.
     pub(crate) fn direction(&self, u: f64, v: f64) -> DVec3 {
-        let cell = self.before.partition_point(|&before| before <= u).clamp(1, self.before.len() - 1) - 1;
-        let [from, to] = [self.before[cell], self.before[cell + 1]];
-        let u = if to > from { ((u - from) / (to - from)).clamp(0.0, 1.0) } else { 0.5 };
-        within(self.side, cell, [u, v]).0
+        let first = self.first[(u * (self.first.len() - 1) as f64) as usize];
+        let (cell, u) = interval(&self.before, first as usize, u);
+        let Some(of) = self.divided[cell].checked_sub(1) else {
+            return within(self.side, cell, [u, v]).0;
+        };
+        let before = &self.parts_before[usize::from(of)];
+        // The row first: the shares of a part's row are read one after another.
+        let row = (1..PARTS).take_while(|row| before[row * PARTS] <= u).count() * PARTS;
+        let (part, u) = interval(before, row, u);
+        let place = [(part % PARTS) as f64 + u, (part / PARTS) as f64 + v].map(|place| place / PARTS as f64);
+        within(self.side, cell, place).0
     }
+}
+
+/// Returns a cell and those that touch it.
+fn around(side: usize, cell: usize) -> impl Iterator<Item = u32> {
+    let beside = [-0.01, 0.5, 1.01];
+    let places = beside.into_iter().flat_map(move |v| beside.map(|u| [u, v]));
+    places.map(move |place| self::cell(within(side, cell, place).0, side).0 as u32)
+}
+
+/// Returns the weights of the parts of a cell: the mean of those of their corners and middles.
+fn weights_of_parts(side: usize, cell: usize, weight: &impl Fn(DVec3) -> f64) -> Vec<f64> {
+    let at = |column: f64, row: f64| within(side, cell, [column, row].map(|place| place / PARTS as f64));
+    let corners: Vec<f64> = (0..(PARTS + 1) * (PARTS + 1))
+        .map(|k| weight(at((k % (PARTS + 1)) as f64, (k / (PARTS + 1)) as f64).0))
+        .collect();
+    let of_part = |part: usize| {
+        let (column, row) = (part % PARTS, part / PARTS);
+        let (middle, solid) = at(column as f64 + 0.5, row as f64 + 0.5);
+        let first = row * (PARTS + 1) + column;
+        let corners = [0, 1, PARTS + 1, PARTS + 2].map(|corner| corners[first + corner]);
+        (corners.iter().sum::<f64>() + weight(middle)) * solid / (5 * PARTS * PARTS) as f64
+    };
+    (0..PARTS * PARTS).map(of_part).collect()
 }
 
 /// Returns the solid angle that a cell would have if all of it were like the place (s, t) on its face.
 fn solid_angle(side: usize, [s, t]: [f64; 2]) -> f64 {
     let stretch = 1.0 + s * s + t * t;
     4.0 / ((side * side) as f64 * stretch * stretch.sqrt())
+}
+
+/// Returns the number of the cell, of so many along an edge, of a place from -1 to 1.
+fn place(at: f64, side: usize) -> usize {
+    ((0.5 * (at + 1.0) * side as f64) as usize).min(side - 1)
 }
 
 /// Returns the cell of a direction, of so many along an edge, and its place on the face, from -1 to 1.
@@ -56,9 +155,8 @@ pub(crate) fn cell(direction: DVec3, side: usize) -> (usize, [f64; 2]) {
         (2, [direction.z, direction.x, direction.y])
     };
     let [s, t] = [s / major.abs(), t / major.abs()];
-    let index = |place: f64| ((0.5 * (place + 1.0) * side as f64) as usize).min(side - 1);
     let face = 2 * axis + usize::from(major < 0.0);
-    ((face * side + index(t)) * side + index(s), [s, t])
+    ((face * side + place(t, side)) * side + place(s, side), [s, t])
 }
 
 /// Returns the direction of a place in a cell, from (0, 0) to (1, 1), and the solid angle of the cell there.
@@ -84,8 +182,17 @@ mod tests {
     #[test]
     fn directions_are_drawn_with_their_density() {
         let weights: Vec<f64> = (0..54).map(|cell| [0.0, 1.0, 5.0, 0.5][cell % 4]).collect();
+        // Some cells are divided; their weights are those of their directions.
+        let bright = |direction: DVec3| 0.2 + direction.x.max(0.0);
+        let table = CubeTable::new(3, weights.clone(), 2, bright);
+        let weights: Vec<f64> = (0..54)
+            .map(|cell| match table.divided[cell] {
+                0 => weights[cell],
+                _ => weights_of_parts(3, cell, &bright).iter().sum(),
+            })
+            .collect();
         let total: f64 = weights.iter().sum();
-        let table = CubeTable::new(3, &weights);
+        assert!(table.parts_before.len() >= 9);
         let mut dice = fastrand::Rng::with_seed(3);
         let (count, mut solid, mut found) = (400_000, 0.0, [0.0; 54]);
         for _ in 0..count {

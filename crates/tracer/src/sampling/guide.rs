@@ -8,48 +8,42 @@
 //! Cones around boxes hold what glows, and the windows of a room. The sky is drawn by a table of how much brighter than the
 //! mean it is, since the cosine finds the rest as well (Karlík, Šik, Vévoda, Skřivan and Křivánek, 2019).
 
-use core::f64::consts::{FRAC_1_PI, PI, TAU};
+use core::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayfold_scene::{Object, Scene};
+use rayfold_scene::Scene;
 
-use super::paths::scattered;
-use super::places::in_cone;
+use super::bright::{Bright, Seen, brightest, see};
 use super::sky_table::{SkyTable, brightness};
 use crate::pictures::Panorama;
-
-/// The largest number of cones. Each is asked for at each hit.
-const MAX_CONES: usize = 16;
 
 /// The part of the light from all around that is weighed against what is bright. Walls often keep most of it out.
 const OPENNESS: f64 = 0.2;
 
+/// From so large a part of all light on, what is bright is always aimed at.
+const BRIGHT: f64 = 0.4;
+
 /// The bright light of a scene at a moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
-    cones: Vec<Ball>,
+    /// What glows, and then the windows.
+    lights: Vec<Bright>,
+    /// The number of those that glow.
+    glowing: usize,
+    /// The box in which windows are seen.
+    room: Option<[DVec3; 2]>,
     sky: Option<(Arc<SkyTable>, Panorama)>,
-    windows: Option<Arc<Windows>>,
     /// The light that the bright parts of the sky give a surface, about.
     sky_weight: f64,
     /// The light that a surface gets from all around, about.
     around: f64,
 }
 
-/// A ball around a part of what glows.
-#[derive(Clone, Copy, Debug)]
-struct Ball {
-    center: DVec3,
-    radius: f64,
-    brightness: f64,
-}
-
 impl Guide {
     /// Returns the guide of each moment of a scene; `None` if nothing is bright, or if no ray is scattered. `windows` are those of
     /// the first moment.
     pub(crate) fn of(moments: &[Scene], windows: Option<Windows>) -> Vec<Option<Self>> {
-        let windows = windows.map(Arc::new);
         let of = |scene: &Scene| {
             if scene.indirect_bounces() == 0 {
                 return None;
@@ -62,35 +56,43 @@ impl Guide {
                     (brightness(low.midpoint(high.unwrap_or(low))), 0.0)
                 }
             };
-            let cones = balls(glowing(scene));
-            let is_bright = sky.is_some() || windows.is_some() || !cones.is_empty();
-            let windows = windows.clone();
-            is_bright.then(|| Self { cones, sky, windows, sky_weight, around: PI * mean })
+            let glowing = glowing(scene);
+            let is_bright = sky.is_some() || windows.is_some() || !glowing.is_empty();
+            is_bright.then(|| Self::new(glowing, windows.as_ref(), (sky, sky_weight), PI * mean))
         };
         moments.iter().map(of).collect()
     }
 
+    fn new(
+        mut lights: Vec<Bright>,
+        windows: Option<&Windows>,
+        (sky, sky_weight): (Option<(Arc<SkyTable>, Panorama)>, f64),
+        around: f64,
+    ) -> Self {
+        let glowing = lights.len();
+        lights.extend(windows.iter().flat_map(|windows| &windows.lights));
+        Self { lights, glowing, room: windows.map(|windows| windows.room), sky, sky_weight, around }
+    }
+
     /// Returns the rays that a surface scatters at a place of the scene: their directions, and the factors with which they count. A
-    /// factor is 0 for a ray that is none. The other arguments are those of [`scattered`].
+    /// factor is 0 for a ray that is none. `by_cosine` is the direction that [`super::paths::scattered`] gives for the numbers and the
+    /// normals.
     pub(crate) fn scattered(
         &self,
-        (u, v): (f64, f64),
+        ((u, v), by_cosine): ((f64, f64), DVec3),
         place: DVec3,
         (normal, face): (DVec3, DVec3),
         aims: &mut Aims,
     ) -> [(DVec3, f64); 2] {
         let seen = &mut aims.0;
         seen.clear();
-        let mut lit = self.sky_weight;
-        let windows = self.windows.as_ref().filter(|windows| windows.contain(place));
-        let windows = windows.map_or(&[][..], |windows| &windows.balls);
-        for cone in self.cones.iter().chain(windows).filter_map(|ball| ball.seen(place, normal)) {
-            lit += cone.weight;
-            seen.push(cone);
+        let (glowing, windows) = self.lights.split_at(self.glowing);
+        let mut lit = self.sky_weight + see(glowing, 0, (place, normal), seen);
+        if self.room.is_some_and(|[low, high]| place.cmpge(low).all() && place.cmple(high).all()) {
+            lit += see(windows, self.glowing, (place, normal), seen);
         }
-        let by_cosine = scattered((u, v), normal, face);
         // The chance of a second ray. It is no number without light.
-        let share = lit / (lit + OPENNESS * self.around);
+        let share = (lit / (BRIGHT * (lit + OPENNESS * self.around))).min(1.0);
         if share.is_nan() || share == 0.0 {
             return [(by_cosine, 1.0), (by_cosine, 0.0)];
         }
@@ -114,14 +116,14 @@ impl Guide {
             Some((table, panorama)) => self.sky_weight * table.directions.density(panorama.turned(direction)),
             None => 0.0,
         };
-        seen.iter().fold(of_sky, |sum, seen| sum + seen.weighted_density(direction))
+        seen.iter().fold(of_sky, |sum, seen| sum + seen.weighted_density(direction, &self.lights))
     }
 
     /// Returns a direction towards light. `at` is below the sum of all weights.
     fn towards_light(&self, (mut at, v): (f64, f64), seen: &[Seen]) -> DVec3 {
         for seen in seen {
             if at < seen.weight {
-                return seen.within(at / seen.weight, v);
+                return seen.within(at / seen.weight, v, &self.lights);
             }
             at -= seen.weight;
         }
@@ -130,7 +132,7 @@ impl Guide {
                 panorama.turned_back(table.directions.direction((at / self.sky_weight).min(1.0), v))
             }
             // The sum was rounded.
-            None => seen.last().map_or(DVec3::Y, |seen| seen.within(1.0, v)),
+            None => seen.last().map_or(DVec3::Y, |seen| seen.within(1.0, v, &self.lights)),
         }
     }
 }
@@ -139,58 +141,7 @@ impl Guide {
 #[derive(Default)]
 pub(crate) struct Aims(Vec<Seen>);
 
-/// A ball as a surface sees it.
-struct Seen {
-    /// The light that it gives the surface, about.
-    weight: f64,
-    /// Its weight in a unit of solid angle.
-    flux: f64,
-    /// Its direction.
-    axis: DVec3,
-    /// 1 - cos of half the angle of a cone around it.
-    spread: f64,
-}
-
-impl Seen {
-    /// Returns the density of directions in the cone, times the weight.
-    #[inline(always)]
-    fn weighted_density(&self, direction: DVec3) -> f64 {
-        // Of narrow cones the cosine is no measure.
-        if (direction - self.axis).length_squared() <= 2.0 * self.spread { self.flux } else { 0.0 }
-    }
-
-    /// Returns a direction in the cone.
-    fn within(&self, u: f64, v: f64) -> DVec3 {
-        let (x, y) = self.axis.any_orthonormal_pair();
-        let DVec3 { x: across, y: down, z: along } = in_cone(u, v, self.spread);
-        (across * x + down * y + along * self.axis).normalize()
-    }
-}
-
-impl Ball {
-    /// Returns how a surface sees it; `None` for a ball that the surface is in or that is behind it.
-    #[inline(always)]
-    fn seen(&self, place: DVec3, normal: DVec3) -> Option<Seen> {
-        let towards = self.center - place;
-        let nearness = 1.0 / towards.length_squared().sqrt();
-        let axis = towards * nearness;
-        let sine = self.radius * nearness;
-        // No point of the ball is seen under a larger cosine.
-        let cosine = (axis.dot(normal) + sine).min(1.0);
-        // A little above 1 - √(1 - sine²), by its series.
-        let share = sine * sine;
-        let spread = share * (0.5 + share * (0.125 + share * (0.0625 + share * 0.3125)));
-        let flux = self.brightness * cosine;
-        (sine < 1.0 && share > 1e-30 && cosine > 0.0).then_some(Seen {
-            weight: flux * TAU * spread,
-            flux,
-            axis: axis + DVec3::ZERO,
-            spread,
-        })
-    }
-}
-
-/// Returns the density of the directions of [`scattered`].
+/// Returns the density of the directions of [`super::paths::scattered`].
 fn density(direction: DVec3, normal: DVec3, face: DVec3) -> f64 {
     let above = direction.dot(face);
     if above < 0.0 {
@@ -202,94 +153,38 @@ fn density(direction: DVec3, normal: DVec3, face: DVec3) -> f64 {
     (cosine.max(0.0) + mirrored.max(0.0)) * FRAC_1_PI
 }
 
-/// Returns half of the area of a box.
-pub(crate) fn half_area([low, high]: [DVec3; 2]) -> f64 {
-    let DVec3 { x, y, z } = high - low;
-    x * y + y * z + z * x
-}
-
-/// A part of what is bright.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Part {
-    pub(crate) brightness: f64,
-    /// The lowest and the highest corner of its box.
-    pub(crate) bounds: [DVec3; 2],
-}
-
 /// The windows of a room.
 #[derive(Debug)]
 pub(crate) struct Windows {
     room: [DVec3; 2],
-    balls: Vec<Ball>,
+    lights: Vec<Bright>,
 }
 
 impl Windows {
-    pub(crate) fn new(room: [DVec3; 2], windows: Vec<Part>) -> Self {
-        Self { room, balls: balls(windows) }
-    }
-
-    fn contain(&self, place: DVec3) -> bool {
-        place.cmpge(self.room[0]).all() && place.cmple(self.room[1]).all()
+    pub(crate) fn new(room: [DVec3; 2], windows: Vec<Bright>) -> Self {
+        Self { room, lights: brightest(windows) }
     }
 }
 
-/// Returns the parts of a scene that glow.
-fn glowing(scene: &Scene) -> Vec<Part> {
-    let glow = |object: &Object| object.material().finish().map_or(DVec3::ZERO, |finish| finish.glow);
-    let objects = scene.objects.iter().filter(|object| glow(object) != DVec3::ZERO);
-    let part =
-        |object: &Object| Some(Part { brightness: brightness(glow(object)), bounds: object.bounds()? });
-    objects.filter_map(part).collect()
-}
-
-/// Returns balls around what is bright: around boxes that are about as long as wide.
-fn balls(mut parts: Vec<Part>) -> Vec<Ball> {
-    // The ones to find are those that give most light.
-    parts.sort_by(|a, b| b.power().total_cmp(&a.power()));
-    parts.truncate(MAX_CONES);
-    while parts.len() < MAX_CONES {
-        let longest =
-            (0..parts.len()).max_by(|&a, &b| parts[a].elongation().total_cmp(&parts[b].elongation()));
-        let Some(at) = longest.filter(|&at| parts[at].elongation() > 0.0) else { break };
-        let Part { bounds: [low, high], .. } = parts[at];
-        let half = DVec3::AXES[(high - low).max_position()] * (high - low) / 2.0;
-        parts.push(Part { bounds: [low + half, high], ..parts[at] });
-        parts[at].bounds[1] = high - half;
+/// Returns what glows in a scene.
+fn glowing(scene: &Scene) -> Vec<Bright> {
+    let mut found = vec![];
+    for object in scene.objects.iter() {
+        let glow = object.material().finish().map_or(DVec3::ZERO, |finish| finish.glow);
+        if glow != DVec3::ZERO {
+            Bright::add_object(object, brightness(glow), &mut found);
+        }
     }
-    let ball = |Part { brightness, bounds: [low, high] }: Part| Ball {
-        center: low.midpoint(high),
-        radius: (high - low).length() / 2.0,
-        brightness,
-    };
-    parts.into_iter().map(ball).filter(|ball| ball.radius > 0.0 && ball.radius.is_finite()).collect()
-}
-
-impl Part {
-    /// Returns about how much light the surface of its box gives off.
-    fn power(&self) -> f64 {
-        self.brightness * half_area(self.bounds)
-    }
-
-    /// Returns how much light is at stake in the halves of a long box; 0 for boxes that are short.
-    fn elongation(&self) -> f64 {
-        let sides = self.bounds[1] - self.bounds[0];
-        let longest = sides.max_position();
-        let second =
-            (0..3).filter(|&axis| axis != longest).fold(0.0, |most: f64, axis| most.max(sides[axis]));
-        if sides[longest] > 2.0 * second { self.brightness * sides[longest] * sides[longest] } else { 0.0 }
-    }
+    brightest(found)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::paths::scattered;
     use super::*;
 
-    fn guide(cones: Vec<Part>, windows: Option<Windows>) -> Guide {
-        Guide { cones: balls(cones), sky: None, windows: windows.map(Arc::new), sky_weight: 0.0, around: 0.3 }
-    }
-
-    fn part(brightness: f64, low: [f64; 3], high: [f64; 3]) -> Part {
-        Part { brightness, bounds: [low.into(), high.into()] }
+    fn guide(lights: Vec<Bright>, windows: &Windows) -> Guide {
+        Guide::new(brightest(lights), Some(windows), (None, 0.0), 0.3)
     }
 
     /// The mean of the light of scattered rays from directions in which `is_lit`, and its standard error.
@@ -301,7 +196,10 @@ mod tests {
         for _ in 0..count {
             let numbers = (dice.f64(), dice.f64());
             let rays = match guide {
-                Some(guide) => guide.scattered(numbers, DVec3::ZERO, normals, &mut Aims::default()),
+                Some(guide) => {
+                    let drawn = (numbers, scattered(numbers, normal, face));
+                    guide.scattered(drawn, DVec3::ZERO, normals, &mut Aims::default())
+                }
                 None => [(scattered(numbers, normal, face), 1.0), (DVec3::Y, 0.0)],
             };
             for (direction, share) in rays.iter().filter(|ray| ray.1 > 0.0) {
@@ -318,13 +216,16 @@ mod tests {
 
     #[test]
     fn light_from_all_directions_is_that_of_the_cosine_with_less_noise() {
-        let tube = part(4.0, [-1.0, 1.0, -0.05], [1.0, 1.1, 0.05]);
-        let pane = part(2.0, [0.5, 0.3, 0.5], [0.9, 0.3, 0.9]);
-        let window = Windows::new(
-            [DVec3::splat(-2.0), DVec3::splat(2.0)],
-            vec![part(1.0, [-2.0, 0.5, 0.0], [-2.0, 1.0, 0.4])],
-        );
-        let guide = guide(vec![tube, pane], Some(window));
+        let mut lights = vec![];
+        let tube = Capsule::new(0.05, [DVec3::new(-1.0, 1.05, 0.0), DVec3::new(1.0, 1.05, 0.0)], Material::default());
+        Bright::add_object(&tube.unwrap().into(), 4.0, &mut lights);
+        let rectangle = |brightness, low: [f64; 3], high: [f64; 3]| {
+            Bright::rectangle(brightness, [low.into(), high.into()]).unwrap()
+        };
+        lights.push(rectangle(2.0, [0.5, 0.3, 0.5], [0.9, 0.3, 0.9]));
+        let window = vec![rectangle(1.0, [-2.0, 0.5, 0.0], [-2.0, 1.0, 0.4])];
+        let window = Windows::new([DVec3::splat(-2.0), DVec3::splat(2.0)], window);
+        let guide = guide(lights, &window);
         let bent = DVec3::new(0.6, 0.8, 0.0);
         for normals in [(DVec3::Y, DVec3::Y), (bent, DVec3::Y), (bent, bent)] {
             let is_in = |[low, high]: [[f64; 3]; 2]| {
@@ -355,16 +256,5 @@ mod tests {
                 (light(Some(&guide), normals, far), light(None, normals, far));
             assert!((by_guide - by_cosine).abs() <= 4.0 * (error * error + noise * noise).sqrt());
         }
-    }
-
-    #[test]
-    fn long_boxes_are_many_balls_and_the_brightest_are_kept() {
-        let tube = balls(vec![part(1.0, [0.0; 3], [8.0, 0.5, 0.5])]);
-        assert_eq!(tube.len(), 8);
-        assert!(tube.iter().all(|ball| ball.radius < 0.7));
-        let crowd = (1..100).map(|k| part(f64::from(k), [0.0; 3], [1.0; 3])).collect();
-        let crowd = balls(crowd);
-        assert_eq!(crowd.len(), MAX_CONES);
-        assert!(crowd.iter().all(|ball| ball.brightness > 83.0));
     }
 }

@@ -5,6 +5,7 @@
 //! alone: what stands still from frame to frame does not flicker. [`places`] maps numbers to places, [`film`] sums
 //! up and says where more rays are due. Nothing here knows how rays are traced.
 
+pub(crate) mod bright;
 pub(crate) mod cube_table;
 pub(crate) mod film;
 pub(crate) mod guide;

@@ -17,6 +17,9 @@ const COLUMNS: (u32, u32) = (256, 2048);
 /// The columns of the picture along an edge of a cell, in the middle of a face. At its corners a third.
 const COLUMNS_OF_CELL: u32 = 4;
 
+/// The largest number of cells that are divided.
+const DIVIDED: usize = 256;
+
 /// The bright parts of a picture, in the picture's own axes.
 #[derive(Debug)]
 pub(crate) struct SkyTable {
@@ -91,7 +94,14 @@ impl SkyTable {
         }
         let excess = cells.iter().sum::<f64>();
         // In a picture of one colour rounding alone adds some.
-        (excess > 1e-3 * mean).then(|| Self { mean, excess, directions: CubeTable::new(side, &cells) })
+        (excess > 1e-3 * mean).then(|| {
+            let weight = |direction: DVec3| {
+                let bright = brightness(Panorama::place(direction));
+                // A little everywhere: what is bright beside the corners of a part has some density.
+                (bright - mean).max(0.01 * (bright + mean))
+            };
+            Self { mean, excess, directions: CubeTable::new(side, cells, DIVIDED, weight) }
+        })
     }
 }
 

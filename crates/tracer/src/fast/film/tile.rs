@@ -565,8 +565,7 @@ fn go_on<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     if let Some(numbers) = paths
         && let Some(paths) = scene.beyond.as_ref().and_then(Extensions::paths)
     {
-        let lanes = Lanes::<S, E>::LEN;
-        return spawn_paths::<E>((scene, paths), numbers, (queue, hits), (lanes, is_painted), waiting);
+        return spawn_paths::<S, E>(simd, (scene, paths), numbers, (queue, hits), is_painted, waiting);
     }
     hits.leave_faces();
     if let Some(glass) = scene.beyond.as_ref().and_then(Extensions::glass) {

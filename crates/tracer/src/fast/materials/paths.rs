@@ -6,7 +6,6 @@ use rayfold_scene::{Glass, Object, Scene};
 use crate::fast::placement::geometry::Geometry;
 use crate::reference;
 use crate::sampling::guide::{Aims, Guide};
-use crate::sampling::paths::scattered;
 use crate::sampling::rough::Microfacets;
 
 /// The surfaces of a scene in which light goes round.
@@ -61,18 +60,18 @@ impl Paths {
     }
 
     /// Returns the rays that a surface scatters at a place: their directions, and the factors with which they count, of which 0
-    /// stands for no ray.
+    /// stands for no ray. `drawn` has the random numbers, and the direction that they give by the cosine.
     #[inline(always)]
     pub(crate) fn scattered(
         &self,
-        numbers: (f64, f64),
+        drawn: ((f64, f64), DVec3),
         place: DVec3,
         (normal, face): (DVec3, DVec3),
         aims: &mut Aims,
     ) -> [(DVec3, f64); 2] {
         match &self.guide {
-            Some(guide) => guide.scattered(numbers, place / self.scale + self.center, (normal, face), aims),
-            None => [(scattered(numbers, normal, face), 1.0), (DVec3::Y, 0.0)],
+            Some(guide) => guide.scattered(drawn, place / self.scale + self.center, (normal, face), aims),
+            None => [(drawn.1, 1.0), (DVec3::Y, 0.0)],
         }
     }
 

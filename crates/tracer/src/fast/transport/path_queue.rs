@@ -4,6 +4,8 @@
 //! the longest paths of which there are enough for a batch. So no queue holds more than some batches, however many rays there
 //! are. What a ray adds to a pixel is summed as that of the other queues is.
 
+use glam::DVec3;
+
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
 use crate::sampling::guide::Aims;
@@ -43,19 +45,40 @@ pub(crate) struct PathRay<E> {
     pub(crate) turns: Turns,
 }
 
+/// What is drawn at the hits of a batch: the numbers of the directions, and the directions by the cosine.
+pub(super) struct DrawnByCosine {
+    pub(super) numbers: [Box<Column<f64>>; 2],
+    pub(super) directions: [Box<Column<f64>>; 3],
+}
+
+impl DrawnByCosine {
+    fn new() -> Self {
+        let column = || Box::new(Column::new());
+        Self { numbers: [column(), column()], directions: [column(), column(), column()] }
+    }
+
+    /// Returns the numbers and the direction of a ray of the batch.
+    #[inline(always)]
+    pub(super) fn at(&self, lane: usize) -> ((f64, f64), DVec3) {
+        let [u, v] = self.numbers.each_ref().map(|column| column.0[lane]);
+        ((u, v), DVec3::from_array(self.directions.each_ref().map(|column| column.0[lane])))
+    }
+}
+
 /// The rays of the paths of a tile.
 pub(crate) struct PathQueues<E> {
     /// By hits before, and by [`Way`].
     waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
     /// The turns of the rays of the current batch.
-    turns: [Turns; ROOM],
+    pub(super) turns: [Turns; ROOM],
+    pub(super) drawn: DrawnByCosine,
     /// Room for where a surface sees light.
     pub(super) aims: Aims,
 }
 
 impl<E: Real> PathQueues<E> {
     pub(crate) fn new() -> Self {
-        Self { waiting: vec![], turns: [Turns::default(); ROOM], aims: Aims::default() }
+        Self { waiting: vec![], turns: [Turns::default(); ROOM], drawn: DrawnByCosine::new(), aims: Aims::default() }
     }
 
     /// Starts with a batch of camera rays.

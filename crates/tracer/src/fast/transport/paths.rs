@@ -1,18 +1,20 @@
 //! The rays that go on from hits in scenes in which light goes round: this step replaces `reflect` and `spawn_rays` there.
 //!
-//! It goes lane by lane, with the functions of the reference tracer.
+//! It goes lane by lane, with the functions of the reference tracer. The directions by the cosine alone are drawn in packets, by
+//! the same functions.
 
+use fearless_simd::{Simd, SimdBase};
 use glam::DVec3;
 use rayfold_scene::Glass;
 
-use crate::fast::arithmetic::real::Real;
+use crate::fast::arithmetic::real::{Lanes, Real};
 use crate::fast::build::prepare::Prepared;
 use crate::fast::materials::paths::Paths;
 use crate::fast::rays::bounce::{Column, Hits, RayBatch};
-use crate::fast::transport::path_queue::{PathRay, Turns};
+use crate::fast::transport::path_queue::{PathQueues, PathRay, Turns};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::reference::{Refraction, refract};
-use crate::sampling::paths::{Way, choice, direction_dimension};
+use crate::sampling::paths::{Way, choice, direction_dimension, scattered};
 use crate::sampling::{Dimensions, Points};
 
 /// The random numbers of a tile's paths.
@@ -39,16 +41,63 @@ impl PathNumbers<'_> {
     }
 }
 
+/// Draws the directions by the cosine at the hits of a batch, and the numbers that they are drawn with.
+#[inline(never)]
+fn draw_by_cosine<S: Simd, E: Real>(
+    simd: S,
+    numbers: PathNumbers,
+    (queue, hits): (&RayBatch<E>, &Hits<E>),
+    paths: &mut PathQueues<E>,
+) {
+    let drawn = &mut paths.drawn;
+    let mut end = 0;
+    for &(at, _) in &hits.packets {
+        end = at + Lanes::<S, E>::LEN;
+        for lane in at..end {
+            let turns = paths.turns[lane];
+            let pixel = queue.pixel.0[lane];
+            if hits.is_hit(lane) && pixel.widen() >= 0.0 && u32::from(turns.scattered) < numbers.indirect {
+                let of = numbers.direction(pixel.to_index(), turns.hits());
+                [drawn.numbers[0].0[lane], drawn.numbers[1].0[lane]] = [of.0, of.1];
+            }
+        }
+    }
+    let faces = if hits.face[0].is_empty() { None } else { Some(&hits.face) };
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let [u, v] = drawn.numbers.each_ref().map(|column| &column.0[..end]);
+            let [nx, ny, nz] = hits.normal.each_ref().map(|column| &column.0[..end]);
+            let [fx, fy, fz] = match faces {
+                Some(faces) => faces.each_ref().map(|column| &column[..end]),
+                None => [nx, ny, nz],
+            };
+            let [x, y, z] = drawn.directions.each_mut().map(|column| &mut column.0[..end]);
+            for k in 0..end {
+                let normal = DVec3::new(nx[k].widen(), ny[k].widen(), nz[k].widen());
+                let face = DVec3::new(fx[k].widen(), fy[k].widen(), fz[k].widen());
+                let direction = scattered((u[k], v[k]), normal, face);
+                (x[k], y[k], z[k]) = (direction.x, direction.y, direction.z);
+            }
+        },
+    );
+}
+
 /// Adds the rays that go on from the hits of a batch to the queues. `is_painted` says that the hits have their mirror
 /// coefficients, as in patterns and fog.
 #[inline(never)]
-pub(crate) fn spawn_paths<E: Real>(
+pub(crate) fn spawn_paths<S: Simd, E: Real>(
+    simd: S,
     (scene, paths): (&Prepared<E>, &Paths),
     numbers: PathNumbers,
     (queue, hits): (&RayBatch<E>, &Hits<E>),
-    (lanes, is_painted): (usize, bool),
+    is_painted: bool,
     waiting: &mut RayQueues<E>,
 ) {
+    let lanes = Lanes::<S, E>::LEN;
+    if numbers.indirect > 0 {
+        draw_by_cosine(simd, numbers, (queue, hits), &mut waiting.paths);
+    }
     let is_foggy = scene.fog().is_some();
     let has_faces = !hits.face[0].is_empty();
     let mut aims = core::mem::take(&mut waiting.paths.aims);
@@ -71,8 +120,9 @@ pub(crate) fn spawn_paths<E: Real>(
                 if is_foggy {
                     weight *= hits.clearness[lane].widen();
                 }
-                from.send(waiting, Way::Scattered, weight, -1.0, |from| {
-                    let rays = paths.scattered(from.numbers(), start, (normal, face), &mut aims);
+                let drawn = waiting.paths.drawn.at(lane);
+                from.send(waiting, Way::Scattered, weight, -1.0, |_| {
+                    let rays = paths.scattered(drawn, start, (normal, face), &mut aims);
                     rays.map(|(direction, share)| (start, direction, share))
                 });
             }

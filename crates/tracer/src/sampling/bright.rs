@@ -1,0 +1,417 @@
+//! What is bright, as surfaces see it: balls, flat panes, and boxes and rods in which there is something bright.
+
+use core::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+use rayfold_scene::{Object, Outline};
+
+use super::places::{in_cone, on_disc};
+
+/// The largest number of things that are bright. Each is asked for at each hit.
+const MAX_COUNT: usize = 16;
+
+/// Faces of a box that are smaller parts of the largest one are left out.
+const SMALL_FACE: f64 = 1.0 / 64.0;
+
+/// Something bright.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bright {
+    pub(crate) brightness: f64,
+    form: Form,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    Ball {
+        center: DVec3,
+        radius: f64,
+    },
+    Pane(Pane),
+    /// A box along the axes that holds it.
+    Within([DVec3; 2]),
+    Rod {
+        ends: [DVec3; 2],
+        radius: f64,
+    },
+}
+
+/// A flat part of a surface.
+#[derive(Clone, Copy, Debug)]
+struct Pane {
+    edge: Edge,
+    origin: DVec3,
+    /// Vectors in the plane: the radii of a disc, and the sides at the origin of others.
+    sides: [DVec3; 2],
+    /// Their products with a vector in the plane are its parts of the sides.
+    parts: [DVec3; 2],
+    normal: DVec3,
+    area: f64,
+    middle: DVec3,
+    /// The largest distance from the middle.
+    radius: f64,
+    /// Whether it is not seen from behind.
+    is_closed: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Edge {
+    Disc,
+    Rectangle,
+    Triangle,
+}
+
+impl Pane {
+    /// Returns `None` for a pane without area.
+    fn new(edge: Edge, origin: DVec3, sides: [DVec3; 2], is_closed: bool) -> Option<Self> {
+        let [a, b] = sides;
+        let across = a.cross(b);
+        let size = across.length_squared().sqrt();
+        let normal = across / size;
+        let parts = [b.cross(normal) / size, normal.cross(a) / size];
+        let (share, middle) = match edge {
+            Edge::Disc => (PI, origin),
+            Edge::Rectangle => (1.0, origin + (a + b) / 2.0),
+            Edge::Triangle => (0.5, origin + (a + b) / 3.0),
+        };
+        let radius = match edge {
+            Edge::Disc => a.length_squared().sqrt(),
+            _ => [origin, origin + a, origin + b, origin + a + b]
+                .map(|corner| (corner - middle).length_squared().sqrt())
+                .into_iter()
+                .fold(0.0, f64::max),
+        };
+        let is_one = parts.iter().all(|part| part.is_finite()) && radius.is_finite() && size > 0.0;
+        let area = share * size;
+        is_one.then_some(Self { edge, origin, sides, parts, normal, area, middle, radius, is_closed })
+    }
+
+    /// Returns whether a place in the plane, from the origin, is on the pane.
+    #[inline(always)]
+    fn holds(&self, place: DVec3) -> bool {
+        // A little more, for the rounding of directions to its edge.
+        const MORE: f64 = 1e-9;
+        let [s, t] = self.parts.map(|part| part.dot(place));
+        match self.edge {
+            Edge::Disc => s * s + t * t <= 1.0 + MORE,
+            Edge::Rectangle => (s - 0.5).abs().max((t - 0.5).abs()) <= 0.5 + MORE,
+            Edge::Triangle => s.min(t).min(1.0 - s - t) >= -MORE,
+        }
+    }
+
+    /// Returns the place of two numbers from 0 to 1, from the origin.
+    #[inline(always)]
+    fn point(&self, u: f64, v: f64) -> DVec3 {
+        let DVec2 { x, y } = match self.edge {
+            Edge::Disc => on_disc(u, v),
+            Edge::Triangle if u + v > 1.0 => DVec2::new(1.0 - u, 1.0 - v),
+            _ => DVec2::new(u, v),
+        };
+        self.sides[0] * x + self.sides[1] * y
+    }
+}
+
+impl Bright {
+    /// Adds what is bright of an object to `found`.
+    pub(crate) fn add_object(object: &Object, brightness: f64, found: &mut Vec<Self>) {
+        let mut add = |form| found.push(Self { brightness, form });
+        match object.outline() {
+            Some(Outline::Ball { center, radius }) => add(Form::Ball { center, radius }),
+            Some(Outline::Triangle([a, b, c])) => {
+                if let Some(pane) = Pane::new(Edge::Triangle, a, [b - a, c - a], false) {
+                    add(Form::Pane(pane));
+                }
+            }
+            Some(Outline::Disc { center, normal, radius }) => {
+                let (x, y) = (normal.normalize() + DVec3::ZERO).any_orthonormal_pair();
+                if let Some(pane) = Pane::new(Edge::Disc, center, [radius * x, radius * y], false) {
+                    add(Form::Pane(pane));
+                }
+            }
+            Some(Outline::Box { corners, radius: 0.0 }) => {
+                let faces = faces(corners);
+                let largest = faces.iter().fold(0.0, |most: f64, face| most.max(face.area));
+                faces
+                    .into_iter()
+                    .filter(|face| face.area > SMALL_FACE * largest)
+                    .for_each(|face| add(Form::Pane(face)));
+            }
+            Some(Outline::Rod { ends, radii: [a, b], .. }) => add(Form::Rod { ends, radius: a.max(b) }),
+            _ => {
+                if let Some(bounds) = object.bounds() {
+                    add(Form::Within(bounds));
+                }
+            }
+        }
+    }
+
+    /// Returns a rectangle of which two opposite corners are given. It is flat along an axis.
+    pub(crate) fn rectangle(brightness: f64, [low, high]: [DVec3; 2]) -> Option<Self> {
+        let sides = high - low;
+        let flat = sides.abs().min_position();
+        let [a, b] = [1, 2].map(|k| DVec3::AXES[(flat + k) % 3] * sides);
+        Some(Self { brightness, form: Form::Pane(Pane::new(Edge::Rectangle, low, [a, b], false)?) })
+    }
+
+    /// Returns about how much light it gives off.
+    fn power(&self) -> f64 {
+        self.brightness
+            * match self.form {
+                Form::Ball { radius, .. } => 2.0 * PI * radius * radius,
+                Form::Pane(pane) => pane.area,
+                Form::Within(bounds) => half_area(bounds),
+                Form::Rod { ends: [a, b], radius } => PI * radius * ((b - a).length() + radius),
+            }
+    }
+
+    /// Returns how much light is at stake in its halves, and these, if it is long; 0 for what is short.
+    fn halves(&self) -> (f64, [Self; 2]) {
+        let with = |forms: [Form; 2]| forms.map(|form| Self { form, ..*self });
+        let (length, width, halves) = match self.form {
+            Form::Ball { .. } | Form::Pane(_) => return (0.0, [*self; 2]),
+            Form::Within([low, high]) => {
+                let sides = high - low;
+                let longest = sides.max_position();
+                let second = (0..3)
+                    .filter(|&axis| axis != longest)
+                    .fold(0.0, |most: f64, axis| most.max(sides[axis]));
+                let half = DVec3::AXES[longest] * sides / 2.0;
+                (sides[longest], second, [[low, high - half], [low + half, high]].map(Form::Within))
+            }
+            Form::Rod { ends: [a, b], radius } => {
+                let middle = a.midpoint(b);
+                let rods = [[a, middle], [middle, b]].map(|ends| Form::Rod { ends, radius });
+                ((b - a).length() + 2.0 * radius, 2.0 * radius, rods)
+            }
+        };
+        let stake = if length > 2.0 * width { self.brightness * length * length } else { 0.0 };
+        (stake, with(halves))
+    }
+
+    /// Returns the ball around it.
+    fn around(&self) -> (DVec3, f64) {
+        match self.form {
+            Form::Ball { center, radius } => (center, radius),
+            Form::Pane(pane) => (pane.middle, pane.radius),
+            Form::Within([low, high]) => (low.midpoint(high), (high - low).length() / 2.0),
+            Form::Rod { ends: [a, b], radius } => (a.midpoint(b), (b - a).length() / 2.0 + radius),
+        }
+    }
+
+    /// Returns how a surface sees it; `None` for what the surface is in, or what is behind one of the two. `at` is its number.
+    #[inline(always)]
+    fn seen(&self, at: usize, place: DVec3, normal: DVec3) -> Option<Seen> {
+        match &self.form {
+            Form::Pane(pane) => {
+                let towards = pane.middle - place;
+                let distance = towards.length_squared().sqrt();
+                let height = pane.normal.dot(towards);
+                // No point of it is seen under a larger cosine.
+                let cosine = ((towards.dot(normal) + pane.radius) / distance).min(1.0);
+                // About its solid angle. A pane that is near fills a half of all.
+                let solid = TAU * pane.area * height.abs()
+                    / (TAU * distance * distance * distance + pane.area * height.abs());
+                let weight = self.brightness * cosine * solid;
+                let is_seen = weight > 0.0 && weight < f64::INFINITY && !(pane.is_closed && height > 0.0);
+                let view = View::Pane { origin: pane.origin - place, height };
+                is_seen.then_some(Seen { weight, scale: weight / pane.area, view, at })
+            }
+            _ => {
+                let (center, radius) = self.around();
+                let towards = center - place;
+                let nearness = 1.0 / towards.length_squared().sqrt();
+                let axis = towards * nearness;
+                let sine = radius * nearness;
+                let cosine = (axis.dot(normal) + sine).min(1.0);
+                // A little above 1 - √(1 - sine²), by its series.
+                let share = sine * sine;
+                let spread = share * (0.5 + share * (0.125 + share * (0.0625 + share * 0.3125)));
+                let scale = self.brightness * cosine;
+                let is_seen = sine < 1.0 && share > 1e-30 && cosine > 0.0;
+                let view = View::Cone { axis: axis + DVec3::ZERO, spread };
+                is_seen.then_some(Seen { weight: scale * TAU * spread, scale, view, at })
+            }
+        }
+    }
+}
+
+/// Returns the faces of a box, their normals outwards.
+fn faces([low, high]: [DVec3; 2]) -> Vec<Pane> {
+    let sides = high - low;
+    let face = |face: usize| {
+        let [a, b] = [1, 2].map(|k| DVec3::AXES[(face / 2 + k) % 3] * sides);
+        let (origin, sides) = if face.is_multiple_of(2) {
+            (low, [b, a])
+        } else {
+            (low + DVec3::AXES[face / 2] * sides, [a, b])
+        };
+        Pane::new(Edge::Rectangle, origin, sides, true)
+    };
+    (0..6).filter_map(face).collect()
+}
+
+/// Returns half of the area of a box.
+pub(crate) fn half_area([low, high]: [DVec3; 2]) -> f64 {
+    let DVec3 { x, y, z } = high - low;
+    x * y + y * z + z * x
+}
+
+/// Returns the brightest things of all, with long ones in parts.
+pub(crate) fn brightest(mut all: Vec<Bright>) -> Vec<Bright> {
+    // The ones to find are those that give most light.
+    all.sort_by(|a, b| b.power().total_cmp(&a.power()));
+    all.truncate(MAX_COUNT);
+    while all.len() < MAX_COUNT {
+        let longest = (0..all.len()).max_by(|&a, &b| all[a].halves().0.total_cmp(&all[b].halves().0));
+        let Some(at) = longest.filter(|&at| all[at].halves().0 > 0.0) else { break };
+        let (_, [first, second]) = all[at].halves();
+        all[at] = first;
+        all.push(second);
+    }
+    all.retain(|bright| {
+        let (_, radius) = bright.around();
+        radius > 0.0 && radius.is_finite()
+    });
+    all
+}
+
+/// How a surface sees something bright.
+pub(super) struct Seen {
+    /// The light that it gives the surface, about.
+    pub(super) weight: f64,
+    /// The weight in a unit of solid angle of a cone, and of area of a pane.
+    scale: f64,
+    view: View,
+    /// Its number among all.
+    at: usize,
+}
+
+enum View {
+    Cone {
+        axis: DVec3,
+        /// 1 - cos of half the angle of a cone around it.
+        spread: f64,
+    },
+    Pane {
+        /// The origin of the pane, from the place.
+        origin: DVec3,
+        /// The distance of the pane's plane from the place, along its normal.
+        height: f64,
+    },
+}
+
+/// Adds how a surface sees each of these, numbered from `first` on. Returns the sum of their weights.
+pub(super) fn see(
+    all: &[Bright],
+    first: usize,
+    (place, normal): (DVec3, DVec3),
+    seen: &mut Vec<Seen>,
+) -> f64 {
+    let mut sum = 0.0;
+    for (at, bright) in all.iter().enumerate() {
+        if let Some(one) = bright.seen(first + at, place, normal) {
+            sum += one.weight;
+            seen.push(one);
+        }
+    }
+    sum
+}
+
+impl Seen {
+    /// Returns the density of directions towards it, times the weight.
+    #[inline(always)]
+    pub(super) fn weighted_density(&self, direction: DVec3, all: &[Bright]) -> f64 {
+        match (&self.view, &all[self.at].form) {
+            (View::Pane { origin, height }, Form::Pane(pane)) => {
+                let across = pane.normal.dot(direction);
+                let distance = height / across;
+                if distance > 0.0 && pane.holds(direction * distance - origin) {
+                    self.scale * distance * distance / across.abs()
+                } else {
+                    0.0
+                }
+            }
+            (View::Cone { axis, spread }, _) => {
+                // Of narrow cones the cosine is no measure.
+                if (direction - axis).length_squared() <= 2.0 * spread { self.scale } else { 0.0 }
+            }
+            (View::Pane { .. }, _) => 0.0,
+        }
+    }
+
+    /// Returns a direction towards it.
+    pub(super) fn within(&self, u: f64, v: f64, all: &[Bright]) -> DVec3 {
+        match (&self.view, &all[self.at].form) {
+            (View::Pane { origin, .. }, Form::Pane(pane)) => (*origin + pane.point(u, v)).normalize(),
+            (View::Cone { axis, spread }, _) => {
+                let (x, y) = axis.any_orthonormal_pair();
+                let DVec3 { x: across, y: down, z: along } = in_cone(u, v, *spread);
+                (across * x + down * y + along * *axis).normalize()
+            }
+            (View::Pane { .. }, _) => DVec3::Y,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfold_scene::{Cuboid, Disc, Material, Sphere, Triangle};
+
+    use super::*;
+
+    /// The solid angle of what is bright, by directions towards it and by all directions.
+    fn solid_angles(all: &[Bright], place: DVec3, normal: DVec3) -> (f64, f64) {
+        let mut seen = vec![];
+        let weights = see(all, 0, (place, normal), &mut seen);
+        let mut dice = fastrand::Rng::with_seed(5);
+        let (mut by_aim, mut by_all) = (0.0, 0.0);
+        let count = 200_000;
+        for _ in 0..count {
+            let mut at = dice.f64() * weights;
+            let one = seen.iter().find(|one| (at < one.weight, at -= one.weight).0).unwrap();
+            let towards = one.within(dice.f64(), dice.f64(), all);
+            assert!((towards.length() - 1.0).abs() < 1e-14);
+            let density = |direction| seen.iter().map(|one| one.weighted_density(direction, all)).sum::<f64>() / weights;
+            assert!(density(towards) > 0.0);
+            by_aim += 1.0 / density(towards) / f64::from(count);
+            let any = in_cone(dice.f64(), dice.f64(), 2.0);
+            by_all += f64::from(u8::from(density(any) > 0.0)) * 4.0 * PI / f64::from(count);
+        }
+        (by_aim, by_all)
+    }
+
+    #[test]
+    fn directions_towards_what_is_bright_have_their_density() {
+        let material = Material::default();
+        let (a, b) = (DVec3::new(-0.3, 1.0, 0.2), DVec3::new(0.8, 1.4, 0.9));
+        let objects: [Object; 4] = [
+            Sphere::new(0.4, a, material).unwrap().into(),
+            Disc::new(0.6, a, DVec3::new(0.2, -0.7, 0.3), material).unwrap().into(),
+            Cuboid::new(a, b, material).unwrap().into(),
+            Triangle::new([a, b, DVec3::new(0.1, 0.9, -0.6)], material).unwrap().into(),
+        ];
+        for object in objects {
+            let mut all = vec![];
+            Bright::add_object(&object, 2.0, &mut all);
+            for place in [DVec3::ZERO, DVec3::new(1.5, 0.2, -0.4), DVec3::new(-1.0, 1.8, 0.5)] {
+                let towards = (a - place).normalize();
+                let (by_aim, by_all) = solid_angles(&all, place, towards);
+                assert!((by_aim / by_all - 1.0).abs() < 0.03, "{object:?} {place}: {by_aim} {by_all}");
+            }
+        }
+    }
+
+    #[test]
+    fn long_things_are_many_balls_and_the_brightest_are_kept() {
+        let rod = |ends| Bright { brightness: 1.0, form: Form::Rod { ends, radius: 0.25 } };
+        let tube = brightest(vec![rod([DVec3::ZERO, DVec3::new(5.0, 5.0, 0.0)])]);
+        assert_eq!(tube.len(), MAX_COUNT);
+        assert!(tube.iter().all(|bright| bright.around().1 < 0.5));
+        let crowd = (1..100).map(|k| Bright {
+            brightness: f64::from(k),
+            form: Form::Within([DVec3::ZERO, DVec3::ONE]),
+        });
+        let crowd = brightest(crowd.collect());
+        assert_eq!(crowd.len(), MAX_COUNT);
+        assert!(crowd.iter().all(|bright| bright.brightness > 83.0));
+    }
+}
