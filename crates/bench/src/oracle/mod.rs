@@ -43,8 +43,8 @@ pub use glass::reflected;
 pub use hit::{Hit, nearest, nearest_beyond};
 pub use line::Line;
 pub use real::{Real, Vector};
-pub(crate) use sky::along as sky_along;
 pub use shapes::{edge_clearance, sphere_clearance};
+pub(crate) use sky::along as sky_along;
 
 /// Returns the colour of a pixel, unclamped. `i` counts from the left, `j` from the bottom.
 pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {

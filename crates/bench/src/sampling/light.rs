@@ -64,8 +64,7 @@ const WORKS: [Work; 5] = [
         asked: 12.0,
         differs: "",
         script: || {
-            let mut text =
-                "Indirect 1\nSky .25 .25 .3 .8 .9 1\nLook 0 2.4 7 0 .4 0 40\n".to_owned() + FLOOR;
+            let mut text = "Indirect 1\nSky .25 .25 .3 .8 .9 1\nLook 0 2.4 7 0 .4 0 40\n".to_owned() + FLOOR;
             let mut dice = Rng::with_seed(30);
             for k in 0..30 {
                 let (x, z) = (f64::from(k % 6) - 2.5, f64::from(k / 6) - 2.0);
@@ -89,10 +88,10 @@ const WORKS: [Work; 5] = [
         differs: "Its rough mirrors lose what their microfacets hide, about a fiftieth. The floor is a class of Python that suns alone \
                   light.",
         script: || {
-            let mut text = "Depth 4\nSky .3 .35 .4 .6 .7 .8\nIlight .4 .4 .35 1 -1.7 -1\nIlight .25 .25 .3 -1 -1.2 -.4\n\
+            let mut text =
+                "Depth 4\nSky .3 .35 .4 .6 .7 .8\nIlight .4 .4 .35 1 -1.7 -1\nIlight .25 .25 .3 -1 -1.2 -.4\n\
                             Look 0 2.4 7 0 .4 0 40\nMaterial brushed mirror .8 .75 .7 rough .2\n"
-                .to_owned()
-                + FLOOR;
+                    .to_owned() + FLOOR;
             for k in 0..10 {
                 let (x, z) = (1.2 * f64::from(k % 5) - 2.4, 1.6 * f64::from(k / 5) - 1.0);
                 let _ = if k % 3 == 2 {
@@ -138,7 +137,8 @@ fn room(lights: &str, wall: &str) -> String {
         } else {
             let height = 0.3 + 0.7 * dice.f64();
             let (low, high) = ([x - size, 0.0, z - size], [x + size, height, z + size]);
-            let corners = [low, high].concat().iter().map(|c| format!("{c:.3}")).collect::<Vec<_>>().join(" ");
+            let corners =
+                [low, high].concat().iter().map(|c| format!("{c:.3}")).collect::<Vec<_>>().join(" ");
             writeln!(text, "Box {corners} 0 0 0 {colors}")
         };
     }
@@ -181,7 +181,7 @@ impl Work {
 fn limits(work: &Work) -> Vec<(&'static str, (u32, f64))> {
     let mut limits: Vec<_> = [4, 16, 64, 256, 1024].map(|count| ("uniform", (count, 0.0))).into();
     let least = work.errors.iter().copied().fold(f64::INFINITY, f64::min);
-    limits.extend([4.0, 2.0, 1.0, 0.7].map(|factor| ("adaptive", (4096, factor * least))));
+    limits.extend([4.0, 2.0, 1.0].map(|factor| ("adaptive", (4096, factor * least))));
     limits
 }
 
@@ -286,7 +286,8 @@ fn page(args: &Args, (width, height): (u32, u32), all: &[Compared]) -> Result<St
                     .filter_map(|curve| Some((curve.time(error)?, &curve.way)));
                 times.min_by(|a, b| a.0.total_cmp(&b.0))
             };
-            let number = |number: Option<f64>| number.map_or("–".to_owned(), |number| format!("{number:.0}"));
+            let number =
+                |number: Option<f64>| number.map_or("–".to_owned(), |number| format!("{number:.0}"));
             let (ours, theirs) = (of(false), of(true));
             let ratio = ours.zip(theirs).map_or("–".to_owned(), |(a, b)| format!("{:.1}", b.0 / a.0));
             writeln!(

@@ -82,8 +82,7 @@ pub(super) fn describe(scene: &Scene, enough: f64, pairs: bool) -> Result<Value>
         // Light that lamps or suns sent has one more way to go in this language.
         indirect => indirect - 1,
     };
-    let shapes: Result<Vec<Value>> =
-        scene.objects.iter().map(|object| shape(object, seen.eye)).collect();
+    let shapes: Result<Vec<Value>> = scene.objects.iter().map(|object| shape(object, seen.eye)).collect();
     let suns: Result<Vec<Value>> = scene.lights.iter().map(sun).collect();
     Ok(json!({
         "shapes": shapes?,
@@ -197,9 +196,12 @@ fn surface(material: &Material) -> Result<Value> {
         material.finish().is_none_or(|finish| *finish == known),
         "highlights, patterns and glass are not translated"
     );
-    let colors = [material.ambient(), material.diffuse(), material.mirror(), glow].map(|color| color.to_array());
+    let colors =
+        [material.ambient(), material.diffuse(), material.mirror(), glow].map(|color| color.to_array());
     let rough = rough.map_or(0.0, |rough| rough.alpha());
-    Ok(json!({"ambient": colors[0], "diffuse": colors[1], "mirror": colors[2], "glow": colors[3], "rough": rough}))
+    Ok(
+        json!({"ambient": colors[0], "diffuse": colors[1], "mirror": colors[2], "glow": colors[3], "rough": rough}),
+    )
 }
 
 #[cfg(test)]

@@ -171,9 +171,8 @@ impl Bright {
             Form::Within([low, high]) => {
                 let sides = high - low;
                 let longest = sides.max_position();
-                let second = (0..3)
-                    .filter(|&axis| axis != longest)
-                    .fold(0.0, |most: f64, axis| most.max(sides[axis]));
+                let second =
+                    (0..3).filter(|&axis| axis != longest).fold(0.0, |most: f64, axis| most.max(sides[axis]));
                 let half = DVec3::AXES[longest] * sides / 2.0;
                 (sides[longest], second, [[low, high - half], [low + half, high]].map(Form::Within))
             }
@@ -370,7 +369,9 @@ mod tests {
             let one = seen.iter().find(|one| (at < one.weight, at -= one.weight).0).unwrap();
             let towards = one.within(dice.f64(), dice.f64(), all);
             assert!((towards.length() - 1.0).abs() < 1e-14);
-            let density = |direction| seen.iter().map(|one| one.weighted_density(direction, all)).sum::<f64>() / weights;
+            let density = |direction| {
+                seen.iter().map(|one| one.weighted_density(direction, all)).sum::<f64>() / weights
+            };
             assert!(density(towards) > 0.0);
             by_aim += 1.0 / density(towards) / f64::from(count);
             let any = in_cone(dice.f64(), dice.f64(), 2.0);
@@ -406,10 +407,8 @@ mod tests {
         let tube = brightest(vec![rod([DVec3::ZERO, DVec3::new(5.0, 5.0, 0.0)])]);
         assert_eq!(tube.len(), MAX_COUNT);
         assert!(tube.iter().all(|bright| bright.around().1 < 0.5));
-        let crowd = (1..100).map(|k| Bright {
-            brightness: f64::from(k),
-            form: Form::Within([DVec3::ZERO, DVec3::ONE]),
-        });
+        let crowd = (1..100)
+            .map(|k| Bright { brightness: f64::from(k), form: Form::Within([DVec3::ZERO, DVec3::ONE]) });
         let crowd = brightest(crowd.collect());
         assert_eq!(crowd.len(), MAX_COUNT);
         assert!(crowd.iter().all(|bright| bright.brightness > 83.0));

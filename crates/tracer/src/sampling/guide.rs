@@ -217,7 +217,11 @@ mod tests {
     #[test]
     fn light_from_all_directions_is_that_of_the_cosine_with_less_noise() {
         let mut lights = vec![];
-        let tube = Capsule::new(0.05, [DVec3::new(-1.0, 1.05, 0.0), DVec3::new(1.0, 1.05, 0.0)], Material::default());
+        let tube = Capsule::new(
+            0.05,
+            [DVec3::new(-1.0, 1.05, 0.0), DVec3::new(1.0, 1.05, 0.0)],
+            Material::default(),
+        );
         Bright::add_object(&tube.unwrap().into(), 4.0, &mut lights);
         let rectangle = |brightness, low: [f64; 3], high: [f64; 3]| {
             Bright::rectangle(brightness, [low.into(), high.into()]).unwrap()

@@ -78,7 +78,12 @@ pub(crate) struct PathQueues<E> {
 
 impl<E: Real> PathQueues<E> {
     pub(crate) fn new() -> Self {
-        Self { waiting: vec![], turns: [Turns::default(); ROOM], drawn: DrawnByCosine::new(), aims: Aims::default() }
+        Self {
+            waiting: vec![],
+            turns: [Turns::default(); ROOM],
+            drawn: DrawnByCosine::new(),
+            aims: Aims::default(),
+        }
     }
 
     /// Starts with a batch of camera rays.

@@ -13,8 +13,13 @@ const SECOND: u32 = 4;
 /// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
-/// The slope for scenes in which light goes round: many dimensions, and little that is smooth.
-const SLOPE_OF_PATHS: f64 = -0.5;
+/// The same two for scenes in which light goes round, where all pixels vary. Light that comes in by chance has a slope of -0.5,
+/// and other light one of -0.7 (docs/decisions/tracer-paths.md).
+const SLOPE_OF_PATHS: f64 = -0.6;
+const SPARED_OF_PATHS: f64 = 1.4;
+
+/// In such scenes the neighbours of a pixel go on if its error is more than so many times that of a settled one.
+const LOUD: f64 = 2.0;
 
 /// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary
 /// ([`super::density`]), the fewer others there are that have less.
@@ -63,7 +68,8 @@ pub(super) struct SampleSchedule {
 pub(crate) struct Verdict {
     /// Whether it needs more of them.
     pub(crate) is_unsettled: bool,
-    /// Even neighbours with so many of the numbers of the chain, from the second on, go on.
+    /// Even neighbours with so many of the numbers of the chain, from the second on, go on. Where light goes round, 1 says that all
+    /// neighbours go on.
     pub(crate) reach: usize,
     /// Whether they differ.
     pub(crate) is_uneven: bool,
@@ -74,19 +80,19 @@ pub(crate) struct Verdict {
 impl SampleSchedule {
     pub(super) fn new(samples: Samples, tone: Tone, step: u32, is_unclamped: bool) -> Self {
         // Where light goes round all pixels vary.
-        let (slope, spared) = if is_unclamped { (SLOPE_OF_PATHS, [1.0; _]) } else { (SLOPE, SPARED) };
+        let (slope, spared) =
+            if is_unclamped { (SLOPE_OF_PATHS, [SPARED_OF_PATHS; _]) } else { (SLOPE, SPARED) };
         let limit = |spared: f64, count: u32| {
             let limit = spared * samples.error() * libm::pow(f64::from(count), -slope);
             limit * limit
         };
         let limits = spared.map(|spared| core::array::from_fn(|at| limit(spared, 1 << at)));
-        // Neighbours always go on if light goes round.
         let numbers = (0..u32::BITS - 2)
             .map(|at| SECOND << at)
             .take_while(|&count| count == SECOND || count < samples.most());
         let calm = numbers.map(|count| CALM * samples.error() * libm::pow(f64::from(count), MISSED));
-        let calm =
-            calm.take_while(|&calm| calm < MAX_DEVIATION && !is_unclamped).map(|calm| calm * calm).collect();
+        let calm = calm.take_while(|&calm| calm < MAX_DEVIATION && !is_unclamped);
+        let calm = calm.map(|calm| calm * calm).collect();
         let even = limit(EVEN, 1);
         Self { samples, step, tone, is_unclamped, limits, calm, even, still: limit(VARYING, SECOND) }
     }
@@ -153,9 +159,16 @@ impl SampleSchedule {
         let is_number = count == self.most() || count.is_power_of_two();
         let variance = if is_number { self.variance(pixel) } else { 0.0 };
         let is_asked = is_number && count < self.most();
+        // No number that is asked about is above the largest power of two.
+        let limit = self.limits[density][count.trailing_zeros() as usize % self.limits[density].len()];
+        let reach = if self.is_unclamped {
+            usize::from(is_asked && variance > LOUD * LOUD * limit)
+        } else {
+            self.calm.iter().take_while(|&&calm| variance > calm).count()
+        };
         Verdict {
-            is_unsettled: is_asked && variance > self.limits[density][count.trailing_zeros() as usize],
-            reach: self.calm.iter().take_while(|&&calm| variance > calm).count(),
+            is_unsettled: is_asked && variance > limit,
+            reach,
             is_uneven: variance > self.even,
             is_varying: is_asked && variance > self.still,
         }
@@ -163,7 +176,7 @@ impl SampleSchedule {
 
     /// Returns how many numbers of the chain, from the second on, a pixel can reach ([`Verdict::reach`]).
     pub(super) fn reaches(&self) -> usize {
-        self.calm.len()
+        self.calm.len() + usize::from(self.is_unclamped)
     }
 
     #[inline(always)]

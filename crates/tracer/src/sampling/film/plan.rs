@@ -8,8 +8,9 @@
 //! - if it lies between two neighbours with at least as many samples, on opposite sides, whose errors are too large,
 //! - if a neighbour is more than [`AHEAD`] numbers ahead on the chain.
 //!
-//! Beside a neighbour around which much varies ([`Density`]), or where light goes round, it goes on if the neighbour's error is too large, whatever its own
-//! samples show, and if the neighbour is more than one number ahead.
+//! Beside a neighbour around which much varies ([`Density`]) it goes on if the neighbour's error is too large, whatever its own
+//! samples show, and if the neighbour is more than one number ahead. Where light goes round it goes on if the neighbour's error is
+//! far too large, or if the neighbour is more than one number ahead.
 //!
 //! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
 //! bias of asking a pixel about itself shrinks to that of asking many.
@@ -346,7 +347,8 @@ impl Plan {
             let always: Vec<&Bits> =
                 self.floors.above(number).chain(self.density.iter().flat_map(|d| d.above(number))).collect();
             let (unsettled, uneven) = (&self.unsettled, &self.uneven);
-            let spreading = self.spreading.get(at.saturating_sub(1));
+            let reach = if self.chain.is_unclamped() { 0 } else { at.saturating_sub(1) };
+            let spreading = self.spreading.get(reach);
             let at_least = &self.at_least;
             let is_unclamped = self.chain.is_unclamped();
             let dense = self.density.as_ref().map(Density::dense);
@@ -372,10 +374,10 @@ impl Plan {
                     for (word, (open, active)) in open.iter_mut().zip(active).enumerate() {
                         let has = have.map_or(u64::MAX, |have| have.row(row)[word]);
                         *open = unsettled.row(row)[word] & has;
-                        let dense = if is_unclamped { u64::MAX } else { of(dense, row, word) };
-                        *active = of(spreading, row, word) & has
-                            | (*open | of(soon, row, word)) & dense
-                            | of(ahead, row, word);
+                        let dense = of(dense, row, word);
+                        let soon = of(soon, row, word);
+                        let close = if is_unclamped { soon } else { (*open | soon) & dense };
+                        *active = of(spreading, row, word) & has | close | of(ahead, row, word);
                     }
                 };
                 let top = band * BAND;
