@@ -382,13 +382,13 @@ mod tests {
 
     #[test]
     fn directions_towards_what_is_bright_have_their_density() {
-        let material = Material::default();
+        let material = Material::default;
         let (a, b) = (DVec3::new(-0.3, 1.0, 0.2), DVec3::new(0.8, 1.4, 0.9));
         let objects: [Object; 4] = [
-            Sphere::new(0.4, a, material).unwrap().into(),
-            Disc::new(0.6, a, DVec3::new(0.2, -0.7, 0.3), material).unwrap().into(),
-            Cuboid::new(a, b, material).unwrap().into(),
-            Triangle::new([a, b, DVec3::new(0.1, 0.9, -0.6)], material).unwrap().into(),
+            Sphere::new(0.4, a, material()).unwrap().into(),
+            Disc::new(0.6, a, DVec3::new(0.2, -0.7, 0.3), material()).unwrap().into(),
+            Cuboid::new([a, b], material()).unwrap().into(),
+            Triangle::new([a, b, DVec3::new(0.1, 0.9, -0.6)], material()).unwrap().into(),
         ];
         for object in objects {
             let mut all = vec![];

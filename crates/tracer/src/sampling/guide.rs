@@ -180,6 +180,8 @@ fn glowing(scene: &Scene) -> Vec<Bright> {
 
 #[cfg(test)]
 mod tests {
+    use rayfold_scene::{Capsule, Material};
+
     use super::super::paths::scattered;
     use super::*;
 
