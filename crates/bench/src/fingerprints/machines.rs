@@ -199,7 +199,7 @@ fn batches(random: u64) -> Result<Vec<Batch>> {
 }
 
 /// Returns a script with small pictures.
-fn in_small(text: &str) -> String {
+pub(crate) fn in_small(text: &str) -> String {
     let small =
         |line: &str| if line.trim_start().starts_with("Screen ") { SCREEN.into() } else { line.to_owned() };
     text.lines().map(small).collect::<Vec<_>>().join("\n") + "\n"

@@ -34,6 +34,7 @@ use rayon::prelude::*;
 
 use self::folders::find;
 use self::machines::Machine;
+pub(crate) use self::machines::in_small;
 use crate::backends::levels;
 
 /// The options of the subcommand.
