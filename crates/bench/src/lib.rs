@@ -28,6 +28,8 @@ pub mod models;
 pub mod needs;
 pub mod oracle;
 pub mod outlines;
+#[cfg(feature = "bucket")]
+pub mod packages;
 pub mod parsing;
 pub mod paths;
 #[cfg(feature = "bucket")]

@@ -6,7 +6,7 @@ use rayfold_bench::{
     paths, sampling, speed, studio,
 };
 #[cfg(feature = "bucket")]
-use rayfold_bench::{cold_start, explore, footprint, laptop, pipeline, scale, simulate};
+use rayfold_bench::{cold_start, explore, footprint, laptop, packages, pipeline, scale, simulate};
 
 #[derive(Debug, Parser)]
 #[command(name = "rayfold-bench", about = "Measures rayfold and writes the reports in docs/reports")]
@@ -30,6 +30,9 @@ enum Measurement {
     /// Size of the functions, and the time until a new process requests its first invocation
     #[cfg(feature = "bucket")]
     ColdStart(cold_start::Args),
+    /// The packages for Lambda, run by the local invoker: they make the GIF that this machine's functions make
+    #[cfg(feature = "bucket")]
+    Packages(packages::Args),
     /// Light that goes round: means of blocks of pixels, compared with independent paths of the oracle
     Paths(paths::Args),
     /// Time and memory to read and write the largest scripts
@@ -83,6 +86,8 @@ fn main() -> anyhow::Result<()> {
         Measurement::Laptop(args) => laptop::run(&args),
         #[cfg(feature = "bucket")]
         Measurement::ColdStart(args) => cold_start::run(&args),
+        #[cfg(feature = "bucket")]
+        Measurement::Packages(args) => packages::run(&args),
         Measurement::Paths(args) => paths::run(&args),
         Measurement::Parsing(args) => parsing::run(&args),
         #[cfg(feature = "bucket")]

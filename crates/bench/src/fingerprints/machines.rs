@@ -1,7 +1,7 @@
 //! Fingerprints of pictures that are the same on every kind of machine, compared with the table in the repository.
 //!
-//! The table has a line for the first and the middle script of each example, in a small size, and one for each hundred
-//! of random scripts. This machine draws them with each of its instruction sets. Other kinds of machines are emulated:
+//! The table has a line for the first and the middle script of each example, in a small size, one for each script of
+//! guided light ([`lights`]), and one for each hundred of random scripts. This machine draws them with each of its instruction sets. Other kinds of machines are emulated:
 //! a small program is compiled for them ([`Machine`]), and gets the same scripts.
 
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ use rayfold_tracer::{Level, RenderOptions, probe};
 use rayon::prelude::*;
 
 use super::folders::{is_script, sorted};
-use super::scripts;
+use super::{lights, scripts};
 use crate::backends::levels;
 use crate::needs::parts;
 
@@ -61,15 +61,15 @@ struct Batch {
     scripts: Vec<(String, String)>,
 }
 
-/// Draws the examples and this many random scripts, and compares them with the table. A slice is what takes other machines
-/// little time: the random scripts alone, and not on this machine.
+/// Draws the examples, guided light and this many random scripts, and compares them with the table. A slice is what takes
+/// other machines little time: all but the examples, and not on this machine.
 ///
 /// # Errors
 /// Fails if a picture differs, or if a script cannot be drawn.
 pub(super) fn check(scripts: u64, machines: &[Machine], is_slice: bool) -> Result<()> {
     let mut batches = batches(scripts)?;
     if is_slice {
-        batches.drain(..batches.len() - 1);
+        batches.drain(..batches.len() - 2);
     } else {
         for (name, level) in levels() {
             compare(name, &here(&batches, level)?, &batches)?;
@@ -174,7 +174,7 @@ fn here(batches: &[Batch], level: Level) -> Result<Fingerprints> {
     Ok(drawn.into_iter().flatten().collect())
 }
 
-/// Returns the examples, a batch a folder, and the random scripts.
+/// Returns the examples, a batch a folder, then guided light, and the random scripts.
 fn batches(random: u64) -> Result<Vec<Batch>> {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut batches: Vec<Batch> = Vec::new();
@@ -193,13 +193,16 @@ fn batches(random: u64) -> Result<Vec<Batch>> {
         batches.push(Batch { files, scripts: chosen.into_iter().map(small).collect::<Result<_>>()? });
     }
     let files = scripts::FILES.map(|(name, bytes)| (name.to_owned(), bytes.to_vec())).to_vec();
+    let named = |(name, text): (&str, &str)| (format!("light {name}.txt"), text.to_owned());
+    let of_light = [&files[..], &[(lights::SKY.to_owned(), lights::sky())]].concat();
+    batches.push(Batch { files: of_light, scripts: lights::SCRIPTS.map(named).to_vec() });
     let scripts = (1..=random).map(|seed| (random_name(seed), scripts::script(seed))).collect();
     batches.push(Batch { files, scripts });
     Ok(batches)
 }
 
 /// Returns a script with small pictures.
-fn in_small(text: &str) -> String {
+pub(crate) fn in_small(text: &str) -> String {
     let small =
         |line: &str| if line.trim_start().starts_with("Screen ") { SCREEN.into() } else { line.to_owned() };
     text.lines().map(small).collect::<Vec<_>>().join("\n") + "\n"

@@ -15,6 +15,7 @@
 //! alike (`machines`).
 
 mod folders;
+mod lights;
 mod machines;
 mod scripts;
 
@@ -34,6 +35,7 @@ use rayon::prelude::*;
 
 use self::folders::find;
 use self::machines::Machine;
+pub(crate) use self::machines::in_small;
 use crate::backends::levels;
 
 /// The options of the subcommand.
@@ -54,7 +56,7 @@ pub struct Args {
     /// With `--check`: draw them on another kind of machine, too, which is emulated
     #[arg(long, value_enum, requires = "check", value_name = "MACHINE")]
     on: Vec<Machine>,
-    /// With `--on`: draw the random scripts alone, and not on this machine, by a program that is sooner built
+    /// With `--on`: draw no examples, and not on this machine, by a program that is sooner built
     #[arg(long, requires = "on")]
     slice: bool,
     /// Write that table anew
