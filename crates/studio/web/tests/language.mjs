@@ -158,7 +158,10 @@ test("a material is dropped on an object, taken off again, and a group is used f
   const box = await page.locator(".viewport").boundingBox();
   const at = { targetPosition: { x: x - box.x, y: y - box.y } };
   const ball = async () => (await studio.saved()).split("\n").find((line) => line.endsWith("# ball"));
-  await page.locator(".sphere", { hasText: "red" }).dragTo(page.locator(".viewport"), at);
+  const red = page.locator(".sphere", { hasText: "red" });
+  // A tile that is still without its picture may move under the pointer.
+  await until(() => red.locator("img").evaluate((image) => image.complete && image.naturalWidth > 0));
+  await red.dragTo(page.locator(".viewport"), at);
   await until(async () => words(await ball()).at(-1) === "red");
   await page.getByText("Starter materials").click();
   await page.locator(".sphere", { hasText: "gold" }).dragTo(page.locator(".viewport"), at);
