@@ -58,7 +58,7 @@ test("what takes long is there at once, with few pixels, and then becomes the pi
   const shown = () => studio.page.locator("canvas").evaluate(({ width, dataset }) => ({ width, final: dataset.final }));
   const first = await shown();
   assert.equal(first.final, "false");
-  await until(async () => (await shown()).width > 300, 120_000);
+  await until(async () => (await shown()).width > 300);
   // It can be worked with meanwhile.
   await clickRow(studio.page, ".item.object");
   await studio.page.locator(".viewport").focus();
