@@ -42,32 +42,31 @@ fn the_page_does_in_a_browser_what_it_promises() {
         Ok(browser) => browser,
         Err(missing) => return note(&format!("the page was NOT TESTED: {missing}")),
     };
-    let firefox = found(&FIREFOX)
-        .map_err(|missing| note(&format!("the page was NOT TESTED in Firefox: {missing}")))
-        .ok();
     let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
-    let passes = |tests: &[&str], in_firefox: &str, site: &Path| {
-        let mut node = Command::new("node");
-        // Two at the same time, because each often waits.
-        node.args(["--test", "--test-reporter=spec", "--test-concurrency=2"]).args(tests).env("SITE", site);
-        if let Some(firefox) = &firefox {
-            node.arg(in_firefox).env("FIREFOX", firefox);
+    let mut node = Command::new("node");
+    // One after the other, because each uses all cores.
+    node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
+    let site = match site() {
+        Ok(site) => Some(node.args(OF_THE_SITE).env("SITE", site)).is_some(),
+        Err(missing) => {
+            note(&format!("the page without a server was NOT TESTED: {missing}"));
+            false
         }
-        if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
-            // The functions were built with this test. Without them `rayfold dev` builds them itself.
-            node.env("RAYFOLD_FUNCTIONS", beside);
-        }
-        node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", &browser).stdin(Stdio::null());
-        node.status().expect("node runs").success()
     };
-    // The page without a server is built while the other is tested.
-    let building = std::thread::spawn(site);
-    let mut all_pass = passes(&TESTS, IN_FIREFOX, Path::new(""));
-    match building.join().expect("the page without a server is built") {
-        Ok(site) => all_pass &= passes(&OF_THE_SITE, OF_THE_SITE_IN_FIREFOX, &site),
-        Err(missing) => note(&format!("the page without a server was NOT TESTED: {missing}")),
+    match found(&FIREFOX) {
+        Ok(firefox) => {
+            node.arg(IN_FIREFOX).env("FIREFOX", firefox);
+            node.args(site.then_some(OF_THE_SITE_IN_FIREFOX));
+        }
+        Err(missing) => note(&format!("the page was NOT TESTED in Firefox: {missing}")),
     }
-    assert!(all_pass, "see above which of the page's tests failed");
+    if let Some(beside) = program.parent().filter(|folder| folder.join("rayfold-render").is_file()) {
+        // The functions were built with this test. Without them `rayfold dev` builds them itself.
+        node.env("RAYFOLD_FUNCTIONS", beside);
+    }
+    node.current_dir(&web).env("RAYFOLD", program).env("CHROMIUM", browser).stdin(Stdio::null());
+    let status = node.status().expect("node runs");
+    assert!(status.success(), "see above which of the page's tests failed");
 }
 
 /// Prints a line; `eprintln!` would print nothing in a test that passes.
