@@ -9,10 +9,10 @@ use glam::DVec3;
 use rayfold_files::OutputFile;
 use rayfold_scene::Samples;
 use rayfold_scene::assets::{Library, MemoryFiles};
-use rayfold_tracer::RenderOptions;
+use rayfold_tracer::{RenderOptions, Sampler};
 
 use super::curve::{Curve, Point, gathered};
-use super::measure::{Args, measure, truth};
+use super::measure::{Args, means, measure};
 use super::mitsuba::{self, Truth};
 use super::scenes::Picture;
 use crate::speed;
@@ -179,7 +179,7 @@ impl Work {
 
 /// The most samples of a pixel, and an error, which also depends on the work.
 fn limits(work: &Work) -> Vec<(&'static str, (u32, f64))> {
-    let mut limits: Vec<_> = [4, 16, 64, 256, 1024].map(|count| ("uniform", (count, 0.0))).into();
+    let mut limits: Vec<_> = [4, 16, 64, 256].map(|count| ("uniform", (count, 0.0))).into();
     let least = work.errors.iter().copied().fold(f64::INFINITY, f64::min);
     limits.extend([4.0, 2.0, 1.0].map(|factor| ("adaptive", (4096, factor * least))));
     limits
@@ -204,7 +204,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let mut all = vec![];
     for work in WORKS.iter().filter(|work| args.only.as_ref().is_none_or(|only| only == work.name)) {
         let picture = work.picture(size)?;
-        let truth = truth(&picture, args.truth)?;
+        let others = RenderOptions { sampler: Sampler::Others(1), ..RenderOptions::default() };
+        let truth = means(&picture, Samples::new(args.truth, 0.0)?, &others)?;
         let shown = truth.means.iter().map(|mean| mean.clamp(DVec3::ZERO, DVec3::ONE).element_sum());
         let level = 255.0 * shown.sum::<f64>() / (3 * truth.means.len()) as f64;
         let mut curves: Vec<Curve> = vec![];
@@ -259,7 +260,7 @@ fn page(args: &Args, (width, height): (u32, u32), all: &[Compared]) -> Result<St
         "# Light that goes round: the time to an error\n\n\
          Written by `rayfold-bench sampling --light`. Pictures of {width} x {height}, one thread, processor time of preparing and \
          drawing, the shortest of three runs. An error is the root mean square over pixels and channels in levels (0..255) of the \
-         clamped means, from the same picture with {} samples in every pixel. *Adaptive* pictures are asked for `Samples 4096 e`. \
+         clamped means, from the same picture with {} other samples in every pixel. *Adaptive* pictures are asked for `Samples 4096 e`. \
          Times are read off the line between neighbouring measurements.\n\n",
         args.truth
     );

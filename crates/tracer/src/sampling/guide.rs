@@ -91,11 +91,11 @@ impl Guide {
         if self.room.is_some_and(|[low, high]| place.cmpge(low).all() && place.cmple(high).all()) {
             lit += see(windows, self.glowing, (place, normal), seen);
         }
-        // The chance of a second ray. It is no number without light.
-        let share = (lit / (BRIGHT * (lit + OPENNESS * self.around))).min(1.0);
-        if share.is_nan() || share == 0.0 {
+        if lit <= 0.0 {
             return [(by_cosine, 1.0), (by_cosine, 0.0)];
         }
+        // The chance of a second ray.
+        let share = (lit / (BRIGHT * (lit + OPENNESS * self.around))).min(1.0);
         let part = |direction: DVec3| {
             let asked = density(direction, normal, face);
             let aimed = share / lit * self.weighted_density(direction, seen);
@@ -214,6 +214,15 @@ mod tests {
         }
         let (mean, square) = (sum / f64::from(count), squares / f64::from(count));
         (mean, ((square - mean * mean) / f64::from(count)).sqrt())
+    }
+
+    #[test]
+    fn a_place_that_sees_nothing_bright_has_a_ray_by_the_cosine() {
+        let pane = Bright::rectangle(1.0, [DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, -1.0, 1.0)]);
+        let dark = Guide::new(vec![pane.unwrap()], None, (None, 0.0), 0.0);
+        let drawn = ((0.3, 0.4), DVec3::Y);
+        let rays = dark.scattered(drawn, DVec3::ZERO, (DVec3::Y, DVec3::Y), &mut Aims::default());
+        assert_eq!(rays.map(|ray| ray.1), [1.0, 0.0]);
     }
 
     #[test]
