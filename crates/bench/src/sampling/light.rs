@@ -248,7 +248,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let page = page(args, size, &all)?;
     if args.check {
-        print!("{page}");
+        eprint!("{page}");
         return Ok(());
     }
     OutputFile::write(args.output.join("light.md"), page, false)?;
