@@ -48,9 +48,6 @@ export const commands = computed(() => new Map(tables.value.map((table) => [tabl
 /** Receives pictures as bytes with their header. */
 type Show = (picture: ArrayBuffer) => void;
 
-/** The milliseconds after which a drag no longer waits for a picture. The server takes a longer pause for a rest. */
-const LATE = 60;
-
 let send: Send | null = null;
 let show: Show = () => {};
 /** The messages that came before the editor. */
@@ -59,12 +56,8 @@ let hearText: (tell: ServerMessage) => void = (tell) => void early.push(tell);
 let hovering = false;
 let nextHover: ClientMessage | null = null;
 let nextDrag: ClientMessage | null = null;
-/** The number of the last message about a drag until it is answered, else 0. */
+/** The number of the last message about a drag. */
 let dragged = 0;
-/** The number of the picture that shows that drag, and of the last picture that has come. */
-let [ordered, came] = [0, 0];
-/** The time of that message. */
-let draggedAt = 0;
 let gestures = 0;
 /** The number of messages sent. */
 let sent = 0;
@@ -91,15 +84,10 @@ export function ask(wish: ClientMessage): void {
   if (send?.(JSON.stringify(wish))) sent += 1;
 }
 
-/** Drags what is held. Until the picture of the last place has come, only the newest place is kept, so that none waits in line. */
+/** Drags what is held. While a reply is awaited, only the newest place is kept. */
 export function drag(wish: ClientMessage): void {
   nextDrag = wish;
-  dragOn(performance.now() - draggedAt > LATE);
-}
-
-/** Sends the place that was kept, if the last one is answered and shown. */
-function dragOn(isLate = false): void {
-  if (dragged === 0 && (came >= ordered || isLate)) dragNext();
+  if ((state.value?.asked ?? 0) >= dragged) dragNext();
 }
 
 /** Sends the place that was kept. */
@@ -108,7 +96,7 @@ export function dragNext(): void {
   nextDrag = null;
   if (!wish) return;
   ask(wish);
-  [dragged, draggedAt] = [sent, performance.now()];
+  dragged = sent;
 }
 
 /** Selects lines. The selection is shown at once, so that repeated keys continue from it. */
@@ -134,15 +122,11 @@ export function connect(): void {
     opened: () => {
       connected.value = true;
       hovering = false;
-      [sent, dragged, ordered, came] = [0, 0, 0, 0];
+      [sent, dragged] = [0, 0];
       dispatchEvent(new Event("resize"));
     },
     told: (text) => hear(JSON.parse(text) as ServerMessage),
-    shown: (picture) => {
-      came = new DataView(picture).getUint32(0, true);
-      dragOn();
-      show(picture);
-    },
+    shown: (picture) => show(picture),
     closed: () => {
       connected.value = false;
       playing.value = false;
@@ -170,8 +154,7 @@ function hear(tell: ServerMessage): void {
       // A state that was sent before the server received the last selection does not undo it.
       const isOld = chosen !== null && tell.state.asked < chosen.sent;
       state.value = isOld && chosen ? { ...tell.state, selection: chosen.lines } : tell.state;
-      if (dragged > 0 && tell.state.asked >= dragged) [dragged, ordered] = [0, tell.state.picture?.[0] ?? 0];
-      dragOn();
+      if (tell.state.asked >= dragged) dragNext();
     }
     if (tell.hovered !== undefined) {
       hovered.value = tell.hovered;

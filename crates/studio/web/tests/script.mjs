@@ -22,34 +22,30 @@ function written(count) {
   return Array.from({ length: count }, (_, n) => kinds[n % kinds.length](n));
 }
 
-test("lines typed at any speed are the lines of the file", { concurrency: true }, async (t) => {
-  // `LINES=200` types a long script. Slow typing is mostly waiting, so all are typed at the same time.
-  const speeds = [[0, Number(process.env.LINES ?? 24)], [5, 12], [30, 6], [60, 6]];
-  const typed = speeds.map(([delay, count]) =>
-    t.test(`${count} lines at ${delay} ms a key`, async (t) => {
-      const studio = await open(t, { text });
-      const { page } = studio;
-      const lines = written(count);
-      await page.locator(".cm-content").focus();
-      await page.keyboard.press("Control+a");
-      for (const [at, line] of lines.entries()) {
-        if (at > 0) await page.keyboard.press("Enter");
-        await page.keyboard.type(line, { delay });
-      }
-      await page.keyboard.press("Escape");
-      const expected = lines.join("\n");
-      await until(() => readFileSync(studio.path, "utf8") === expected);
-      // And undo brings back every byte. It takes long, so the shorter texts stand for all.
-      for (let undone = 0; count < 13 && readFileSync(studio.path, "utf8") !== text; undone += 1) {
-        assert.ok(undone < 600, "undo ends");
-        for (let at = 0; at < 25; at += 1) await page.keyboard.press("Control+z");
-        await studio.saved();
-      }
-      studio.check();
-    }),
-  );
-  await Promise.all(typed);
-});
+// `LINES=200` types a long script.
+for (const [delay, count] of [[0, Number(process.env.LINES ?? 24)], [5, 12], [30, 6], [60, 6]]) {
+  test(`${count} lines typed at ${delay} ms a key are the lines of the file`, async (t) => {
+    const studio = await open(t, { text });
+    const { page } = studio;
+    const lines = written(count);
+    await page.locator(".cm-content").focus();
+    await page.keyboard.press("Control+a");
+    for (const [at, line] of lines.entries()) {
+      if (at > 0) await page.keyboard.press("Enter");
+      await page.keyboard.type(line, { delay });
+    }
+    await page.keyboard.press("Escape");
+    const expected = lines.join("\n");
+    await until(() => readFileSync(studio.path, "utf8") === expected);
+    // And undo brings back every byte. It takes long, so the shorter texts stand for all.
+    for (let undone = 0; count < 13 && readFileSync(studio.path, "utf8") !== text; undone += 1) {
+      assert.ok(undone < 600, "undo ends");
+      for (let at = 0; at < 25; at += 1) await page.keyboard.press("Control+z");
+      await studio.saved();
+    }
+    studio.check();
+  });
+}
 
 test("Enter splits a line at once, and a paste of several lines stays several lines", async (t) => {
   const studio = await open(t, { text });

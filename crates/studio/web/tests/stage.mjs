@@ -16,36 +16,6 @@ export const program = process.env.RAYFOLD;
 export const scenes = join(import.meta.dirname, "../../../../scenes");
 const shots = process.env.SHOTS;
 
-/** Runs in a page before its own scripts: notes which of its messages the studio has answered. */
-const HEARD = `(() => {
-  const heard = (window.heard = { sent: 0, last: 0, answered: 0 });
-  const Socket = window.WebSocket;
-  window.WebSocket = class extends Socket {
-    constructor(...args) {
-      super(...args);
-      this.addEventListener("message", ({ data }) => {
-        const asked = typeof data === "string" && /"asked":(\\d+)/.exec(data);
-        if (asked) heard.answered = Number(asked[1]);
-      });
-    }
-    send(text) {
-      heard.sent += 1;
-      // That a picture was shown is not answered.
-      if (text !== '{"ask":"shown"}') heard.last = heard.sent;
-      super.send(text);
-    }
-  };
-})()`;
-
-/** The milliseconds between two looks at a page that is to be calm. */
-const LOOK = 25;
-
-/** The number of looks in a row at which a page must be calm that has to do more than to answer. */
-const LOOKS = 4;
-
-/** Longer than anything takes on a loaded machine, in milliseconds. */
-const PATIENCE = 240_000;
-
 let browser;
 before(async () => {
   browser = await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox"] });
@@ -53,7 +23,7 @@ before(async () => {
 after(() => browser?.close());
 
 /** A page of a server that serves a copy of `from`, or a new script with `text`. */
-export async function open(t, { from, text, name = "scene.txt", scheme = "light", size = [1400, 900], scale = 1, blank = text === "", args = [], env = {} }) {
+export async function open(t, { from, text, name = "scene.txt", scheme = "light", size = [1400, 900], blank = text === "", args = [], env = {} }) {
   const folder = mkdtempSync(join(tmpdir(), "rayfold-studio-"));
   const path = join(folder, name);
   if (from) cpSync(from, path, { recursive: true });
@@ -62,8 +32,7 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   const memory = mkdtempSync(join(tmpdir(), "rayfold-state-"));
   const { server, ended, said } = start(program, ["studio", path, "--no-open", ...args], { XDG_STATE_HOME: memory, ...env });
   const address = (await said((text) => text.includes("\n"))).trim();
-  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, colorScheme: scheme, deviceScaleFactor: scale });
-  await context.addInitScript(HEARD);
+  const context = await browser.newContext({ viewport: { width: size[0], height: size[1] }, colorScheme: scheme });
   const page = await context.newPage();
   const faults = [];
   const outside = [];
@@ -81,42 +50,27 @@ export async function open(t, { from, text, name = "scene.txt", scheme = "light"
   await page.goto(address);
   const drawn = () => page.locator("canvas").getAttribute("data-picture");
   if (!blank) await until(async () => (await drawn()) !== null);
-  /** Waits until the studio has answered all messages, and also the picture is final or the files are saved, for a while. */
-  const calm = async (...what) => {
-    const isCalm = await page.evaluate(
-      async ([look, looks, what, patience]) => {
-        const end = performance.now() + patience;
-        for (let row = 0; row < looks; ) {
-          if (performance.now() > end) return false;
-          await new Promise((resolve) => setTimeout(resolve, look));
-          const { picture, wanted, final } = document.querySelector("canvas").dataset;
-          const isDrawn = picture === wanted && final === "true";
-          const isSaved = document.querySelector(".saved").textContent === "saved";
-          const isAnswered = heard.answered >= heard.last;
-          row = isAnswered && (isDrawn || !what.includes("drawn")) && (isSaved || !what.includes("saved")) ? row + 1 : 0;
-        }
-        return true;
-      },
-      [LOOK, what.length > 0 ? LOOKS : 1, what, PATIENCE],
-    );
-    assert.ok(isCalm, `waited in vain for the page: ${what}`);
-  };
   /** Waits until the picture that was ordered last is on the canvas, as it will stay. */
-  const settled = () => calm("drawn");
-  const saved = async () => {
-    await calm("saved");
-    return readFileSync(path, "utf8");
+  const settled = async () => {
+    let last = "";
+    await until(async () => {
+      const now = await page.locator("canvas").evaluate(({ dataset }) => `${dataset.picture} ${dataset.wanted} ${dataset.final}`);
+      const same = now === last && /^(\d+) \1 true$/.test(now);
+      last = now;
+      await page.waitForTimeout(150);
+      return same;
+    });
   };
-  /** The script as the studio has it, saved or not yet. */
-  const script = async () => {
-    await calm();
-    return page.evaluate(async () => (await fetch("script.txt?0")).text());
+  const saved = async () => {
+    await page.waitForTimeout(300);
+    await page.getByText("saved", { exact: true }).waitFor({ timeout: 60_000 });
+    return readFileSync(path, "utf8");
   };
   const check = () => {
     assert.deepEqual(faults, [], "errors of the page");
     assert.deepEqual(outside, [], "nothing but its own server");
   };
-  return { page, context, path, folder, address, calm, settled, saved, script, check, ended, server };
+  return { page, context, path, folder, address, settled, saved, check, ended, server };
 }
 
 /** The start page of a program of its own, with its folder. */
@@ -136,8 +90,8 @@ export async function openStart(t, size = [1024, 768], scheme = "light") {
   return { page, folder, address };
 }
 
-/** Waits for a condition. */
-export async function until(condition, patience = PATIENCE) {
+/** Waits for a condition; its patience, in milliseconds, is longer than anything takes on a loaded machine. */
+export async function until(condition, patience = 60_000) {
   const end = Date.now() + patience;
   while (!(await condition())) {
     assert.ok(Date.now() < end, `waited in vain for ${condition}`);
@@ -240,17 +194,13 @@ export async function shot(page, name) {
   if (shots) await page.screenshot({ path: join(shots, `studio-${name}.png`) });
 }
 
-/**
- * What axe finds wrong with a page, in light and in dark colours; it is left in those that it was in. With the start of a name,
- * the page is shot in both.
- */
-export async function audit(page, name) {
+/** What axe finds wrong with a page, in light and in dark colours; it is left in those that it was in. */
+export async function audit(page) {
   await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
   const was = await page.evaluate(() => (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   const wrong = [];
   for (const colorScheme of [was === "dark" ? "light" : "dark", was]) {
     await page.emulateMedia({ colorScheme });
-    if (name !== undefined) await shot(page, `${name}${colorScheme}`);
     const found = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
     for (const { id, nodes } of found.violations) wrong.push(`${colorScheme}: ${id}: ${nodes.map((n) => n.html).slice(0, 3).join(" | ")}`);
   }

@@ -353,21 +353,27 @@ test("materials are given by their spheres, which the tracer draws anew when the
 });
 
 test("axe finds nothing in timeline, groups and materials, light and dark", async (t) => {
-  const studio = await open(t, { text: MATERIALS });
-  const { page } = studio;
-  await page.locator(".track .label").first().click();
-  await page.locator(".track.selected").first().waitFor();
-  await page.getByText("Starter materials").click();
-  await page.getByRole("button", { name: "chalk" }).scrollIntoViewIfNeeded();
-  await studio.settled();
-  assert.deepEqual(await audit(page, "timeline-"), []);
-  await page.getByRole("listbox").focus();
-  await page.keyboard.press("Home");
-  for (let down = 0; down < 2; down += 1) await page.keyboard.press("ArrowDown");
-  await page.getByRole("heading", { name: "glow Material" }).waitFor();
-  await studio.settled();
-  assert.deepEqual(await audit(page, "material-"), []);
-  studio.check();
+  for (const scheme of ["light", "dark"]) {
+    await t.test(scheme, async (t) => {
+      const studio = await open(t, { text: MATERIALS, scheme });
+      const { page } = studio;
+      await page.locator(".track .label").first().click();
+      await page.locator(".track.selected").first().waitFor();
+      await page.getByText("Starter materials").click();
+      await page.getByRole("button", { name: "chalk" }).scrollIntoViewIfNeeded();
+      await studio.settled();
+      await shot(page, `timeline-${scheme}`);
+      assert.deepEqual(await audit(page), []);
+      await page.getByRole("listbox").focus();
+      await page.keyboard.press("Home");
+      for (let down = 0; down < 2; down += 1) await page.keyboard.press("ArrowDown");
+      await page.getByRole("heading", { name: "glow Material" }).waitFor();
+      await studio.settled();
+      await shot(page, `material-${scheme}`);
+      assert.deepEqual(await audit(page), []);
+      studio.check();
+    });
+  }
 });
 
 test("a script of one frame says how it becomes an animation, and a folder that each script is a frame", async (t) => {

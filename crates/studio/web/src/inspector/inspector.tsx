@@ -418,7 +418,7 @@ function SunRows({ field, inspected, values }: SwatchProps): JSX.Element | null 
             value={now[name]}
             set={(to, under) => (to === null ? set(inspected.line, field.first, [], null) : put({ ...now, [name]: to }, under))}
           />
-          <NumberField label={`sun ${name}`} value={now[name]} set={(to, under) => put({ ...now, [name]: to }, under)} slid={() => set(inspected.line, field.first, [], null)} />
+          <NumberField label={`sun ${name}`} value={now[name]} set={(to) => put({ ...now, [name]: to }, null)} />
           <span class="unit">°</span>
         </p>
       ))}
@@ -469,13 +469,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
           set={(to, under) => set(inspected.line, at, to === null ? [] : [Number(to.toPrecision(4))], under)}
         />
       )}
-      <NumberField
-        label={label}
-        value={value === undefined ? undefined : round(value)}
-        range={field}
-        set={(asked, under) => set(inspected.line, at, [asked], under)}
-        slid={() => set(inspected.line, at, [], null)}
-      />
+      <NumberField label={label} value={value === undefined ? undefined : round(value)} set={(asked) => set(inspected.line, at, [asked], null)} />
       {field.names.length === 1 && unitOf(field.unit) && <span class="unit">{unitOf(field.unit)}</span>}
       {!field.fixed && <KeyButton inspected={inspected} numbers={[at]} label={label} />}
     </p>

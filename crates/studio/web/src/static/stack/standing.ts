@@ -1,5 +1,5 @@
 // The state of a run for the page, from its manifest (docs/manifest.md) and the listing of its scripts. Contains values only; the
-// program computes the same in `runs/updates.rs`; tests compare both on the cases in `runs/standing.json`.
+// program computes the same in `runs/updates.rs`.
 
 import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../../protocol";
 
