@@ -1,5 +1,30 @@
 //! Scripts for each way in which indirect light is guided: to what glows, to windows, and to the sun of a sky's picture.
-//! Random scripts have no rooms, and few of them have such light.
+//! Few random scripts have such light.
+
+/// Walls and the ceiling of a room with a window, of this material.
+macro_rules! walls {
+    ($material:literal) => {
+        concat!(
+            "Box -2 2.5 -2  2 2.6 2  ",
+            $material,
+            "\nBox -2 0 -2.1  2 2.5 -2  ",
+            $material,
+            "\nBox -2 0 2  2 2.5 2.1  ",
+            $material,
+            "\nBox 2 0 -2  2.1 2.5 2  ",
+            $material,
+            "\nBox -2.1 0 -2  -2 2.5 -.9  ",
+            $material,
+            "\nBox -2.1 0 -.1  -2 2.5 2  ",
+            $material,
+            "\nBox -2.1 0 -.9  -2 .9 -.1  ",
+            $material,
+            "\nBox -2.1 1.9 -.9  -2 2.5 -.1  ",
+            $material,
+            "\n"
+        )
+    };
+}
 
 /// Each script with its name.
 pub(super) const SCRIPTS: [(&str, &str); 4] =
@@ -36,7 +61,8 @@ Trace
 ";
 
 /// A room that the sun and the sky light through a window, and whose samples go where the noise is.
-const WINDOW: &str = "Screen 40 30
+const WINDOW: &str = concat!(
+    "Screen 40 30
 Tone srgb
 Samples 40 4
 Indirect 3
@@ -47,18 +73,13 @@ Material plaster  diffuse .8 .75 .7
 Material floor    diffuse .4 .25 .15   mirror .1 .1 .1   rough .4
 Material ball     mirror .7 .7 .7   rough .2
 Box -2 -.1 -2  2 0 2  floor
-Box -2 2.5 -2  2 2.6 2  plaster
-Box -2 0 -2.1  2 2.5 -2  plaster
-Box -2 0 2  2 2.5 2.1  plaster
-Box 2 0 -2  2.1 2.5 2  plaster
-Box -2.1 0 -2  -2 2.5 -.9  plaster
-Box -2.1 0 -.1  -2 2.5 2  plaster
-Box -2.1 0 -.9  -2 .9 -.1  plaster
-Box -2.1 1.9 -.9  -2 2.5 -.1  plaster
-Sphere .4  -.5 .4 -.8  ball
+",
+    walls!("plaster"),
+    "Sphere .4  -.5 .4 -.8  ball
 Cylinder .3  .6 0 -1  .6 .8 -1  plaster
 Trace
-";
+"
+);
 
 /// Surfaces below the sun of a picture.
 const SUN: &str = "Screen 40 30
@@ -78,7 +99,8 @@ Trace
 ";
 
 /// A room with a lamp and a window, through which the sun of a picture is seen.
-const ALL: &str = "Screen 40 30
+const ALL: &str = concat!(
+    "Screen 40 30
 Tone srgb
 Samples 30 3
 Indirect 4
@@ -90,22 +112,17 @@ Material gold   diffuse .2 .15 .05   mirror .6 .5 .2   rough .25
 Material lamp   glow 5 4 2
 Material clear  glass 1 .9 .9 1.5
 Box -2 -.1 -2  2 0 2  wall
-Box -2 2.5 -2  2 2.6 2  wall
-Box -2 0 -2.1  2 2.5 -2  wall
-Box -2 0 2  2 2.5 2.1  wall
-Box 2 0 -2  2.1 2.5 2  wall
-Box -2.1 0 -2  -2 2.5 -.9  wall
-Box -2.1 0 -.1  -2 2.5 2  wall
-Box -2.1 0 -.9  -2 .9 -.1  wall
-Box -2.1 1.9 -.9  -2 2.5 -.1  wall
-Group sign
+",
+    walls!("wall"),
+    "Group sign
 Text \"8i\" .5 .05  lamp centre
 End
 Use sign  -.8 1.3 -1.5
 Mesh \"model.obj\" gold
 Sphere .3  .8 .3 -.6  clear
 Trace
-";
+"
+);
 
 /// Returns the picture of a sky, in Radiance's format: dark but for one pixel.
 pub(super) fn sky() -> Vec<u8> {

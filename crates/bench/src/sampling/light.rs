@@ -24,7 +24,7 @@ struct Work {
     /// The errors in levels at which times are compared, and how many times Mitsuba's speed is asked for.
     errors: &'static [f64],
     asked: f64,
-    /// What Mitsuba draws in another way.
+    /// Differences of Mitsuba's picture.
     differs: &'static str,
     script: fn() -> String,
 }

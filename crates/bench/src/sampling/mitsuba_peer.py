@@ -34,10 +34,6 @@ ALL = 64
 GO_ON = 2
 
 
-# The middle of a panorama is at -z here.
-PANORAMA = Transform()
-
-
 class Matter(mitsuba.BSDF):
     """Scatters what lights send, on the side that is seen, and goes on as a mirror does."""
 
@@ -164,7 +160,9 @@ request = json.load(sys.stdin)
 sky = {"sampling_weight": 1.0 if request["sampled"] else 0.0}
 if isinstance(request["sky"][0], list):
     panorama = numpy.array(request["sky"], dtype=numpy.float32)
-    sky |= {"type": "envmap", "bitmap": mitsuba.Bitmap(panorama), "to_world": PANORAMA}
+    # The middle of a panorama is at -z here, and at +z there.
+    panorama = numpy.roll(panorama, panorama.shape[1] // 2, axis=1)
+    sky |= {"type": "envmap", "bitmap": mitsuba.Bitmap(panorama)}
 else:
     sky |= {"type": "constant", "radiance": rgb(request["sky"])}
 path = {"type": "path", "max_depth": request["bounces"] + 2, "rr_depth": 1000}

@@ -1,4 +1,4 @@
-//! What is bright, as surfaces see it: balls, flat panes, and boxes and rods in which there is something bright.
+//! Bright things as surfaces see them: balls, flat panes, and boxes and rods in which there is something bright.
 
 use core::f64::consts::{PI, TAU};
 
@@ -16,7 +16,7 @@ const SMALL_FACE: f64 = 1.0 / 64.0;
 /// Something bright.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bright {
-    pub(crate) brightness: f64,
+    brightness: f64,
     form: Form,
 }
 
@@ -47,7 +47,7 @@ struct Pane {
     normal: DVec3,
     area: f64,
     middle: DVec3,
-    /// The largest distance from the middle.
+    /// No point is farther from the middle.
     radius: f64,
     /// Whether it is not seen from behind.
     is_closed: bool,
@@ -273,7 +273,7 @@ pub(crate) fn brightest(mut all: Vec<Bright>) -> Vec<Bright> {
     all
 }
 
-/// How a surface sees something bright.
+/// Something bright, as a surface sees it.
 pub(super) struct Seen {
     /// The light that it gives the surface, about.
     pub(super) weight: f64,

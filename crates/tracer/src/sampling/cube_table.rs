@@ -18,7 +18,7 @@ pub(crate) struct CubeTable {
     first: Vec<u32>,
     /// For each cell, one more than its place in `parts_before`; 0 for cells that are not divided.
     divided: Vec<u16>,
-    /// The same shares of the parts of each of them.
+    /// For each divided cell, the share of its parts before each part, and 1.
     parts_before: Vec<[f64; PARTS * PARTS + 1]>,
 }
 

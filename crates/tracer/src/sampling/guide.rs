@@ -27,7 +27,7 @@ const BRIGHT: f64 = 0.4;
 /// The bright light of a scene at a moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
-    /// What glows, and then the windows.
+    /// Glowing things, and after them the windows.
     lights: Vec<Bright>,
     /// The number of those that glow.
     glowing: usize,

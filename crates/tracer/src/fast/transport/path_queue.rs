@@ -45,7 +45,7 @@ pub(crate) struct PathRay<E> {
     pub(crate) turns: Turns,
 }
 
-/// What is drawn at the hits of a batch: the numbers of the directions, and the directions by the cosine.
+/// The numbers of the directions at the hits of a batch, and the directions that they give by the cosine.
 pub(super) struct DrawnByCosine {
     pub(super) numbers: [Box<Column<f64>>; 2],
     pub(super) directions: [Box<Column<f64>>; 3],

@@ -13,7 +13,7 @@ const SECOND: u32 = 4;
 /// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
-/// The same two for scenes in which light goes round, where all pixels vary. Light that comes in by chance has a slope of -0.5,
+/// Slope and share for scenes in which light goes round, where all pixels vary. Light that comes in by chance has a slope of -0.5,
 /// and other light one of -0.7 (docs/decisions/tracer-paths.md).
 const SLOPE_OF_PATHS: f64 = -0.6;
 const SPARED_OF_PATHS: f64 = 1.4;
