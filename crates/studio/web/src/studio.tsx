@@ -63,10 +63,34 @@ function Studio({ places, children }: Props) {
   );
 }
 
+/**
+ * Renders changes once per frame of the browser: more updates would be invisible and delay the picture. What a key or a
+ * click changes is rendered at once, because the next key may be for a field that it opens.
+ */
+function paceRendering(): void {
+  let waiting: (() => void) | undefined;
+  let pressed = false;
+  const flush = (): void => {
+    const update = waiting;
+    waiting = undefined;
+    update?.();
+  };
+  options.debounceRendering = (update) => {
+    waiting = update;
+    if (pressed) queueMicrotask(flush);
+    else requestAnimationFrame(flush);
+  };
+  const press = (): void => {
+    flush();
+    pressed = true;
+    setTimeout(() => (pressed = false));
+  };
+  for (const name of ["keydown", "click"]) addEventListener(name, press, true);
+}
+
 /** Shows the page. */
 export function start(more: Props): void {
-  // Once per frame of the browser: more updates would be invisible and delay the picture.
-  options.debounceRendering = (update) => requestAnimationFrame(update);
+  paceRendering();
   startTheme();
   render(<Studio {...more} />, document.body);
   listen();

@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 
 import type { Listener, Send } from "../connection/listener";
 import { place, opened as remember } from "./address";
-import type { Question, ToDesk, ToPage } from "./messages";
+import type { Question, Start, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
 import { moduleFile } from "./variant";
 
@@ -45,9 +45,12 @@ export const importProject = async (name: string, files: readonly File[]): Promi
 /** Waits until the files are written. */
 export const write = (): Promise<unknown> => ask({ is: "write" });
 
+const newWorker = (): Worker => new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+
 export function open({ opened, told, shown, closed }: Listener): Send {
   let isOpen = true;
-  const own = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  const own = newWorker();
+  const helpers = new Map<number, Worker>();
   worker = own;
   const end = (why: string): void => {
     isOpen = false;
@@ -61,6 +64,14 @@ export function open({ opened, told, shown, closed }: Listener): Send {
     else if (data.is === "answer") {
       waiting.get(data.number)?.(data.value);
       waiting.delete(data.number);
+    } else if (data.is === "helper") {
+      const helper = newWorker();
+      helper.onerror = own.onerror;
+      helper.postMessage({ is: "start", program: data.program, port: data.port } satisfies Start, [data.port]);
+      helpers.set(data.number, helper);
+    } else if (data.is === "end") {
+      helpers.get(data.number)?.terminate();
+      helpers.delete(data.number);
     } else if (data.is === "closed") end(data.why);
     else {
       project.value = data.project;

@@ -4,7 +4,7 @@
 import type { OutputState, ServerMessage } from "../protocol";
 import { Film } from "./film";
 import { Helper } from "./helper";
-import type { Place, Question, ToDesk, ToPage } from "./messages";
+import type { Place, Post, Question, ToDesk } from "./messages";
 import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File, type Program } from "./module";
 import { Folder, keep, project, projects, remove } from "./projects";
 
@@ -19,8 +19,6 @@ const MOST = 8;
 
 /** What the session wants done, as `written` in crates/web numbers it. */
 const Kind = { tell: 0, show: 1, put: 2, draw: 3, save: 4, answer: 5, wake: 6, film: 7 } as const;
-
-type Post = (message: ToPage, transfer?: Transferable[]) => void;
 
 const why = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
@@ -59,7 +57,7 @@ export class Session {
     this.#module = new Module(program);
     const { name, files } = await this.#files(place);
     const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
-    this.#drawers = Array.from({ length: workers }, () => new Helper(program));
+    this.#drawers = Array.from({ length: workers }, () => new Helper(program, this.#post));
     this.#alone(name);
     this.#post({ is: "opened", project: name, folder: place.is === "folder" });
     this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
@@ -181,7 +179,7 @@ export class Session {
     if (!this.#module || !this.#program) return;
     this.#tell({ notice: `This cannot be drawn, because the tracer has failed: ${fault.message}` });
     this.#drawers[number]?.end();
-    this.#drawers[number] = new Helper(this.#program);
+    this.#drawers[number] = new Helper(this.#program, this.#post);
     this.#do(Call.lost, number);
   }
 
@@ -215,7 +213,7 @@ export class Session {
 
   #newFilm(): Film {
     if (!this.#program) throw new Error("no project is open");
-    return new Film(this.#program, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
+    return new Film(this.#program, this.#post, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
   }
 
   /** The files of the project, after one whose name is the format of an animation. */

@@ -1,6 +1,7 @@
 // An animation: some workers draw its frames, ahead of the one that encodes them in order.
 
 import { Helper } from "./helper";
+import type { Post } from "./messages";
 import { Call, type Program } from "./module";
 
 const NONE = (): Uint8Array => new Uint8Array();
@@ -10,9 +11,9 @@ export class Film {
   readonly #drawers: Helper[];
   #isCancelled = false;
 
-  constructor(program: Program, drawers: number) {
-    this.#encoder = new Helper(program);
-    this.#drawers = Array.from({ length: drawers }, () => new Helper(program));
+  constructor(program: Program, page: Post, drawers: number) {
+    this.#encoder = new Helper(program, page);
+    this.#drawers = Array.from({ length: drawers }, () => new Helper(program, page));
   }
 
   get isCancelled(): boolean {

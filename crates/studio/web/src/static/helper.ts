@@ -1,6 +1,8 @@
-// A worker that the session's worker starts: it draws, encodes or draws frames, one call after the other.
+// A worker that draws, encodes or draws frames for the session, one call after the other.
+//
+// The page starts it, not the session's worker: Firefox hangs now and then while a worker starts another one.
 
-import type { ToWorker } from "./messages";
+import type { Post, ToHelper } from "./messages";
 import { Fault, type Program } from "./module";
 
 interface Answer {
@@ -9,39 +11,45 @@ interface Answer {
   readonly isFault?: boolean;
 }
 
+let helpers = 0;
+
 export class Helper {
-  readonly #worker: Worker;
+  readonly #page: Post;
+  readonly #number: number;
+  readonly #port: MessagePort;
   readonly #waiting: { readonly done: (result: Uint8Array) => void; readonly failed: (error: Error) => void }[] = [];
 
-  constructor(program: Program) {
-    // The program of this very worker.
-    this.#worker = new Worker(self.location.href, { type: "module" });
-    this.#worker.onmessage = ({ data }: MessageEvent<Answer>) => {
+  constructor(program: Program, page: Post) {
+    helpers += 1;
+    const { port1, port2 } = new MessageChannel();
+    [this.#page, this.#number, this.#port] = [page, helpers, port1];
+    port1.onmessage = ({ data }: MessageEvent<Answer>) => {
       const next = this.#waiting.shift();
       if (data.result) next?.done(data.result);
       else next?.failed(data.isFault ? new Fault(data.why) : new Error(data.why));
     };
-    this.#post({ is: "start", program });
+    page({ is: "helper", number: this.#number, program, port: port2 }, [port2]);
   }
 
   /** Makes a call whose result is of no interest. */
   tell(what: number, bytes: Uint8Array): void {
-    this.#post({ is: "call", what, number: 0, bytes, answers: false }, [bytes.buffer as ArrayBuffer]);
+    this.#post({ what, number: 0, bytes, answers: false });
   }
 
   call(what: number, number: number, bytes: Uint8Array): Promise<Uint8Array> {
     return new Promise((done, failed) => {
       this.#waiting.push({ done, failed });
-      this.#post({ is: "call", what, number, bytes, answers: true }, [bytes.buffer as ArrayBuffer]);
+      this.#post({ what, number, bytes, answers: true });
     });
   }
 
   end(): void {
-    this.#worker.terminate();
+    this.#port.close();
+    this.#page({ is: "end", number: this.#number });
     for (const { failed } of this.#waiting.splice(0)) failed(new Error("cancelled"));
   }
 
-  #post(message: ToWorker, transfer: Transferable[] = []): void {
-    this.#worker.postMessage(message, transfer);
+  #post(call: ToHelper): void {
+    this.#port.postMessage(call, [call.bytes.buffer as ArrayBuffer]);
   }
 }

@@ -37,9 +37,25 @@ export type ToPage =
   | ArrayBuffer
   | { readonly is: "opened"; readonly project: string; readonly folder: boolean }
   | { readonly is: "closed"; readonly why: string }
+  /** A worker is wanted that draws or encodes. It takes its calls from the port. */
+  | { readonly is: "helper"; readonly number: number; readonly program: Program; readonly port: MessagePort }
+  /** A worker is wanted no longer. */
+  | { readonly is: "end"; readonly number: number }
   | { readonly is: "answer"; readonly number: number; readonly value: unknown };
 
+export type Post = (message: ToPage, transfer?: Transferable[]) => void;
+
 /** To a worker that draws, encodes, or draws frames. */
-export type ToWorker =
-  | { readonly is: "start"; readonly program: Program }
-  | { readonly is: "call"; readonly what: number; readonly number: number; readonly bytes: Uint8Array; readonly answers: boolean };
+export interface Start {
+  readonly is: "start";
+  readonly program: Program;
+  readonly port: MessagePort;
+}
+
+/** A call of such a worker, through its port. */
+export interface ToHelper {
+  readonly what: number;
+  readonly number: number;
+  readonly bytes: Uint8Array;
+  readonly answers: boolean;
+}
