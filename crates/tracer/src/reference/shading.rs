@@ -13,7 +13,7 @@ use super::shapes::Surface;
 use super::world::{World, glass};
 use crate::camera::Ray;
 use crate::meshes::Shading;
-use crate::sampling::guide::{Aims, Guide};
+use crate::sampling::guide::{Guide, Scattering};
 use crate::sampling::paths::{Way, scattered};
 use crate::sampling::rough::{Energies, Microfacets};
 
@@ -172,12 +172,13 @@ impl Shader<'_> {
             let factor = coefficients.diffuse() * tint;
             if let Some((next, factor)) = self.sent(path, factor, Way::Scattered) {
                 let uv = (numbers.direction)(path.hits);
+                let by_cosine = scattered(uv, normal, face);
                 let rays = match numbers.guide {
                     Some(guide) => {
-                        let drawn = (uv, scattered(uv, normal, face));
-                        guide.scattered(drawn, world.in_scene(start), (normal, face), &mut Aims::default())
+                        let hit = Scattering::of_one(uv, by_cosine, world.in_scene(start), (normal, face));
+                        guide.scattered(&hit, &mut vec![]).of_one(by_cosine)
                     }
-                    None => [(scattered(uv, normal, face), 1.0), (DVec3::Y, 0.0)],
+                    None => [(by_cosine, 1.0), (DVec3::Y, 0.0)],
                 };
                 for (direction, share) in rays.into_iter().filter(|&(_, share)| share > 0.0) {
                     let next = Path { clear: None, weight: held(next.weight * share), ..next };

@@ -84,30 +84,6 @@ impl Pane {
         let area = share * size;
         is_one.then_some(Self { edge, origin, sides, parts, normal, area, middle, radius, is_closed })
     }
-
-    /// Returns whether a place in the plane, from the origin, is on the pane.
-    #[inline(always)]
-    fn holds(&self, place: DVec3) -> bool {
-        // A little more, for the rounding of directions to its edge.
-        const MORE: f64 = 1e-9;
-        let [s, t] = self.parts.map(|part| part.dot(place));
-        match self.edge {
-            Edge::Disc => s * s + t * t <= 1.0 + MORE,
-            Edge::Rectangle => (s - 0.5).abs().max((t - 0.5).abs()) <= 0.5 + MORE,
-            Edge::Triangle => s.min(t).min(1.0 - s - t) >= -MORE,
-        }
-    }
-
-    /// Returns the place of two numbers from 0 to 1, from the origin.
-    #[inline(always)]
-    fn point(&self, u: f64, v: f64) -> DVec3 {
-        let DVec2 { x, y } = match self.edge {
-            Edge::Disc => on_disc(u, v),
-            Edge::Triangle if u + v > 1.0 => DVec2::new(1.0 - u, 1.0 - v),
-            _ => DVec2::new(u, v),
-        };
-        self.sides[0] * x + self.sides[1] * y
-    }
 }
 
 impl Bright {
@@ -196,40 +172,53 @@ impl Bright {
         }
     }
 
-    /// Returns how a surface sees it; `None` for what the surface is in, or what is behind one of the two. `at` is its number.
+    /// Returns how surfaces see it.
     #[inline(always)]
-    fn seen(&self, at: usize, place: DVec3, normal: DVec3) -> Option<Seen> {
+    pub(super) fn seen<const N: usize>(&self, places: &Places<N>, normals: &Places<N>) -> Seen<N> {
+        let mut seen = Seen { weight: [0.0; N], scale: [0.0; N], view: [[0.0; N]; 4] };
         match &self.form {
             Form::Pane(pane) => {
-                let towards = pane.middle - place;
-                let distance = towards.length_squared().sqrt();
-                let height = pane.normal.dot(towards);
-                // No point of it is seen under a larger cosine.
-                let cosine = ((towards.dot(normal) + pane.radius) / distance).min(1.0);
-                // About its solid angle. A pane that is near fills a half of all.
-                let solid = TAU * pane.area * height.abs()
-                    / (TAU * distance * distance * distance + pane.area * height.abs());
-                let weight = self.brightness * cosine * solid;
-                let is_seen = weight > 0.0 && weight < f64::INFINITY && !(pane.is_closed && height > 0.0);
-                let view = View::Pane { origin: pane.origin - place, height };
-                is_seen.then_some(Seen { weight, scale: weight / pane.area, view, at })
+                for k in 0..N {
+                    let (place, normal) = (at(places, k), at(normals, k));
+                    let towards = pane.middle - place;
+                    let distance = towards.length_squared().sqrt();
+                    let height = pane.normal.dot(towards);
+                    // No point of it is seen under a larger cosine.
+                    let cosine = ((towards.dot(normal) + pane.radius) / distance).min(1.0);
+                    // About its solid angle. A pane that is near fills a half of all.
+                    let solid = TAU * pane.area * height.abs()
+                        / (TAU * distance * distance * distance + pane.area * height.abs());
+                    let weight = self.brightness * cosine * solid;
+                    let is_seen = weight > 0.0 && weight < f64::INFINITY && !(pane.is_closed && height > 0.0);
+                    let origin = pane.origin - place;
+                    seen.set(
+                        k,
+                        is_seen,
+                        (weight, weight / pane.area),
+                        [origin.x, origin.y, origin.z, height],
+                    );
+                }
             }
             _ => {
                 let (center, radius) = self.around();
-                let towards = center - place;
-                let nearness = 1.0 / towards.length_squared().sqrt();
-                let axis = towards * nearness;
-                let sine = radius * nearness;
-                let cosine = (axis.dot(normal) + sine).min(1.0);
-                // A little above 1 - √(1 - sine²), by its series.
-                let share = sine * sine;
-                let spread = share * (0.5 + share * (0.125 + share * (0.0625 + share * 0.3125)));
-                let scale = self.brightness * cosine;
-                let is_seen = sine < 1.0 && share > 1e-30 && cosine > 0.0;
-                let view = View::Cone { axis: axis + DVec3::ZERO, spread };
-                is_seen.then_some(Seen { weight: scale * TAU * spread, scale, view, at })
+                for k in 0..N {
+                    let (place, normal) = (at(places, k), at(normals, k));
+                    let towards = center - place;
+                    let nearness = 1.0 / towards.length_squared().sqrt();
+                    let axis = towards * nearness;
+                    let sine = radius * nearness;
+                    let cosine = (axis.dot(normal) + sine).min(1.0);
+                    // A little above 1 - √(1 - sine²), by its series.
+                    let share = sine * sine;
+                    let spread = share * (0.5 + share * (0.125 + share * (0.0625 + share * 0.3125)));
+                    let scale = self.brightness * cosine;
+                    let is_seen = sine < 1.0 && share > 1e-30 && cosine > 0.0;
+                    let axis = axis + DVec3::ZERO;
+                    seen.set(k, is_seen, (scale * TAU * spread, scale), [axis.x, axis.y, axis.z, spread]);
+                }
             }
         }
+        seen
     }
 }
 
@@ -273,81 +262,143 @@ pub(crate) fn brightest(mut all: Vec<Bright>) -> Vec<Bright> {
     all
 }
 
-/// Something bright, as a surface sees it.
-pub(super) struct Seen {
-    /// The light that it gives the surface, about.
-    pub(super) weight: f64,
+/// Vectors, each axis a column.
+pub(crate) type Places<const N: usize> = [[f64; N]; 3];
+
+/// Returns one of the vectors.
+#[inline(always)]
+pub(crate) fn at<const N: usize>([x, y, z]: &Places<N>, k: usize) -> DVec3 {
+    DVec3::new(x[k], y[k], z[k])
+}
+
+#[inline(always)]
+fn places<const N: usize>(place: impl Fn(usize) -> DVec3) -> Places<N> {
+    let mut all = [[0.0; N]; 3];
+    for k in 0..N {
+        let of = place(k);
+        (all[0][k], all[1][k], all[2][k]) = (of.x, of.y, of.z);
+    }
+    all
+}
+
+/// Something bright, as some surfaces see it.
+pub(crate) struct Seen<const N: usize> {
+    /// The light that it gives each surface, about. It is 0 for what the surface is in, or what is behind one of the two.
+    pub(super) weight: [f64; N],
     /// The weight in a unit of solid angle of a cone, and of area of a pane.
-    scale: f64,
-    view: View,
-    /// Its number among all.
-    at: usize,
+    scale: [f64; N],
+    /// Of a pane: its origin, from the place, and the distance of its plane from the place, along its normal. Of others: the axis of
+    /// a cone around it, and 1 - cos of half of its angle.
+    view: [[f64; N]; 4],
 }
 
-enum View {
-    Cone {
-        axis: DVec3,
-        /// 1 - cos of half the angle of a cone around it.
-        spread: f64,
-    },
-    Pane {
-        /// The origin of the pane, from the place.
-        origin: DVec3,
-        /// The distance of the pane's plane from the place, along its normal.
-        height: f64,
-    },
-}
-
-/// Adds how a surface sees each of these, numbered from `first` on. Returns the sum of their weights.
-pub(super) fn see(
-    all: &[Bright],
-    first: usize,
-    (place, normal): (DVec3, DVec3),
-    seen: &mut Vec<Seen>,
-) -> f64 {
-    let mut sum = 0.0;
-    for (at, bright) in all.iter().enumerate() {
-        if let Some(one) = bright.seen(first + at, place, normal) {
-            sum += one.weight;
-            seen.push(one);
+impl<const N: usize> Seen<N> {
+    #[inline(always)]
+    fn set(&mut self, k: usize, is_seen: bool, (weight, scale): (f64, f64), view: [f64; 4]) {
+        self.weight[k] = if is_seen { weight } else { 0.0 };
+        self.scale[k] = if is_seen { scale } else { 0.0 };
+        for (column, part) in self.view.iter_mut().zip(view) {
+            column[k] = part;
         }
     }
-    sum
-}
 
-impl Seen {
-    /// Returns the density of directions towards it, times the weight.
+    /// Leaves out the surfaces for which `is_kept` is false.
     #[inline(always)]
-    pub(super) fn weighted_density(&self, direction: DVec3, all: &[Bright]) -> f64 {
-        match (&self.view, &all[self.at].form) {
-            (View::Pane { origin, height }, Form::Pane(pane)) => {
-                let across = pane.normal.dot(direction);
-                let distance = height / across;
-                if distance > 0.0 && pane.holds(direction * distance - origin) {
-                    self.scale * distance * distance / across.abs()
-                } else {
-                    0.0
+    pub(super) fn keep(&mut self, is_kept: &[bool; N]) {
+        for k in 0..N {
+            self.weight[k] = if is_kept[k] { self.weight[k] } else { 0.0 };
+            self.scale[k] = if is_kept[k] { self.scale[k] } else { 0.0 };
+        }
+    }
+
+    #[inline(always)]
+    fn view(&self, k: usize) -> (DVec3, f64) {
+        let [x, y, z, last] = self.view.each_ref().map(|column| column[k]);
+        (DVec3::new(x, y, z), last)
+    }
+
+    /// Adds the density of directions towards it, times the weight. `bright` is what is seen.
+    #[inline(always)]
+    pub(super) fn add_density(&self, bright: &Bright, directions: &Places<N>, sums: &mut [f64; N]) {
+        // A little more, for the rounding of directions to an edge.
+        const MORE: f64 = 1e-9;
+        match &bright.form {
+            Form::Pane(pane) => match pane.edge {
+                Edge::Disc => {
+                    self.add_of_pane(pane, directions, sums, |s, t| s * s + t * t <= 1.0 + MORE);
+                }
+                Edge::Rectangle => self.add_of_pane(pane, directions, sums, |s, t| {
+                    (s - 0.5).abs().max((t - 0.5).abs()) <= 0.5 + MORE
+                }),
+                Edge::Triangle => {
+                    self.add_of_pane(pane, directions, sums, |s, t| s.min(t).min(1.0 - s - t) >= -MORE);
+                }
+            },
+            _ => {
+                for k in 0..N {
+                    let (axis, spread) = self.view(k);
+                    // Of narrow cones the cosine is no measure.
+                    let is_within = (at(directions, k) - axis).length_squared() <= 2.0 * spread;
+                    sums[k] += if is_within { self.scale[k] } else { 0.0 };
                 }
             }
-            (View::Cone { axis, spread }, _) => {
-                // Of narrow cones the cosine is no measure.
-                if (direction - axis).length_squared() <= 2.0 * spread { self.scale } else { 0.0 }
-            }
-            (View::Pane { .. }, _) => 0.0,
         }
     }
 
-    /// Returns a direction towards it.
-    pub(super) fn within(&self, u: f64, v: f64, all: &[Bright]) -> DVec3 {
-        match (&self.view, &all[self.at].form) {
-            (View::Pane { origin, .. }, Form::Pane(pane)) => (*origin + pane.point(u, v)).normalize(),
-            (View::Cone { axis, spread }, _) => {
-                let (x, y) = axis.any_orthonormal_pair();
-                let DVec3 { x: across, y: down, z: along } = in_cone(u, v, *spread);
-                (across * x + down * y + along * *axis).normalize()
-            }
-            (View::Pane { .. }, _) => DVec3::Y,
+    /// Adds those of a pane. `holds` says whether a place is on it, by the parts of its sides.
+    #[inline(always)]
+    fn add_of_pane(
+        &self,
+        pane: &Pane,
+        directions: &Places<N>,
+        sums: &mut [f64; N],
+        holds: impl Fn(f64, f64) -> bool,
+    ) {
+        for k in 0..N {
+            let direction = at(directions, k);
+            let (origin, height) = self.view(k);
+            let across = pane.normal.dot(direction);
+            let distance = height / across;
+            let [s, t] = pane.parts.map(|part| part.dot(direction * distance - origin));
+            let density = self.scale[k] * distance * distance / across.abs();
+            sums[k] += if (distance > 0.0) & (self.scale[k] > 0.0) & holds(s, t) { density } else { 0.0 };
         }
+    }
+
+    /// Returns the directions of two numbers from 0 to 1 towards it, for each surface. `bright` is what is seen.
+    #[inline(always)]
+    pub(super) fn towards(&self, bright: &Bright, numbers: &[[f64; N]; 2]) -> Places<N> {
+        match &bright.form {
+            Form::Pane(pane) => match pane.edge {
+                Edge::Disc => self.towards_pane(pane, numbers, on_disc),
+                Edge::Rectangle => self.towards_pane(pane, numbers, DVec2::new),
+                Edge::Triangle => self.towards_pane(pane, numbers, |u, v| {
+                    let is_beyond = u + v > 1.0;
+                    let [x, y] = [u, v].map(|part| if is_beyond { 1.0 - part } else { part });
+                    DVec2::new(x, y)
+                }),
+            },
+            _ => places(|k| {
+                let (axis, spread) = self.view(k);
+                let (x, y) = axis.any_orthonormal_pair();
+                let DVec3 { x: across, y: down, z: along } = in_cone(numbers[0][k], numbers[1][k], spread);
+                (across * x + down * y + along * axis).normalize()
+            }),
+        }
+    }
+
+    /// Returns those towards a pane. `point` gives the parts of its sides that two numbers stand for.
+    #[inline(always)]
+    fn towards_pane(
+        &self,
+        pane: &Pane,
+        numbers: &[[f64; N]; 2],
+        point: impl Fn(f64, f64) -> DVec2,
+    ) -> Places<N> {
+        places(|k| {
+            let DVec2 { x, y } = point(numbers[0][k], numbers[1][k]);
+            (self.view(k).0 + (pane.sides[0] * x + pane.sides[1] * y)).normalize()
+        })
     }
 }
 
@@ -359,18 +410,24 @@ mod tests {
 
     /// The solid angle of what is bright, by directions towards it and by all directions.
     fn solid_angles(all: &[Bright], place: DVec3, normal: DVec3) -> (f64, f64) {
-        let mut seen = vec![];
-        let weights = see(all, 0, (place, normal), &mut seen);
+        let column = |v: DVec3| v.to_array().map(|x| [x]);
+        let seen: Vec<_> = all.iter().map(|one| one.seen(&column(place), &column(normal))).collect();
+        let weights: f64 = seen.iter().map(|one| one.weight[0]).sum();
         let mut dice = fastrand::Rng::with_seed(5);
         let (mut by_aim, mut by_all) = (0.0, 0.0);
         let count = 200_000;
         for _ in 0..count {
             let mut at = dice.f64() * weights;
-            let one = seen.iter().find(|one| (at < one.weight, at -= one.weight).0).unwrap();
-            let towards = one.within(dice.f64(), dice.f64(), all);
+            let one = seen.iter().position(|one| (at < one.weight[0], at -= one.weight[0]).0).unwrap();
+            let numbers = [[dice.f64()], [dice.f64()]];
+            let towards = super::at(&seen[one].towards(&all[one], &numbers), 0);
             assert!((towards.length() - 1.0).abs() < 1e-14);
             let density = |direction| {
-                seen.iter().map(|one| one.weighted_density(direction, all)).sum::<f64>() / weights
+                let mut sums = [0.0];
+                for (seen, bright) in seen.iter().zip(all) {
+                    seen.add_density(bright, &column(direction), &mut sums);
+                }
+                sums[0] / weights
             };
             assert!(density(towards) > 0.0);
             by_aim += 1.0 / density(towards) / f64::from(count);

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayfold_scene::Scene;
 
-use super::bright::{Bright, Seen, brightest, see};
+use super::bright::{Bright, Places, Seen, at, brightest};
 use super::sky_table::{SkyTable, brightness};
 use crate::pictures::Panorama;
 
@@ -74,72 +74,194 @@ impl Guide {
         Self { lights, glowing, room: windows.map(|windows| windows.room), sky, sky_weight, around }
     }
 
-    /// Returns the rays that a surface scatters at a place of the scene: their directions, and the factors with which they count. A
-    /// factor is 0 for a ray that is none. `by_cosine` is the direction that [`super::paths::scattered`] gives for the numbers and the
-    /// normals.
-    pub(crate) fn scattered(
+    /// Returns the rays that surfaces scatter: besides those by the cosine others towards light, and the factors with which they count.
+    /// `seen` is room to work in.
+    #[inline(always)]
+    pub(crate) fn scattered<const N: usize>(
         &self,
-        ((u, v), by_cosine): ((f64, f64), DVec3),
-        place: DVec3,
-        (normal, face): (DVec3, DVec3),
-        aims: &mut Aims,
-    ) -> [(DVec3, f64); 2] {
-        let seen = &mut aims.0;
+        hits: &Scattering<N>,
+        seen: &mut Vec<Seen<N>>,
+    ) -> Aimed<N> {
+        let lit = self.see(hits, seen);
+        let mut share = [0.0; N];
+        for k in 0..N {
+            // The chance of a second ray.
+            share[k] = (lit[k] / (BRIGHT * (lit[k] + OPENNESS * self.around))).min(1.0);
+        }
+        let mut is_aimed = [false; N];
+        let mut sums = [0.0; N];
+        for k in 0..N {
+            let u = hits.numbers[0][k];
+            is_aimed[k] = hits.is_hit[k] && lit[k] > 0.0 && u < share[k];
+            sums[k] = u / share[k] * lit[k];
+        }
+        let aimed = self.towards_light(&is_aimed, (sums, hits.numbers[1]), seen);
+        let [by_cosine, towards_light] =
+            [&hits.by_cosine, &aimed].map(|directions| self.weighted_densities(directions, hits, seen));
+        let mut factors = [[0.0; N]; 2];
+        for k in 0..N {
+            let part = |directions: &Places<N>, weighted: f64| {
+                let asked = density(at(directions, k), at(&hits.normal, k), at(&hits.face, k));
+                let aimed = share[k] / lit[k] * weighted;
+                if asked > 0.0 { asked / (asked + aimed) } else { 0.0 }
+            };
+            // A ray by the cosine along the surface counts as nothing.
+            let first = part(&hits.by_cosine, by_cosine[k]);
+            factors[0][k] = if lit[k] > 0.0 { first } else { 1.0 };
+            let second = part(&aimed, towards_light[k]);
+            factors[1][k] = if is_aimed[k] { second } else { 0.0 };
+        }
+        Aimed { directions: aimed, factors }
+    }
+
+    /// Finds how surfaces see each of the lights. Returns about the light that they get from all.
+    #[inline(always)]
+    fn see<const N: usize>(&self, hits: &Scattering<N>, seen: &mut Vec<Seen<N>>) -> [f64; N] {
         seen.clear();
         let (glowing, windows) = self.lights.split_at(self.glowing);
-        let mut lit = self.sky_weight + see(glowing, 0, (place, normal), seen);
-        if self.room.is_some_and(|[low, high]| place.cmpge(low).all() && place.cmple(high).all()) {
-            lit += see(windows, self.glowing, (place, normal), seen);
+        let (mut from_glowing, mut from_windows) = ([0.0; N], [0.0; N]);
+        for bright in glowing {
+            let one = bright.seen(&hits.place, &hits.normal);
+            for k in 0..N {
+                from_glowing[k] += one.weight[k];
+            }
+            seen.push(one);
         }
-        if lit <= 0.0 {
-            return [(by_cosine, 1.0), (by_cosine, 0.0)];
+        if let Some([low, high]) = self.room {
+            let is_in: [bool; N] = core::array::from_fn(|k| {
+                let place = at(&hits.place, k);
+                place.cmpge(low).all() && place.cmple(high).all()
+            });
+            for bright in windows {
+                let mut one = bright.seen(&hits.place, &hits.normal);
+                one.keep(&is_in);
+                for k in 0..N {
+                    from_windows[k] += one.weight[k];
+                }
+                seen.push(one);
+            }
         }
-        // The chance of a second ray.
-        let share = (lit / (BRIGHT * (lit + OPENNESS * self.around))).min(1.0);
-        let part = |direction: DVec3| {
-            let asked = density(direction, normal, face);
-            let aimed = share / lit * self.weighted_density(direction, seen);
-            if asked > 0.0 { asked / (asked + aimed) } else { 0.0 }
-        };
-        // A ray by the cosine along the surface counts as nothing.
-        let by_cosine = (by_cosine, part(by_cosine));
-        if u >= share {
-            return [by_cosine, (by_cosine.0, 0.0)];
-        }
-        let aimed = self.towards_light((u / share * lit, v), seen);
-        [by_cosine, (aimed, part(aimed))]
+        core::array::from_fn(|k| self.sky_weight + from_glowing[k] + from_windows[k])
     }
 
-    /// Returns the sum of the densities of the ways to aim in a direction, each times its weight.
-    fn weighted_density(&self, direction: DVec3, seen: &[Seen]) -> f64 {
-        let of_sky = match &self.sky {
-            Some((table, panorama)) => self.sky_weight * table.directions.density(panorama.turned(direction)),
-            None => 0.0,
-        };
-        seen.iter().fold(of_sky, |sum, seen| sum + seen.weighted_density(direction, &self.lights))
+    /// Returns for each direction the sum of the densities of the ways to aim there, each times its weight.
+    #[inline(always)]
+    fn weighted_densities<const N: usize>(
+        &self,
+        directions: &Places<N>,
+        hits: &Scattering<N>,
+        seen: &[Seen<N>],
+    ) -> [f64; N] {
+        let mut sums = [0.0; N];
+        if let Some((table, panorama)) = &self.sky {
+            for k in (0..N).filter(|&k| hits.is_hit[k]) {
+                sums[k] = self.sky_weight * table.directions.density(panorama.turned(at(directions, k)));
+            }
+        }
+        for (seen, bright) in seen.iter().zip(&self.lights) {
+            seen.add_density(bright, directions, &mut sums);
+        }
+        sums
     }
 
-    /// Returns a direction towards light. `at` is below the sum of all weights.
-    fn towards_light(&self, (mut at, v): (f64, f64), seen: &[Seen]) -> DVec3 {
-        for seen in seen {
-            if at < seen.weight {
-                return seen.within(at / seen.weight, v, &self.lights);
+    /// Returns the directions of surfaces towards light, of those that are aimed. The sums are below those of all weights.
+    #[inline(always)]
+    fn towards_light<const N: usize>(
+        &self,
+        is_aimed: &[bool; N],
+        (mut sums, v): ([f64; N], [f64; N]),
+        seen: &[Seen<N>],
+    ) -> Places<N> {
+        // The number of the light, and the first of the numbers of the direction to it.
+        let (mut chosen, mut u) = ([usize::MAX; N], [0.0; N]);
+        for k in (0..N).filter(|&k| is_aimed[k]) {
+            let of = seen.iter().position(|seen| {
+                let weight = seen.weight[k];
+                let is_it = sums[k] < weight;
+                if is_it {
+                    u[k] = sums[k] / weight;
+                } else {
+                    sums[k] -= weight;
+                }
+                is_it
+            });
+            chosen[k] = of.unwrap_or(usize::MAX);
+            if of.is_none() && self.sky.is_none() {
+                // The sum was rounded.
+                chosen[k] = seen.iter().rposition(|seen| seen.weight[k] > 0.0).unwrap_or(usize::MAX);
+                u[k] = 1.0;
             }
-            at -= seen.weight;
         }
-        match &self.sky {
-            Some((table, panorama)) => {
-                panorama.turned_back(table.directions.direction((at / self.sky_weight).min(1.0), v))
+        let mut aimed = [[0.0; N]; 3];
+        for (number, (seen, bright)) in seen.iter().zip(&self.lights).enumerate() {
+            if !chosen.contains(&number) {
+                continue;
             }
-            // The sum was rounded.
-            None => seen.last().map_or(DVec3::Y, |seen| seen.within(1.0, v, &self.lights)),
+            let towards = seen.towards(bright, &[u, v]);
+            for (aimed, towards) in aimed.iter_mut().zip(&towards) {
+                for k in 0..N {
+                    aimed[k] = if chosen[k] == number { towards[k] } else { aimed[k] };
+                }
+            }
+        }
+        if let Some((table, panorama)) = &self.sky {
+            for k in (0..N).filter(|&k| is_aimed[k] && chosen[k] == usize::MAX) {
+                let u = (sums[k] / self.sky_weight).min(1.0);
+                let towards = panorama.turned_back(table.directions.direction(u, v[k]));
+                (aimed[0][k], aimed[1][k], aimed[2][k]) = (towards.x, towards.y, towards.z);
+            }
+        }
+        aimed
+    }
+}
+
+/// Hits at which light is scattered.
+pub(crate) struct Scattering<const N: usize> {
+    /// Whether there is a hit. What the others get is of no use.
+    pub(crate) is_hit: [bool; N],
+    /// The numbers of the directions.
+    pub(crate) numbers: [[f64; N]; 2],
+    /// The directions that [`super::paths::scattered`] gives for them and for the normals.
+    pub(crate) by_cosine: Places<N>,
+    /// The places in the scene.
+    pub(crate) place: Places<N>,
+    pub(crate) normal: Places<N>,
+    pub(crate) face: Places<N>,
+}
+
+impl Scattering<1> {
+    pub(crate) fn of_one(
+        numbers: (f64, f64),
+        by_cosine: DVec3,
+        place: DVec3,
+        (normal, face): (DVec3, DVec3),
+    ) -> Self {
+        let column = |v: DVec3| v.to_array().map(|x| [x]);
+        Self {
+            is_hit: [true],
+            numbers: [[numbers.0], [numbers.1]],
+            by_cosine: column(by_cosine),
+            place: column(place),
+            normal: column(normal),
+            face: column(face),
         }
     }
 }
 
-/// Room for what a surface sees, used for one hit after another.
-#[derive(Default)]
-pub(crate) struct Aims(Vec<Seen>);
+/// Rays that are aimed at light.
+pub(crate) struct Aimed<const N: usize> {
+    pub(crate) directions: Places<N>,
+    /// The factors with which the rays by the cosine count, and these. They are 0 for a ray that is none.
+    pub(crate) factors: [[f64; N]; 2],
+}
+
+impl Aimed<1> {
+    /// Returns the two rays of one surface, and the factors with which they count.
+    pub(crate) fn of_one(&self, by_cosine: DVec3) -> [(DVec3, f64); 2] {
+        let [[first], [second]] = self.factors;
+        [(by_cosine, first), (at(&self.directions, 0), second)]
+    }
+}
 
 /// Returns the density of the directions of [`super::paths::scattered`].
 fn density(direction: DVec3, normal: DVec3, face: DVec3) -> f64 {
@@ -185,6 +307,13 @@ mod tests {
     use super::super::paths::scattered;
     use super::*;
 
+    /// The rays of one surface: their directions, and the factors with which they count.
+    fn rays(guide: &Guide, numbers: (f64, f64), normals: (DVec3, DVec3)) -> [(DVec3, f64); 2] {
+        let by_cosine = scattered(numbers, normals.0, normals.1);
+        let hit = Scattering::of_one(numbers, by_cosine, DVec3::ZERO, normals);
+        guide.scattered(&hit, &mut vec![]).of_one(by_cosine)
+    }
+
     fn guide(lights: Vec<Bright>, windows: &Windows) -> Guide {
         Guide::new(brightest(lights), Some(windows), (None, 0.0), 0.3)
     }
@@ -197,18 +326,15 @@ mod tests {
         let count = 200_000;
         for _ in 0..count {
             let numbers = (dice.f64(), dice.f64());
-            let rays = match guide {
-                Some(guide) => {
-                    let drawn = (numbers, scattered(numbers, normal, face));
-                    guide.scattered(drawn, DVec3::ZERO, normals, &mut Aims::default())
-                }
+            let drawn = match guide {
+                Some(guide) => rays(guide, numbers, normals),
                 None => [(scattered(numbers, normal, face), 1.0), (DVec3::Y, 0.0)],
             };
-            for (direction, share) in rays.iter().filter(|ray| ray.1 > 0.0) {
+            for (direction, share) in drawn.iter().filter(|ray| ray.1 > 0.0) {
                 assert!((direction.length() - 1.0).abs() < 1e-14 && *share <= 1.0);
             }
             let of = |(direction, share): (DVec3, f64)| if is_lit(direction) { share } else { 0.0 };
-            let light: f64 = rays.map(of).into_iter().sum();
+            let light: f64 = drawn.map(of).into_iter().sum();
             sum += light;
             squares += light * light;
         }
@@ -220,8 +346,7 @@ mod tests {
     fn a_place_that_sees_nothing_bright_has_a_ray_by_the_cosine() {
         let pane = Bright::rectangle(1.0, [DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, -1.0, 1.0)]);
         let dark = Guide::new(vec![pane.unwrap()], None, (None, 0.0), 0.0);
-        let drawn = ((0.3, 0.4), DVec3::Y);
-        let rays = dark.scattered(drawn, DVec3::ZERO, (DVec3::Y, DVec3::Y), &mut Aims::default());
+        let rays = rays(&dark, (0.3, 0.4), (DVec3::Y, DVec3::Y));
         assert_eq!(rays.map(|ray| ray.1), [1.0, 0.0]);
     }
 

@@ -5,7 +5,7 @@ use rayfold_scene::{Glass, Object, Scene};
 
 use crate::fast::placement::geometry::Geometry;
 use crate::reference;
-use crate::sampling::guide::{Aims, Guide};
+use crate::sampling::guide::Guide;
 use crate::sampling::rough::Microfacets;
 
 /// The surfaces of a scene in which light goes round.
@@ -59,20 +59,16 @@ impl Paths {
         self.rough.get(order)?.as_ref()
     }
 
-    /// Returns the rays that a surface scatters at a place: their directions, and the factors with which they count, of which 0
-    /// stands for no ray. `drawn` has the random numbers, and the direction that they give by the cosine.
+    /// Returns the guide of scattered rays to bright light.
     #[inline(always)]
-    pub(crate) fn scattered(
-        &self,
-        drawn: ((f64, f64), DVec3),
-        place: DVec3,
-        (normal, face): (DVec3, DVec3),
-        aims: &mut Aims,
-    ) -> [(DVec3, f64); 2] {
-        match &self.guide {
-            Some(guide) => guide.scattered(drawn, place / self.scale + self.center, (normal, face), aims),
-            None => [(drawn.1, 1.0), (DVec3::Y, 0.0)],
-        }
+    pub(crate) fn guide(&self) -> Option<&Guide> {
+        self.guide.as_ref()
+    }
+
+    /// Returns a place of the kernels' coordinates in the scene.
+    #[inline(always)]
+    pub(crate) fn in_scene(&self, place: DVec3) -> DVec3 {
+        place / self.scale + self.center
     }
 
     /// Returns whether any object is rough.

@@ -4,11 +4,9 @@
 //! the longest paths of which there are enough for a batch. So no queue holds more than some batches, however many rays there
 //! are. What a ray adds to a pixel is summed as that of the other queues is.
 
-use glam::DVec3;
-
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
-use crate::sampling::guide::Aims;
+use crate::sampling::bright::Seen;
 use crate::sampling::paths::Way;
 
 /// The number of rays in a full batch.
@@ -45,23 +43,38 @@ pub(crate) struct PathRay<E> {
     pub(crate) turns: Turns,
 }
 
-/// The numbers of the directions at the hits of a batch, and the directions that they give by the cosine.
-pub(super) struct DrawnByCosine {
+/// The number of hits of which the rays to light are drawn at once.
+pub(super) const BLOCK: usize = 16;
+const _: () = assert!(ROOM.is_multiple_of(BLOCK));
+
+/// The rays that are scattered at the hits of a batch.
+pub(super) struct Drawn {
+    /// Whether the hit of a ray scatters light, and its path may go on so.
+    pub(super) is_scattered: [bool; ROOM],
+    /// The numbers of the directions.
     pub(super) numbers: [Box<Column<f64>>; 2],
-    pub(super) directions: [Box<Column<f64>>; 3],
+    /// The directions by the cosine.
+    pub(super) by_cosine: [Box<Column<f64>>; 3],
+    /// The directions towards light.
+    pub(super) aimed: [Box<Column<f64>>; 3],
+    /// The factors with which those by the cosine count, and those towards light. They are 0 for a ray that is none.
+    pub(super) factors: [Box<Column<f64>>; 2],
+    /// Room for how surfaces see light.
+    pub(super) seen: Vec<Seen<BLOCK>>,
 }
 
-impl DrawnByCosine {
+impl Drawn {
     fn new() -> Self {
         let column = || Box::new(Column::new());
-        Self { numbers: [column(), column()], directions: [column(), column(), column()] }
-    }
-
-    /// Returns the numbers and the direction of a ray of the batch.
-    #[inline(always)]
-    pub(super) fn at(&self, lane: usize) -> ((f64, f64), DVec3) {
-        let [u, v] = self.numbers.each_ref().map(|column| column.0[lane]);
-        ((u, v), DVec3::from_array(self.directions.each_ref().map(|column| column.0[lane])))
+        let columns = || [column(), column(), column()];
+        Self {
+            is_scattered: [false; ROOM],
+            numbers: [column(), column()],
+            by_cosine: columns(),
+            aimed: columns(),
+            factors: [column(), column()],
+            seen: vec![],
+        }
     }
 }
 
@@ -71,19 +84,12 @@ pub(crate) struct PathQueues<E> {
     waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
     /// The turns of the rays of the current batch.
     pub(super) turns: [Turns; ROOM],
-    pub(super) drawn: DrawnByCosine,
-    /// Room for where a surface sees light.
-    pub(super) aims: Aims,
+    pub(super) drawn: Drawn,
 }
 
 impl<E: Real> PathQueues<E> {
     pub(crate) fn new() -> Self {
-        Self {
-            waiting: vec![],
-            turns: [Turns::default(); ROOM],
-            drawn: DrawnByCosine::new(),
-            aims: Aims::default(),
-        }
+        Self { waiting: vec![], turns: [Turns::default(); ROOM], drawn: Drawn::new() }
     }
 
     /// Starts with a batch of camera rays.

@@ -1,7 +1,7 @@
 //! The rays that go on from hits in scenes in which light goes round: this step replaces `reflect` and `spawn_rays` there.
 //!
-//! It goes lane by lane, with the functions of the reference tracer. The directions by the cosine alone are drawn in packets, by
-//! the same functions.
+//! It goes lane by lane, with the functions of the reference tracer. The directions of scattered rays alone are drawn in packets,
+//! by the same functions.
 
 use fearless_simd::{Simd, SimdBase};
 use glam::DVec3;
@@ -11,9 +11,10 @@ use crate::fast::arithmetic::real::{Lanes, Real};
 use crate::fast::build::prepare::Prepared;
 use crate::fast::materials::paths::Paths;
 use crate::fast::rays::bounce::{Column, Hits, RayBatch};
-use crate::fast::transport::path_queue::{PathQueues, PathRay, Turns};
+use crate::fast::transport::path_queue::{BLOCK, Drawn, PathQueues, PathRay, Turns};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::reference::{Refraction, refract};
+use crate::sampling::guide::{Guide, Scattering};
 use crate::sampling::paths::{Way, choice, direction_dimension, scattered};
 use crate::sampling::{Dimensions, Points};
 
@@ -56,7 +57,9 @@ fn draw_by_cosine<S: Simd, E: Real>(
         for lane in at..end {
             let turns = paths.turns[lane];
             let pixel = queue.pixel.0[lane];
-            if hits.is_hit(lane) && pixel.widen() >= 0.0 && u32::from(turns.scattered) < numbers.indirect {
+            drawn.is_scattered[lane] =
+                hits.is_hit(lane) && pixel.widen() >= 0.0 && u32::from(turns.scattered) < numbers.indirect;
+            if drawn.is_scattered[lane] {
                 let of = numbers.direction(pixel.to_index(), turns.hits());
                 [drawn.numbers[0].0[lane], drawn.numbers[1].0[lane]] = [of.0, of.1];
             }
@@ -72,7 +75,7 @@ fn draw_by_cosine<S: Simd, E: Real>(
                 Some(faces) => faces.each_ref().map(|column| &column[..end]),
                 None => [nx, ny, nz],
             };
-            let [x, y, z] = drawn.directions.each_mut().map(|column| &mut column.0[..end]);
+            let [x, y, z] = drawn.by_cosine.each_mut().map(|column| &mut column.0[..end]);
             for k in 0..end {
                 let normal = DVec3::new(nx[k].widen(), ny[k].widen(), nz[k].widen());
                 let face = DVec3::new(fx[k].widen(), fy[k].widen(), fz[k].widen());
@@ -81,6 +84,55 @@ fn draw_by_cosine<S: Simd, E: Real>(
             }
         },
     );
+}
+
+/// Draws the rays towards light at the hits of a batch, beside those by the cosine.
+#[inline(never)]
+fn aim<S: Simd, E: Real>(simd: S, (guide, scene): (&Guide, &Paths), hits: &Hits<E>, drawn: &mut Drawn) {
+    let end = hits.packets.iter().map(|&(at, _)| at + Lanes::<S, E>::LEN).max().unwrap_or(0);
+    let has_faces = !hits.face[0].is_empty();
+    drawn.is_scattered[end..].fill(false);
+    for first in (0..end).step_by(BLOCK) {
+        let lanes = first..first + BLOCK;
+        if !drawn.is_scattered[lanes.clone()].contains(&true) {
+            continue;
+        }
+        let (mut place, mut normal, mut face) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
+        for (k, lane) in lanes.clone().enumerate() {
+            let normal_of = read(&hits.normal, lane);
+            let (start, face_of) = match has_faces {
+                true => (read_of(&hits.place, lane), read_of(&hits.face, lane)),
+                false => (read(&hits.start, lane), normal_of),
+            };
+            for (columns, vector) in
+                [(&mut place, scene.in_scene(start)), (&mut normal, normal_of), (&mut face, face_of)]
+            {
+                for (column, part) in columns.iter_mut().zip(vector.to_array()) {
+                    column[k] = part;
+                }
+            }
+        }
+        let block = |column: &Column<f64>| core::array::from_fn(|k| column.0[first + k]);
+        let at = Scattering::<BLOCK> {
+            is_hit: core::array::from_fn(|k| drawn.is_scattered[first + k]),
+            numbers: drawn.numbers.each_ref().map(|column| block(column)),
+            by_cosine: drawn.by_cosine.each_ref().map(|column| block(column)),
+            place,
+            normal,
+            face,
+        };
+        let seen = &mut drawn.seen;
+        let aimed = simd.vectorize(
+            #[inline(always)]
+            || guide.scattered(&at, seen),
+        );
+        for (to, from) in drawn.aimed.iter_mut().zip(&aimed.directions) {
+            to.0[lanes.clone()].copy_from_slice(from);
+        }
+        for (to, from) in drawn.factors.iter_mut().zip(&aimed.factors) {
+            to.0[lanes.clone()].copy_from_slice(from);
+        }
+    }
 }
 
 /// Adds the rays that go on from the hits of a batch to the queues. `is_painted` says that the hits have their mirror
@@ -97,10 +149,12 @@ pub(crate) fn spawn_paths<S: Simd, E: Real>(
     let lanes = Lanes::<S, E>::LEN;
     if numbers.indirect > 0 {
         draw_by_cosine(simd, numbers, (queue, hits), &mut waiting.paths);
+        if let Some(guide) = paths.guide() {
+            aim(simd, (guide, paths), hits, &mut waiting.paths.drawn);
+        }
     }
     let is_foggy = scene.fog().is_some();
     let has_faces = !hits.face[0].is_empty();
-    let mut aims = core::mem::take(&mut waiting.paths.aims);
     for &(at, _) in &hits.packets {
         for lane in at..at + lanes {
             let pixel = queue.pixel.0[lane];
@@ -120,11 +174,18 @@ pub(crate) fn spawn_paths<S: Simd, E: Real>(
                 if is_foggy {
                     weight *= hits.clearness[lane].widen();
                 }
-                let drawn = waiting.paths.drawn.at(lane);
-                from.send(waiting, Way::Scattered, weight, -1.0, |_| {
-                    let rays = paths.scattered(drawn, start, (normal, face), &mut aims);
-                    rays.map(|(direction, share)| (start, direction, share))
-                });
+                let drawn = &waiting.paths.drawn;
+                let of = |columns: &[Box<Column<f64>>; 3]| {
+                    DVec3::from_array(columns.each_ref().map(|column| column.0[lane]))
+                };
+                let by_cosine = of(&drawn.by_cosine);
+                if paths.guide().is_none() {
+                    from.send(waiting, Way::Scattered, weight, -1.0, [(start, by_cosine, 1.0)]);
+                } else {
+                    let [first, second] = drawn.factors.each_ref().map(|column| column.0[lane]);
+                    let rays = [(start, by_cosine, first), (start, of(&drawn.aimed), second)];
+                    from.send(waiting, Way::Scattered, weight, -1.0, rays);
+                }
             }
             let order = hits.order.0[lane].to_index();
             let entry = &scene.entries[order];
@@ -141,7 +202,6 @@ pub(crate) fn spawn_paths<S: Simd, E: Real>(
             );
         }
     }
-    waiting.paths.aims = aims;
 }
 
 /// Sends the mirrored and refracted rays of one hit, at `start` with these normals of its face and of its shading.
@@ -188,9 +248,9 @@ fn send_onward<E: Real>(
             let left = left * (1.0 - mirrored);
             let clear = if clear > 0.0 { clear * left * mean(glass) } else { -1.0 };
             let weight = weight * glass.color() * left;
-            from.send(waiting, Way::Refracted, weight, clear, |_| [(start - 2.0 * offset * face, bent, 1.0)]);
+            from.send(waiting, Way::Refracted, weight, clear, [(start - 2.0 * offset * face, bent, 1.0)]);
         }
-        from.send(waiting, Way::Mirrored, mirror * shown, -1.0, |_| [(start, towards, 1.0)]);
+        from.send(waiting, Way::Mirrored, mirror * shown, -1.0, [(start, towards, 1.0)]);
         return;
     }
     let normal = if has_faces { read_of(&hits.onward, lane) } else { normal };
@@ -200,9 +260,9 @@ fn send_onward<E: Real>(
         mirror += mirrored * weight;
         let clear = if clear > 0.0 { clear * (1.0 - mirrored) * mean(glass) } else { -1.0 };
         let weight = weight * glass.color() * (1.0 - mirrored);
-        from.send(waiting, Way::Refracted, weight, clear, |_| [(start - 2.0 * offset * face, bent, 1.0)]);
+        from.send(waiting, Way::Refracted, weight, clear, [(start - 2.0 * offset * face, bent, 1.0)]);
     }
-    from.send(waiting, Way::Mirrored, mirror, -1.0, |_| [(start, reflected(direction, normal), 1.0)]);
+    from.send(waiting, Way::Mirrored, mirror, -1.0, [(start, reflected(direction, normal), 1.0)]);
 }
 
 /// The hit from which rays go on.
@@ -220,8 +280,8 @@ impl<E: Real> Origin<'_, E> {
         self.numbers.direction(self.slot, self.turns.hits())
     }
 
-    /// Adds rays of this weight, if they are followed. `place` gives their starts, their directions, and further factors, which have no
-    /// part in whether they are followed: a ray that is aimed at bright light has a small one.
+    /// Adds rays of this weight, if they are followed: `rays` has their starts, their directions, and further factors, which have no
+    /// part in whether they are followed. A ray that is aimed at bright light has a small one.
     #[inline(always)]
     fn send<const COUNT: usize>(
         &self,
@@ -229,7 +289,7 @@ impl<E: Real> Origin<'_, E> {
         way: Way,
         weight: DVec3,
         clear: f64,
-        place: impl FnOnce(&Self) -> [(DVec3, DVec3, f64); COUNT],
+        rays: [(DVec3, DVec3, f64); COUNT],
     ) {
         let Self { slot, pixel, turns, numbers } = *self;
         let chance = way.chance(weight);
@@ -242,7 +302,7 @@ impl<E: Real> Origin<'_, E> {
             Way::Scattered => Turns { scattered: turns.scattered + 1, ..turns },
             Way::Mirrored | Way::Refracted => Turns { bounced: turns.bounced + 1, ..turns },
         };
-        for (origin, direction, share) in place(self) {
+        for (origin, direction, share) in rays {
             if share == 0.0 {
                 continue;
             }
