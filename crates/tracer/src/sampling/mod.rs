@@ -31,6 +31,8 @@ pub(crate) struct Dimensions {
     pub(crate) time: Option<usize>,
     /// How many there are.
     count: usize,
+    /// The number of directions that paths draw after scattering hits, two dimensions each.
+    directions: usize,
 }
 
 impl Dimensions {
@@ -45,7 +47,8 @@ impl Dimensions {
         let has_lens = moments.iter().any(has_lens);
         let lens = take(if has_lens { 2 } else { 0 });
         let time = take(usize::from(moments.len() > 1));
-        Self { lights, lens, time, count }
+        let directions = moments.iter().map(Scene::indirect_bounces).max().unwrap_or(0) as usize;
+        Self { lights, lens, time, count, directions }
     }
 }
 
@@ -148,7 +151,7 @@ pub(crate) struct Points {
 impl Points {
     /// Those of the samples from `first` on, up to `end`.
     pub(crate) fn new(dimensions: &Dimensions, sampler: Sampler, first: u32, end: u32) -> Self {
-        let own = dimensions.count.min(sobol::OWN);
+        let own = (dimensions.count + 2 * dimensions.directions).min(sobol::OWN);
         let row = |dimension| (first..end).map(|sample| sobol::reversed(sample, dimension)).collect();
         Self { sampler, aside: sampler.aside(), first, rows: (0..own).map(row).collect() }
     }
@@ -237,7 +240,7 @@ mod tests {
 
     #[test]
     fn many_pixels_at_once_have_the_points_that_each_has() {
-        let dimensions = Dimensions { lights: vec![], lens: None, time: None, count: 50 };
+        let dimensions = Dimensions { lights: vec![], lens: None, time: None, count: 50, directions: 0 };
         let points = Points::new(&dimensions, Sampler::Sobol, 5, 40);
         let seeds: Vec<u32> = (0..35).map(|k| pixel_seed(k, 7 * k)).collect();
         let samples: Vec<u32> = (5..40).collect();

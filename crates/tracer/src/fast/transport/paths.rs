@@ -10,13 +10,13 @@ use rayfold_scene::Glass;
 use crate::fast::arithmetic::real::{Lanes, Real};
 use crate::fast::build::prepare::Prepared;
 use crate::fast::materials::paths::Paths;
-use crate::fast::rays::bounce::{Column, Hits, RayBatch};
+use crate::fast::rays::bounce::{Column, Hits, ROOM, RayBatch};
 use crate::fast::transport::path_queue::{BLOCK, Drawn, PathQueues, PathRay, Turns};
 use crate::fast::transport::ray_queue::RayQueues;
 use crate::reference::{Refraction, refract};
 use crate::sampling::guide::{Guide, Scattering};
 use crate::sampling::paths::{Way, choice, direction_dimension, scattered};
-use crate::sampling::{Dimensions, Points};
+use crate::sampling::{BATCH, Dimensions, Points};
 
 /// The random numbers of a tile's paths.
 #[derive(Clone, Copy)]
@@ -51,20 +51,34 @@ fn draw_by_cosine<S: Simd, E: Real>(
     paths: &mut PathQueues<E>,
 ) {
     let drawn = &mut paths.drawn;
-    let mut end = 0;
-    for &(at, _) in &hits.packets {
-        end = at + Lanes::<S, E>::LEN;
-        for lane in at..end {
-            let turns = paths.turns[lane];
-            let pixel = queue.pixel.0[lane];
-            drawn.is_scattered[lane] =
-                hits.is_hit(lane) && pixel.widen() >= 0.0 && u32::from(turns.scattered) < numbers.indirect;
-            if drawn.is_scattered[lane] {
-                let of = numbers.direction(pixel.to_index(), turns.hits());
-                [drawn.numbers[0].0[lane], drawn.numbers[1].0[lane]] = [of.0, of.1];
-            }
+    let end = hits.packets.iter().map(|&(at, _)| at + Lanes::<S, E>::LEN).max().unwrap_or(0);
+    drawn.is_scattered.fill(false);
+    // Others take the numbers of some sample, which are of no use.
+    let (mut seeds, mut samples) = ([numbers.seeds[0]; ROOM], [numbers.samples[0]; ROOM]);
+    let mut before = 0;
+    for lane in hits.packets.iter().flat_map(|&(at, _)| at..at + Lanes::<S, E>::LEN) {
+        let turns = paths.turns[lane];
+        let pixel = queue.pixel.0[lane];
+        if hits.is_hit(lane) && pixel.widen() >= 0.0 && u32::from(turns.scattered) < numbers.indirect {
+            drawn.is_scattered[lane] = true;
+            let slot = pixel.to_index();
+            (seeds[lane], samples[lane]) = (numbers.seeds[slot], numbers.samples[slot]);
+            // All rays of a batch have as many hits before.
+            before = turns.hits();
         }
     }
+    let first = direction_dimension(numbers.dimensions, before);
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (dimension, column) in (first..).zip(&mut drawn.numbers) {
+                let pixels = seeds[..end].chunks(BATCH).zip(samples[..end].chunks(BATCH));
+                for ((seeds, samples), into) in pixels.zip(column.0[..end].chunks_mut(BATCH)) {
+                    numbers.points.coordinates(dimension, seeds, samples, into);
+                }
+            }
+        },
+    );
     let faces = if hits.face[0].is_empty() { None } else { Some(&hits.face) };
     simd.vectorize(
         #[inline(always)]
@@ -91,7 +105,6 @@ fn draw_by_cosine<S: Simd, E: Real>(
 fn aim<S: Simd, E: Real>(simd: S, (guide, scene): (&Guide, &Paths), hits: &Hits<E>, drawn: &mut Drawn) {
     let end = hits.packets.iter().map(|&(at, _)| at + Lanes::<S, E>::LEN).max().unwrap_or(0);
     let has_faces = !hits.face[0].is_empty();
-    drawn.is_scattered[end..].fill(false);
     for first in (0..end).step_by(BLOCK) {
         let lanes = first..first + BLOCK;
         if !drawn.is_scattered[lanes.clone()].contains(&true) {
