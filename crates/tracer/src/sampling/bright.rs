@@ -1,5 +1,7 @@
 //! Bright things as surfaces see them: balls, flat panes, and boxes and rods in which there is something bright.
 
+#![expect(clippy::needless_range_loop, reason = "lanes of several columns, which become packets")]
+
 use core::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};

@@ -8,6 +8,8 @@
 //! Cones around boxes hold what glows, and the windows of a room. The sky is drawn by a table of how much brighter than the
 //! mean it is, since the cosine finds the rest as well (Karlík, Šik, Vévoda, Skřivan and Křivánek, 2019).
 
+#![expect(clippy::needless_range_loop, reason = "lanes of several columns, which become packets")]
+
 use core::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
