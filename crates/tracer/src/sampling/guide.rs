@@ -98,8 +98,8 @@ impl Guide {
             sums[k] = u / share[k] * lit[k];
         }
         let aimed = self.towards_light(&is_aimed, (sums, hits.numbers[1]), seen);
-        let [by_cosine, towards_light] =
-            [&hits.by_cosine, &aimed].map(|directions| self.weighted_densities(directions, hits, seen));
+        let by_cosine = self.weighted_densities(&hits.by_cosine, &hits.is_hit, seen);
+        let towards_light = self.weighted_densities(&aimed, &is_aimed, seen);
         let mut factors = [[0.0; N]; 2];
         for k in 0..N {
             let part = |directions: &Places<N>, weighted: f64| {
@@ -146,17 +146,18 @@ impl Guide {
         core::array::from_fn(|k| self.sky_weight + from_glowing[k] + from_windows[k])
     }
 
-    /// Returns for each direction the sum of the densities of the ways to aim there, each times its weight.
+    /// Returns for each direction the sum of the densities of the ways to aim there, each times its weight. Those that are not wanted
+    /// are of no use.
     #[inline(always)]
     fn weighted_densities<const N: usize>(
         &self,
         directions: &Places<N>,
-        hits: &Scattering<N>,
+        is_wanted: &[bool; N],
         seen: &[Seen<N>],
     ) -> [f64; N] {
         let mut sums = [0.0; N];
         if let Some((table, panorama)) = &self.sky {
-            for k in (0..N).filter(|&k| hits.is_hit[k]) {
+            for k in (0..N).filter(|&k| is_wanted[k]) {
                 sums[k] = self.sky_weight * table.directions.density(panorama.turned(at(directions, k)));
             }
         }

@@ -42,14 +42,15 @@ impl PathNumbers<'_> {
     }
 }
 
-/// Draws the directions by the cosine at the hits of a batch, and the numbers that they are drawn with.
+/// Draws the directions by the cosine at the hits of a batch, and the numbers that they are drawn with. Returns the end of the lanes
+/// that have them.
 #[inline(never)]
 fn draw_by_cosine<S: Simd, E: Real>(
     simd: S,
     numbers: PathNumbers,
     (queue, hits): (&RayBatch<E>, &Hits<E>),
     paths: &mut PathQueues<E>,
-) {
+) -> usize {
     let drawn = &mut paths.drawn;
     let end = hits.packets.iter().map(|&(at, _)| at + Lanes::<S, E>::LEN).max().unwrap_or(0);
     drawn.is_scattered.fill(false);
@@ -98,13 +99,17 @@ fn draw_by_cosine<S: Simd, E: Real>(
             }
         },
     );
+    end
 }
 
-/// Draws the rays towards light at the hits of a batch, beside those by the cosine.
+/// Draws the rays towards light at the hits in the lanes before `end`, beside those by the cosine.
 #[inline(never)]
-fn aim<S: Simd, E: Real>(simd: S, (guide, scene): (&Guide, &Paths), hits: &Hits<E>, drawn: &mut Drawn) {
-    let end = hits.packets.iter().map(|&(at, _)| at + Lanes::<S, E>::LEN).max().unwrap_or(0);
-    let has_faces = !hits.face[0].is_empty();
+fn aim<S: Simd, E: Real>(
+    simd: S,
+    (guide, scene): (&Guide, &Paths),
+    (hits, end): (&Hits<E>, usize),
+    drawn: &mut Drawn,
+) {
     for first in (0..end).step_by(BLOCK) {
         let lanes = first..first + BLOCK;
         if !drawn.is_scattered[lanes.clone()].contains(&true) {
@@ -112,11 +117,7 @@ fn aim<S: Simd, E: Real>(simd: S, (guide, scene): (&Guide, &Paths), hits: &Hits<
         }
         let (mut place, mut normal, mut face) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
         for (k, lane) in lanes.clone().enumerate() {
-            let normal_of = read(&hits.normal, lane);
-            let (start, face_of) = match has_faces {
-                true => (read_of(&hits.place, lane), read_of(&hits.face, lane)),
-                false => (read(&hits.start, lane), normal_of),
-            };
+            let (start, face_of, normal_of) = start(hits, lane);
             for (columns, vector) in
                 [(&mut place, scene.in_scene(start)), (&mut normal, normal_of), (&mut face, face_of)]
             {
@@ -161,13 +162,12 @@ pub(crate) fn spawn_paths<S: Simd, E: Real>(
 ) {
     let lanes = Lanes::<S, E>::LEN;
     if numbers.indirect > 0 {
-        draw_by_cosine(simd, numbers, (queue, hits), &mut waiting.paths);
+        let end = draw_by_cosine(simd, numbers, (queue, hits), &mut waiting.paths);
         if let Some(guide) = paths.guide() {
-            aim(simd, (guide, paths), hits, &mut waiting.paths.drawn);
+            aim(simd, (guide, paths), (hits, end), &mut waiting.paths.drawn);
         }
     }
     let is_foggy = scene.fog().is_some();
-    let has_faces = !hits.face[0].is_empty();
     for &(at, _) in &hits.packets {
         for lane in at..at + lanes {
             let pixel = queue.pixel.0[lane];
@@ -177,11 +177,7 @@ pub(crate) fn spawn_paths<S: Simd, E: Real>(
             }
             let turns = waiting.paths.turns(lane);
             let from = Origin { slot: pixel.to_index(), pixel, turns, numbers };
-            let normal = read(&hits.normal, lane);
-            let (start, face) = match has_faces {
-                true => (read_of(&hits.place, lane), read_of(&hits.face, lane)),
-                false => (read(&hits.start, lane), normal),
-            };
+            let (start, face, normal) = start(hits, lane);
             if u32::from(turns.scattered) < numbers.indirect {
                 let mut weight = read(&hits.diffuse, lane);
                 if is_foggy {
@@ -329,6 +325,17 @@ impl<E: Real> Origin<'_, E> {
             };
             waiting.paths.push(way, ray);
         }
+    }
+}
+
+/// Returns where the rays from a hit start, and the normals of its face and of its shading.
+#[inline(always)]
+fn start<E: Real>(hits: &Hits<E>, lane: usize) -> (DVec3, DVec3, DVec3) {
+    let normal = read(&hits.normal, lane);
+    if hits.face[0].is_empty() {
+        (read(&hits.start, lane), normal, normal)
+    } else {
+        (read_of(&hits.place, lane), read_of(&hits.face, lane), normal)
     }
 }
 
