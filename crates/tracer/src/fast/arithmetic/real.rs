@@ -24,6 +24,9 @@ pub(crate) trait Real:
     + Sync
     + 'static
 {
+    /// Whether it is `f64`. Code for what is drawn in `f64` alone is left out of programs for `f32`.
+    const IS_DOUBLE: bool;
+
     /// The largest relative error of one rounding.
     const ROUNDOFF: f64;
 
@@ -46,6 +49,7 @@ pub(crate) trait Real:
 }
 
 impl Real for f32 {
+    const IS_DOUBLE: bool = false;
     const ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
     const FAR: f64 = 1e18;
     const COUNT: [Self; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
@@ -74,6 +78,7 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    const IS_DOUBLE: bool = true;
     const ROUNDOFF: f64 = f64::EPSILON / 2.0;
     const FAR: f64 = 1e140;
     const COUNT: [Self; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];

@@ -1,5 +1,5 @@
 //! Features that few scenes use: other shapes, lamps, highlights, patterns, glass, fog. Separate code draws them, so that
-//! scenes without them run no extra instructions.
+//! scenes without them run no extra instructions. All but the faces of meshes are drawn in `f64`.
 
 use rayfold_scene::Scene;
 
@@ -45,13 +45,13 @@ impl<E: Real> Extensions<E> {
     /// Returns the bodies, if there are any.
     #[inline(always)]
     pub(crate) fn bodies(&self) -> Option<&Bodies<E>> {
-        self.bodies.as_ref()
+        if E::IS_DOUBLE { self.bodies.as_ref() } else { None }
     }
 
     /// Returns the glass, if there is any.
     #[inline(always)]
     pub(crate) fn glass(&self) -> Option<&Glass<E>> {
-        if BUILT.glass { self.glass.as_ref() } else { None }
+        if E::IS_DOUBLE && BUILT.glass { self.glass.as_ref() } else { None }
     }
 
     /// Lets shadow rays ask for glass apart from opaque objects. `orders` are those of the row of all objects. Returns the
@@ -73,7 +73,7 @@ impl<E: Real> Extensions<E> {
     /// Returns the fog, if there is any.
     #[inline(always)]
     pub(crate) fn fog(&self) -> Option<&Fog> {
-        if parts::BUILT.fogs { self.fog.as_ref() } else { None }
+        if E::IS_DOUBLE && parts::BUILT.fogs { self.fog.as_ref() } else { None }
     }
 
     /// Returns the faces of meshes, if any has more than a triangle.
@@ -85,19 +85,24 @@ impl<E: Real> Extensions<E> {
     /// Returns the surfaces from which paths go on, if light goes round.
     #[inline(always)]
     pub(crate) fn paths(&self) -> Option<&Paths> {
-        if parts::BUILT.paths { self.paths.as_ref() } else { None }
+        if E::IS_DOUBLE && parts::BUILT.paths { self.paths.as_ref() } else { None }
     }
 
     #[inline(always)]
     pub(crate) fn lamps(&self) -> &[Lamp<E>] {
-        if parts::BUILT.lamps { &self.lamps } else { &[] }
+        if E::IS_DOUBLE && parts::BUILT.lamps { &self.lamps } else { &[] }
+    }
+
+    #[inline(always)]
+    fn finishes(&self) -> Option<&Finishes> {
+        if E::IS_DOUBLE { self.finishes.as_ref() } else { None }
     }
 
     /// Returns the finishes, if any surface has highlights.
     #[inline(always)]
     pub(crate) fn glossy(&self) -> Option<&Finishes> {
         let has_highlights = |finishes: &&Finishes| parts::BUILT.highlights && finishes.has_highlights;
-        self.finishes.as_ref().filter(|finishes| has_highlights(finishes) || self.has_rough())
+        self.finishes().filter(|finishes| has_highlights(finishes) || self.has_rough())
     }
 
     /// Returns the finishes, if any surface has a pattern or a picture, or if highlights need the mirror coefficients.
@@ -105,7 +110,7 @@ impl<E: Real> Extensions<E> {
     pub(crate) fn patterned(&self) -> Option<&Finishes> {
         let has_patterns =
             |finishes: &&Finishes| (parts::BUILT.patterns || parts::BUILT.pictures) && finishes.has_patterns;
-        self.finishes.as_ref().filter(|finishes| has_patterns(finishes) || self.has_rough())
+        self.finishes().filter(|finishes| has_patterns(finishes) || self.has_rough())
     }
 
     /// Returns the surfaces of paths, if any is rough.
@@ -122,7 +127,7 @@ impl<E: Real> Extensions<E> {
     /// Returns the finishes, if any surface glows.
     #[inline(always)]
     pub(crate) fn glowing(&self) -> Option<&Finishes> {
-        self.finishes.as_ref().filter(|finishes| parts::BUILT.glows && finishes.glows())
+        self.finishes().filter(|finishes| parts::BUILT.glows && finishes.glows())
     }
 
     pub(crate) fn has_glass(&self) -> bool {

@@ -283,7 +283,7 @@ impl<E: Real> Prepared<E> {
     /// Returns the picture around it, if there is one.
     #[inline(always)]
     pub(crate) fn panorama(&self) -> Option<&Panorama> {
-        if parts::BUILT.pictures { self.panorama.as_ref() } else { None }
+        if E::IS_DOUBLE && parts::BUILT.pictures { self.panorama.as_ref() } else { None }
     }
 
     /// Returns whether all camera rays that hit nothing bring the same.
@@ -301,13 +301,13 @@ impl<E: Real> Prepared<E> {
     /// Returns whether it has glass.
     #[inline(always)]
     pub(crate) fn has_glass(&self) -> bool {
-        BUILT.glass && self.needs.glass
+        E::IS_DOUBLE && BUILT.glass && self.needs.glass
     }
 
     /// Returns whether rays can be within objects of glass whose surroundings are known.
     #[inline(always)]
     pub(crate) fn has_enclosures(&self) -> bool {
-        BUILT.glass && !self.enclosures.is_empty()
+        E::IS_DOUBLE && BUILT.glass && !self.enclosures.is_empty()
     }
 
     /// Returns what rays meet within the object of this order, if it is known.
@@ -319,7 +319,7 @@ impl<E: Real> Prepared<E> {
     /// Returns the objects of glass, if shadow rays ask for opaque objects first, and for those after them.
     #[inline(always)]
     pub(crate) fn glass_apart(&self) -> Option<GlassBits> {
-        if BUILT.glass { self.glass_bits } else { None }
+        if E::IS_DOUBLE && BUILT.glass { self.glass_bits } else { None }
     }
 
     /// Returns the objects that shadow rays ask for first, as bits: of the row of all objects, and of the bodies. They are all,
