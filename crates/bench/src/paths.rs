@@ -61,9 +61,15 @@ Sphere .6 -.8 .6 0 clay
 Cone .5 .1 .5 0 .3 .5 1 .3 clay
 ";
 
+/// A room with a window in its left wall.
+const WINDOW: &str = "Look 0 1 3.4 0 1 0 50\nMaterial white diffuse .75 .75 .75\nMaterial red diffuse .75 .1 .1\n\
+     Box -1.1 -.1 -1.1 1.1 0 3.6 white\nBox -1.1 0 -1.1 1.1 2 -1 white\nBox 1 0 -1.1 1.1 2 3.6 white\n\
+     Box -1.1 2 -1.1 1.1 2.1 3.6 white\nBox -1.1 0 3.5 1.1 2 3.6 white\nBox -1.1 0 -1.1 -1 .6 3.6 red\n\
+     Box -1.1 1.5 -1.1 -1 2 3.6 red\nBox -1.1 .6 -1.1 -1 1.5 -.6 red\nBox -1.1 .6 .3 -1 1.5 3.6 red\n";
+
 /// Names, settings, and objects after those of a room or of an open place. Nothing in them is brighter than 1: a picture clamps
 /// its pixels, and the oracle its paths not.
-const SCENES: [(&str, &str, &str, &str); 11] = [
+const SCENES: [(&str, &str, &str, &str); 12] = [
     ("a room under a hole", "Indirect 3\nBackground .9 1 1", ROOM, "Sphere .35 -.4 .35 -.3 white"),
     (
         "a room with a lamp",
@@ -84,14 +90,12 @@ const SCENES: [(&str, &str, &str, &str); 11] = [
         "Material pane glass .9 .95 .9 1.5\nMaterial chrome mirror .8 .7 .6 diffuse .1 .1 .1\nSphere .3 .5 .3 .3 pane\n\
          Sphere .3 -.4 .3 -.3 chrome",
     ),
+    ("a room with a window", "Indirect 3\nSky .7 .75 .8", WINDOW, "Sphere .35 -.4 .35 -.3 white"),
     (
-        "a room with a window",
-        "Indirect 3\nSky .7 .75 .8",
-        "Look 0 1 3.4 0 1 0 50\nMaterial white diffuse .75 .75 .75\nMaterial red diffuse .75 .1 .1\n\
-         Box -1.1 -.1 -1.1 1.1 0 3.6 white\nBox -1.1 0 -1.1 1.1 2 -1 white\nBox 1 0 -1.1 1.1 2 3.6 white\n\
-         Box -1.1 2 -1.1 1.1 2.1 3.6 white\nBox -1.1 0 3.5 1.1 2 3.6 white\nBox -1.1 0 -1.1 -1 .6 3.6 red\n\
-         Box -1.1 1.5 -1.1 -1 2 3.6 red\nBox -1.1 .6 -1.1 -1 1.5 -.6 red\nBox -1.1 .6 .3 -1 1.5 3.6 red\n",
-        "Sphere .35 -.4 .35 -.3 white",
+        "a room with a window and a sun",
+        "Indirect 3\nSky .2 .25 .3",
+        WINDOW,
+        "Sphere .35 -.4 .35 -.3 white\nIlight .9 .85 .8 1 -.7 -.2",
     ),
     ("an overcast day", "Indirect 2\nBackground .3 .3 .3 .7 .75 .8", OPEN, ""),
     ("a sun in fog", "Indirect 1\nFog .3 .35 .4 8", OPEN, "Ilight .8 .7 .6 1 -2 -1"),

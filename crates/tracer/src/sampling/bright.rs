@@ -58,6 +58,7 @@ struct Pane {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Edge {
     Disc,
+    /// Of any angle.
     Rectangle,
     Triangle,
 }
@@ -130,8 +131,24 @@ impl Bright {
         Some(Self { brightness, form: Form::Pane(Pane::new(Edge::Rectangle, low, [a, b], false)?) })
     }
 
+    /// Returns a parallelogram of which a corner and the sides there are given. It is seen from where its normal points.
+    pub(crate) fn parallelogram(
+        brightness: f64,
+        origin: DVec3,
+        [a, b]: [DVec3; 2],
+        normal: DVec3,
+    ) -> Option<Self> {
+        let sides = if a.cross(b).dot(normal) > 0.0 { [a, b] } else { [b, a] };
+        Some(Self { brightness, form: Form::Pane(Pane::new(Edge::Rectangle, origin, sides, true)?) })
+    }
+
+    /// Returns what is somewhere in a box.
+    pub(crate) fn within(brightness: f64, bounds: [DVec3; 2]) -> Self {
+        Self { brightness, form: Form::Within(bounds) }
+    }
+
     /// Returns about how much light it gives off.
-    fn power(&self) -> f64 {
+    pub(crate) fn power(&self) -> f64 {
         self.brightness
             * match self.form {
                 Form::Ball { radius, .. } => 2.0 * PI * radius * radius,
