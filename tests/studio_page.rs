@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 9] = [
+const TESTS: [&str; 10] = [
     "tests/logic.mjs",
+    "tests/site-standing.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
     "tests/script.mjs",

@@ -200,9 +200,12 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
         self.outputs().iter().all(|output| self.has_current(*output))
     }
 
-    /// Returns whether a file shows what the manifest says, and the manifest is about the newest scripts.
+    /// Returns whether a file shows what the manifest says, and the manifest is about the newest scripts. An animation that is
+    /// not done has no such file: what is there will be replaced or deleted.
     pub fn has_current(&self, output: Container) -> bool {
-        let shows = |manifest: &Manifest| is_current(&manifest.head, output, self.file(output));
+        let shows = |Manifest { head, .. }: &Manifest| {
+            head.status == Status::Done && is_current(head, output, self.file(output))
+        };
         !self.is_behind && self.manifest.as_ref().is_some_and(shows)
     }
 

@@ -278,7 +278,66 @@ impl RunUpdate {
 
 #[cfg(test)]
 mod tests {
+    use rayfold_client::Client;
+    use rayfold_pipeline::SystemClock;
+    use rayfold_pipeline::assemble::frame_key;
+    use rayfold_pipeline::keys::Animation;
+    use rayfold_pipeline::store::{MemoryStore, PutOptions};
+    use serde_json::{Value, json};
+
     use super::*;
+
+    /// The page without a program reads the same cases (`web/tests/site-standing.mjs`).
+    #[tokio::test]
+    async fn what_the_page_without_a_program_computes_is_the_same() {
+        let cases: Vec<Value> = serde_json::from_str(include_str!("standing.json")).unwrap();
+        for case in cases {
+            assert_eq!(computed(&case).await, case["expected"], "{}", case["title"]);
+        }
+    }
+
+    async fn computed(case: &Value) -> Value {
+        let (store, animation) = (MemoryStore::new(SystemClock), Animation::new("film").unwrap());
+        let put = async |key: String, text: &str, generation: Option<&str>| {
+            let options = PutOptions::always();
+            let options = match generation {
+                Some(generation) => options.metadata("generation", generation),
+                None => options,
+            };
+            store.put(&key, text.to_owned().into(), options).await.unwrap();
+        };
+        for (name, text) in case["scripts"].as_object().unwrap() {
+            put(format!("scripts/film/{name}"), text.as_str().unwrap(), None).await;
+        }
+        for (ending, file) in case["files"].as_object().unwrap() {
+            let text = file["text"].as_str().unwrap();
+            put(format!("animations/film.{ending}"), text, file["generation"].as_str()).await;
+        }
+        match &case["manifest"] {
+            Value::Null => {}
+            Value::Object(manifest) => {
+                let mut head = manifest.clone();
+                let frames = head.remove("frames").unwrap();
+                let head = Value::from(head).to_string();
+                let (head, frames) =
+                    (head.strip_suffix('}').unwrap(), frames.to_string().replacen('[', "[\n", 1));
+                put(animation.manifest(), &format!("{head},\n\"frames\":{frames}}}\n"), None).await;
+            }
+            other => put(animation.manifest(), other.as_str().unwrap(), None).await,
+        }
+        let mut watch = Watch::new(Client::new(&store, &SystemClock), animation.clone());
+        watch.poll().await.unwrap();
+        watch.compare().await.unwrap();
+        let (faults, more_faults) = watch.manifest().map_or_else(Default::default, faults);
+        let frames = watch.manifest().map_or(&[][..], |manifest| &manifest.frames);
+        json!({
+            "summary": summary(&watch),
+            "faults": faults,
+            "moreFaults": more_faults,
+            "frames": frames.iter().map(FrameUpdate::of).collect::<Vec<_>>(),
+            "keys": frames.iter().filter_map(|frame| frame_key(&animation, frame)).collect::<Vec<_>>(),
+        })
+    }
 
     fn state(done: u64) -> RunState {
         let summary = Summary {

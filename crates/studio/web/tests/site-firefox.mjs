@@ -6,6 +6,7 @@ import { after, before, test } from "node:test";
 import puppeteer from "puppeteer-core";
 
 import { expected, film, linked, many, serve } from "./host.mjs";
+import { cognito, dev } from "./site-dev.mjs";
 
 let browser, host;
 before(async () => {
@@ -17,7 +18,7 @@ after(async () => {
   host?.close();
 });
 
-async function open(t, where, shown) {
+async function open(t, where, shown, prepare = () => {}) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
   await page.setViewport({ width: 1400, height: 900 });
@@ -33,7 +34,8 @@ async function open(t, where, shown) {
   page.on("pageerror", (error) => faults.push(String(error)));
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
   t.after(() => context.close());
-  await page.goto(host.address + where);
+  await prepare(page);
+  await page.goto(new URL(where, host.address).href);
   const drawn = (what = "canvas[data-final=true]") => page.waitForSelector(what, { timeout: 120_000 });
   await drawn(shown);
   return { page, drawn, check: () => assert.deepEqual(faults, []) };
@@ -41,7 +43,11 @@ async function open(t, where, shown) {
 
 async function gif(page) {
   await page.click("::-p-aria(Render GIF)");
-  await (await page.waitForSelector(".result a.button", { timeout: 120_000 })).click();
+  return saved(page, ".result a.button");
+}
+
+async function saved(page, link) {
+  await (await page.waitForSelector(link, { timeout: 120_000 })).click();
   await page.waitForFunction(() => globalThis.saved);
   const text = await page.evaluate(async () => {
     const bytes = new Uint8Array(await globalThis.saved.arrayBuffer());
@@ -86,6 +92,43 @@ test("in Firefox the start page shows an example playing, and a click opens it",
   await hello.click();
   await drawn();
   assert.match(page.url(), /studio\.html#project=hello$/);
+  check();
+});
+
+test("in Firefox a person signs in on another page, comes back, submits, has the command's GIF, and finds the run", async (t) => {
+  const { own, stop } = await dev();
+  t.after(stop);
+  const stand = await cognito(own);
+  const { page, drawn, check } = await open(t, `${own}/studio.html${linked("film", [["film.txt", film]])}`, undefined, async (page) => {
+    // What a service worker fetches is not answered here.
+    await page.evaluateOnNewDocument(() => {
+      if (navigator.serviceWorker) navigator.serviceWorker.register = () => new Promise(() => {});
+    });
+    await page.setRequestInterception(true);
+    page.on("request", async (request) => {
+      // Bodies of requests are not told here.
+      const answer = await stand.answer(request.method(), request.url(), request.headers());
+      await (answer ? request.respond(answer) : request.continue());
+    });
+  });
+  assert.deepEqual(stand.asked, [], "nobody is asked before there is a need");
+  const show = (hash) => page.evaluate((hash) => void (location.hash = hash), hash);
+  const click = async (what) => (await page.waitForSelector(what, { timeout: 120_000 })).click();
+  await show("#runs");
+  await click("::-p-aria(Sign in)");
+  await page.waitForSelector("::-p-text(Runs in rayfold)", { timeout: 120_000 });
+  assert.deepEqual(stand.asked, ["password", "token", "GetId", "GetCredentialsForIdentity"]);
+  await show("#submit");
+  await page.locator("form.submit input.rename").setTimeout(120_000).fill("signed");
+  await click("form.submit button.main");
+  await page.waitForSelector("::-p-text(to upload)", { timeout: 120_000 });
+  await click("form.submit button.main:not(:disabled)");
+  await drawn(".standing [role=status][data-status=done][data-settled=true]");
+  assert.equal(new URL(page.url()).hash, "#run=signed");
+  assert.ok((await saved(page, "a[download$='.gif']")).equals(expected(t, [["film.txt", film]])), "the same bytes");
+  await show("#runs");
+  await page.waitForSelector("a[href='#run=signed']", { timeout: 120_000 });
+  await page.waitForSelector("::-p-text(done: 6 of 6 frames)", { timeout: 120_000 });
   check();
 });
 

@@ -3,44 +3,29 @@
 // the functions are not beside the program.
 
 import assert from "node:assert/strict";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
-import { createServer } from "node:net";
-import { tmpdir } from "node:os";
+import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { chromium } from "playwright-core";
 
 import { expected, film, linked } from "./host.mjs";
-import { start } from "./processes.mjs";
+import { cognito, dev } from "./site-dev.mjs";
 
 /** Longer than a bucket takes on a loaded machine, in milliseconds. */
 const PATIENCE = 600_000;
 
-const { CHROMIUM: executablePath, RAYFOLD: program, SITE: site } = process.env;
+const { CHROMIUM: executablePath } = process.env;
 
-async function freePort() {
-  const server = createServer();
-  await new Promise((done) => server.listen(0, "127.0.0.1", done));
-  const { port } = server.address();
-  await new Promise((done) => server.close(done));
-  return port;
-}
-
-let browser, dev, data, address;
+let browser, bucket;
 before(async () => {
   // A page that the test has changed counts as one from afar, which Chromium keeps from this machine's ports.
   browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-features=LocalNetworkAccessChecks"] });
-  data = mkdtempSync(join(tmpdir(), "rayfold-dev-"));
-  address = `127.0.0.1:${await freePort()}`;
-  dev = start(program, ["dev", "--data", data, "--address", "127.0.0.1:0", "--site", site, "--site-address", address]);
-  await dev.said((text) => text.includes("aws s3 sync"));
+  bucket = await dev();
 });
 after(async () => {
   await browser?.close();
-  dev?.server.kill("SIGINT");
-  await dev?.ended;
-  rmSync(data, { recursive: true, force: true });
+  await bucket?.stop();
 });
 
 async function open(t, files) {
@@ -50,7 +35,7 @@ async function open(t, files) {
   page.setDefaultTimeout(60_000);
   const faults = [];
   page.on("pageerror", (error) => faults.push(String(error)));
-  await page.goto(`http://${address}/studio.html${linked("film", files)}`);
+  await page.goto(`${bucket.own}/studio.html${linked("film", files)}`);
   await page.waitForFunction(() => document.querySelector("canvas")?.dataset.final === "true");
   return { page, faults };
 }
@@ -151,52 +136,16 @@ test("the credentials of the page end at the person's folder", async (t) => {
   }
 });
 
-// Cognito's part is played here: its pages and answers are as its documentation describes them, and nobody asked Cognito.
 test("a person signs in on another page, comes back, and submits with the credentials of the identity", async (t) => {
-  const LOGIN = "https://demo.auth.eu-central-1.amazoncognito.com";
-  const IDENTITY = "https://cognito-identity.eu-central-1.amazonaws.com/";
-  const signIn = { region: "eu-central-1", identityPoolId: "eu-central-1:pool", userPoolId: "eu-central-1_Pool", clientId: "client", loginUrl: LOGIN };
-  const own = `http://${address}`;
-  const { credentials: _, ...config } = await (await fetch(`${own}/rayfold.json`)).json();
-  const given = await (await fetch(`${own}/credentials`, { method: "POST", headers: { origin: own } })).json();
+  const { own } = bucket;
+  const stand = await cognito(own);
+  const { asked } = stand;
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, serviceWorkers: "block" });
   t.after(() => context.close());
-  const asked = [];
-  const json = (route, value) => route.fulfill({ json: value, headers: { "access-control-allow-origin": own } });
-  await context.route("**/rayfold.json", (route) => route.fulfill({ json: { ...config, signIn } }));
-  // As Terraform writes it.
-  await context.route("**/studio.html*", async (route) => {
-    const answer = await route.fetch();
-    const policy = (text) => text.replace("connect-src 'self'", `connect-src 'self' ${IDENTITY.slice(0, -1)} ${LOGIN}`);
-    const headers = answer.headers();
-    await route.fulfill({ body: policy(await answer.text()), headers: { ...headers, "content-security-policy": policy(headers["content-security-policy"]) } });
-  });
-  let challenge = "";
-  let state = "right";
-  await context.route(`${LOGIN}/oauth2/authorize?*`, (route) => {
-    const query = new URL(route.request().url()).searchParams;
-    assert.deepEqual([query.get("response_type"), query.get("client_id"), query.get("code_challenge_method")], ["code", "client", "S256"]);
-    challenge = query.get("code_challenge");
-    const back = new URL(query.get("redirect_uri"));
-    back.search = new URLSearchParams({ code: "code", state: state === "right" ? query.get("state") : "another" });
-    asked.push("password");
-    return route.fulfill({ contentType: "text/html", body: `<a href="${back.href.replace("&", "&amp;")}">Sign in</a>` });
-  });
-  await context.route(`${LOGIN}/oauth2/token`, async (route) => {
-    const query = new URLSearchParams(route.request().postData());
-    const digest = Buffer.from(await crypto.subtle.digest("SHA-256", Buffer.from(query.get("code_verifier"))));
-    assert.equal(digest.toString("base64url"), challenge, "the page that asked is the one that redeems");
-    asked.push("token");
-    const claims = Buffer.from(JSON.stringify({ exp: Date.now() / 1000 + 3600 })).toString("base64url");
-    return json(route, { id_token: `e30.${claims}.signature` });
-  });
-  await context.route(IDENTITY, (route) => {
-    const what = route.request().headers()["x-amz-target"].split(".")[1];
-    const body = route.request().postDataJSON();
-    assert.deepEqual(Object.keys(body.Logins), ["cognito-idp.eu-central-1.amazonaws.com/eu-central-1_Pool"]);
-    asked.push(what);
-    if (what === "GetId") return json(route, { IdentityId: given.identity });
-    return json(route, { IdentityId: given.identity, Credentials: { AccessKeyId: given.accessKey, SecretKey: given.secretKey, SessionToken: given.sessionToken } });
+  await context.route("**", async (route) => {
+    const request = route.request();
+    const answer = await stand.answer(request.method(), request.url(), request.headers(), request.postData());
+    return answer ? route.fulfill(answer) : route.continue();
   });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
@@ -207,12 +156,12 @@ test("a person signs in on another page, comes back, and submits with the creden
   await drawn();
   assert.deepEqual(asked, [], "nobody is asked before there is a need");
   // An answer to another question than the page's is not used, and the browser is not sent away again by itself.
-  state = "wrong";
+  stand.isStateRight = false;
   await show(page, "#submit");
   await page.getByRole("link", { name: "Sign in" }).click();
   await page.getByRole("alert").getByText(/nobody was signed in/).waitFor();
   assert.deepEqual(asked, ["password"]);
-  state = "right";
+  stand.isStateRight = true;
   await show(page, "#runs");
   await page.getByRole("link", { name: "Sign in" }).click();
   await page.getByRole("heading", { name: "Runs in rayfold" }).waitFor();

@@ -9,7 +9,7 @@ import { bytesOf, textOf, type File } from "../module";
 import { Bucket } from "./bucket";
 import { isSignedIn, leave } from "./person";
 import { stack } from "./stack";
-import { faults, frameFile, frameUpdate, isBehind, outputsOf, summary, type Manifest, type Output } from "./standing";
+import { faults, frameFile, frameUpdate, isBehind, manifestOf, outputsOf, summary, type Known, type Manifest, type Output } from "./standing";
 
 export type { Answer } from "../../connection/runs";
 
@@ -53,17 +53,8 @@ function checked(run: string): string {
   return run;
 }
 
-function manifestOf(text: string | null): Manifest | string | null {
-  if (text === null) return null;
-  try {
-    return JSON.parse(text) as Manifest;
-  } catch {
-    return text;
-  }
-}
-
-async function outputs(own: Bucket, animation: string, manifest: Manifest): Promise<Output[]> {
-  const found = outputsOf(manifest).map(async (ending) => {
+async function outputs(own: Bucket, animation: string, known: Known): Promise<Output[]> {
+  const found = outputsOf(known).map(async (ending) => {
     const file = await own.head(`animations/${animation}.${ending}`);
     return file && { ending, ...file };
   });
@@ -90,11 +81,12 @@ async function look(own: Bucket, folder: string, run: string, before: Seen | nul
   const content = await own.get(`manifests/${animation}.json`);
   const text = content && textOf(content);
   if (before?.summary.settled && before.text === text) return before;
-  const manifest = manifestOf(text);
-  if (manifest === null || typeof manifest === "string") return { text, summary: summary(run, manifest, [], false), manifest: null };
-  const [made, there] = await Promise.all([outputs(own, animation, manifest), scripts(own, animation)]);
+  const known = manifestOf(animation, text);
+  if (known === "new") return { text, summary: summary(run, known, [], false), manifest: null };
+  if (known === "unreadable") return { text, summary: summary(run, known, await outputs(own, animation, known), false), manifest: null };
+  const [made, there] = await Promise.all([outputs(own, animation, known), scripts(own, animation)]);
   const versions = new Map(Array.from(there, ([name, { etag }]) => [name, etag]));
-  return { text, summary: summary(run, manifest, made, isBehind(manifest, versions)), manifest };
+  return { text, summary: summary(run, known, made, isBehind(known, versions)), manifest: known };
 }
 
 async function list(): Promise<object> {

@@ -1,5 +1,5 @@
 // The state of a run for the page, from its manifest (docs/manifest.md) and the listing of its scripts. Contains values only; the
-// program computes the same in `runs/updates.rs`.
+// program computes the same in `runs/updates.rs`. Tests compare both on the cases in `runs/standing.json`.
 
 import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../../protocol";
 
@@ -28,7 +28,12 @@ interface Made {
   readonly version: string;
 }
 
+/** The version of manifests that is read here. */
+const SCHEMA = 1;
+
 export interface Manifest {
+  readonly schema: number;
+  readonly animation: string;
   readonly status: "empty" | "waiting" | "rendering" | "failed" | "refused" | "done";
   readonly generation: string;
   readonly total: number;
@@ -51,8 +56,22 @@ export interface Output {
   readonly generation: string | null;
 }
 
+/** A manifest, or the reason why there is none. */
+export type Known = Manifest | "new" | "unreadable";
+
+/** Reads the manifest of an animation. One of a later schema or of another animation is unreadable. */
+export function manifestOf(animation: string, text: string | null): Known {
+  if (text === null) return "new";
+  try {
+    const read = JSON.parse(text) as Manifest | null;
+    return read && read.schema <= SCHEMA && read.animation === animation ? read : "unreadable";
+  } catch {
+    return "unreadable";
+  }
+}
+
 /** The endings of the files that are made of an animation. */
-export const outputsOf = (manifest: Manifest): readonly string[] => manifest.settings.value?.outputs ?? ["gif"];
+export const outputsOf = (known: Known): readonly string[] => (typeof known !== "string" && known.settings.value?.outputs) || ["gif"];
 
 /** Whether the manifest is about other scripts or settings than those that are there, by name. Files that scripts name are not looked at. */
 export function isBehind({ frames, settings }: Manifest, there: ReadonlyMap<string, string>): boolean {
@@ -62,27 +81,26 @@ export function isBehind({ frames, settings }: Manifest, there: ReadonlyMap<stri
   return own.length !== seen.size || own.some(([name, version]) => seen.get(name) !== version);
 }
 
-/** The state of a run; `manifest` is the text of its manifest if it cannot be read. */
-export function summary(run: string, manifest: Manifest | string | null, outputs: readonly Output[], behind: boolean): Summary {
-  if (manifest === null || typeof manifest === "string") {
-    return { run, status: manifest === null ? "new" : "unreadable", done: 0, failed: 0, total: 0, behind: false, settled: false, files: [] };
-  }
+/** The state of a run. */
+export function summary(run: string, known: Known, outputs: readonly Output[], behind: boolean): Summary {
   const isCurrent = ({ ending, etag, generation }: Output): boolean => {
-    const made = ending === "gif" ? manifest.gif : manifest.outputs?.[ending];
-    const isOther = made?.generation === manifest.generation && made.version !== etag;
-    return !behind && generation === manifest.generation && !isOther;
+    if (behind || typeof known === "string" || known.status !== "done") return false;
+    const made = ending === "gif" ? known.gif : known.outputs?.[ending];
+    const isOther = made?.generation === known.generation && made.version !== etag;
+    return generation === known.generation && !isOther;
   };
   const files = outputs.map((output): RunFile => ({
     ending: output.ending,
     format: FORMATS[output.ending] ?? output.ending,
     bytes: output.size,
     version: output.etag,
-    current: manifest.status === "done" && isCurrent(output),
+    current: isCurrent(output),
   }));
-  const isComplete = outputsOf(manifest).every((ending) => files.some((file) => file.ending === ending && file.current));
-  const settled = { empty: files.length === 0, waiting: false, rendering: false, failed: true, refused: true, done: isComplete }[manifest.status];
-  const total = Math.max(manifest.total, manifest.settings.value?.frames ?? 0);
-  return { run, status: manifest.status, done: manifest.done, failed: manifest.failed, total, behind, settled: settled && !behind, files };
+  if (typeof known === "string") return { run, status: known, done: 0, failed: 0, total: 0, behind: false, settled: false, files };
+  const isComplete = outputsOf(known).every((ending) => files.some((file) => file.ending === ending && file.current));
+  const settled = { empty: files.length === 0, waiting: false, rendering: false, failed: true, refused: true, done: isComplete }[known.status];
+  const total = Math.max(known.total, known.settings.value?.frames ?? 0);
+  return { run, status: known.status, done: known.done, failed: known.failed, total, behind, settled: settled && !behind, files };
 }
 
 export function frameUpdate({ script, version, part, state, pixels }: Frame): FrameUpdate {

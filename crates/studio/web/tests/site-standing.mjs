@@ -1,0 +1,42 @@
+// The state of a run as the page without a program computes it, without a browser: on the cases that the program's own test reads.
+
+import assert from "node:assert/strict";
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { createServer } from "vite";
+
+const root = join(import.meta.dirname, "..");
+let server, standing;
+before(async () => {
+  server = await createServer({ root, configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
+  standing = await server.ssrLoadModule("/src/static/stack/standing.ts");
+});
+after(() => server?.close());
+
+/** The version of an object in the store of the program's test. */
+const versionOf = (text) => createHash("sha256").update(text).digest("hex").slice(0, 32);
+
+function computed({ scripts, files, manifest }) {
+  const { faults, frameFile, frameUpdate, isBehind, manifestOf, outputsOf, summary } = standing;
+  const text = manifest === null || typeof manifest === "string" ? manifest : JSON.stringify(manifest);
+  const known = manifestOf("film", text);
+  const there = new Map(Object.entries(scripts).map(([name, text]) => [name, versionOf(text)]));
+  const outputs = outputsOf(known)
+    .filter((ending) => files[ending])
+    .map((ending) => ({ ending, etag: versionOf(files[ending].text), size: files[ending].text.length, generation: files[ending].generation ?? null }));
+  if (typeof known === "string") return { summary: summary("film", known, outputs, false), faults: [], moreFaults: 0, frames: [], keys: [] };
+  const frames = known.frames.map(frameUpdate);
+  const keys = frames
+    .filter(({ state }) => state === "done")
+    .map(({ script, version, pixels, part }) => `frames/film/${frameFile(script, version, String(pixels), part === undefined ? null : String(part))}`);
+  return { summary: summary("film", known, outputs, isBehind(known, there)), ...faults("film", known), frames, keys };
+}
+
+test("the state of a run is what the program computes", () => {
+  for (const { title, expected, ...given } of JSON.parse(readFileSync(join(root, "../src/runs/standing.json")))) {
+    assert.deepEqual(JSON.parse(JSON.stringify(computed(given))), expected, title);
+  }
+});
