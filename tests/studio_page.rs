@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 9] = [
+const TESTS: [&str; 11] = [
     "tests/logic.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
@@ -18,6 +18,8 @@ const TESTS: [&str; 9] = [
     "tests/files.mjs",
     "tests/runs.mjs",
     "tests/time.mjs",
+    "tests/history.mjs",
+    "tests/journeys.mjs",
 ];
 
 /// The tests that drive Firefox.
