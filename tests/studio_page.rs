@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 10] = [
+const TESTS: [&str; 12] = [
     "tests/logic.mjs",
     "tests/site-standing.mjs",
     "tests/page.mjs",
@@ -19,6 +19,8 @@ const TESTS: [&str; 10] = [
     "tests/files.mjs",
     "tests/runs.mjs",
     "tests/time.mjs",
+    "tests/history.mjs",
+    "tests/journeys.mjs",
 ];
 
 /// The tests that drive Firefox.

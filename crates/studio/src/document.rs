@@ -131,6 +131,19 @@ impl Document {
         splices
     }
 
+    /// Takes the last step back, if it has this gesture, and forgets it. Returns the splices in their order.
+    pub fn give_up(&mut self, gesture: u64) -> Vec<Splice> {
+        let Some(step) = self.done.pop_back_if(|step| step.gesture == Some(gesture)) else {
+            return Vec::new();
+        };
+        self.held -= step.size();
+        let splices: Vec<_> = step.inverses.into_iter().rev().collect();
+        for splice in &splices {
+            self.splice(splice);
+        }
+        splices
+    }
+
     /// Redoes the step that was undone last, like [`Document::undo`].
     pub fn redo(&mut self, fps: &mut f64) -> Vec<Splice> {
         let Some(step) = self.undone.pop() else { return Vec::new() };
@@ -217,6 +230,20 @@ mod tests {
         assert!(!document.can_undo());
         document.redo(&mut 10.0);
         assert_eq!(document.bytes(), b"a\ne\n");
+    }
+
+    #[test]
+    fn a_drag_that_is_given_up_leaves_nothing() {
+        let mut document = Document::new(b"a \r\nb");
+        document.apply(set(1, "c"), Some(7));
+        document.apply(set(0, "d"), Some(8));
+        document.apply(set(1, "e"), Some(8));
+        assert!(document.give_up(7).is_empty(), "only the last one can be given up");
+        assert_eq!(document.give_up(8).len(), 2);
+        assert_eq!(document.bytes(), b"a \r\nc");
+        assert!(!document.can_redo() && document.give_up(8).is_empty());
+        document.undo(&mut 10.0);
+        assert_eq!((document.bytes(), document.can_undo()), (b"a \r\nb".to_vec(), false));
     }
 
     #[test]

@@ -220,7 +220,7 @@ pub(crate) fn toggle(
         texts.push(clause.name().to_owned());
         if clause == Clause::Image {
             let picture = pictures.iter().find(|name| !is_light(name)).ok_or(NO_PICTURE)?;
-            texts.extend([quoted_word(picture), "ball".to_owned()]);
+            texts.extend([quoted_word(picture), "flat".to_owned(), "1".to_owned()]);
         }
         let fields = clause.form().fields.iter().filter(|field| field.presence == Presence::Required);
         texts.extend(fields.flat_map(|field| {

@@ -11,14 +11,19 @@ pub(crate) const MOVING_UNDER_WAY: u32 = 1;
 /// The same limit at rest, where sketches precede the final picture.
 pub(crate) const RESTING_UNDER_WAY: u32 = 2;
 
-/// The time from the last request of something that moves to its rest.
-pub(crate) const REST: Duration = Duration::from_millis(80);
+/// The time from the last request of something that moves to its rest. It is longer than a frame at 24 per second, so
+/// that what is played does not rest.
+pub(crate) const REST: Duration = Duration::from_millis(50);
 
 /// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
 pub(crate) const PATIENCE: f64 = 0.1;
 
 /// The shortest time between two views of an unfinished picture. Each takes time to be made and shown.
 pub(crate) const APART: Duration = Duration::from_millis(200);
+
+/// The longest time between two views. Each time is as long as the whole time before it, until then.
+#[cfg(feature = "server")]
+pub(crate) const SELDOM: Duration = Duration::from_secs(2);
 
 /// The rays per pixel of a sketch of a scene in which light goes round. One ray would show no indirect light.
 pub(crate) const FEW: u32 = 4;

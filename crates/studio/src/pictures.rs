@@ -5,7 +5,7 @@
 //! that there is always a picture. It then has one ray per pixel, or a few where light goes round, whatever the script
 //! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few
 //! pixels with as few rays, then more. A picture with several rays per pixel is shown after its passes, at most five times a
-//! second ([`APART`]). What moved is at rest soon after the last request, even while it is held.
+//! second and ever more seldom ([`APART`]). What moved is at rest soon after the last request, even while it is held.
 //! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
 //! waits behind another is outdated when it is shown.
 
@@ -20,7 +20,7 @@ use rayfold_tracer::{Drawing, Exposure, RenderError, RenderOptions};
 
 use crate::clock::Instant;
 use crate::pace::{
-    APART, Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, smaller,
+    APART, Effort, FEW, GROWTH, MOVING_UNDER_WAY, PATIENCE, Pace, REST, RESTING_UNDER_WAY, SELDOM, smaller,
 };
 use crate::packing::{Packer, Picture, Quality};
 use crate::wanted::Wanted;
@@ -214,8 +214,9 @@ impl Shared {
                 // The first pass is one ray per pixel.
                 pace.drawn(scene.screen, None, begin.elapsed());
             }
-            if seen.is_none_or(|seen| seen.elapsed() >= APART)
-                && let Some(number) = self.another()
+            if seen.is_none_or(|seen| {
+                seen.elapsed() >= seen.saturating_duration_since(start).clamp(APART, SELDOM)
+            }) && let Some(number) = self.another()
             {
                 let image = image()?.into_rgba8();
                 send(Picture { number, image, took: start.elapsed(), quality: Quality::Coarse });

@@ -358,6 +358,15 @@ impl Opened {
         done
     }
 
+    /// Takes back the step of a gesture, if it is the last one. Returns the changes of the lines.
+    pub fn give_up(&mut self, gesture: u64) -> Vec<Splice> {
+        let done = self.document.give_up(gesture);
+        if !done.is_empty() {
+            self.touched();
+        }
+        done
+    }
+
     /// Makes changes of a text editor, each of the text that the one before it leaves. Returns the changes of the lines,
     /// or `None` if one of them does not fit; those before it stay.
     pub(crate) fn edit_text(&mut self, changes: &[TextChange], gesture: u64) -> Option<Vec<Splice>> {

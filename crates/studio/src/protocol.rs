@@ -50,6 +50,8 @@ pub(crate) enum ClientMessage {
     KeepCamera,
     /// Set the numbers of a line from number `first` on. All changes with the same `gesture` are one step.
     Set { line: usize, first: usize, values: Vec<f64>, gesture: Option<u64> },
+    /// Take back the changes of a gesture, or of what the pointer holds, and hold it no longer.
+    GiveUp { gesture: Option<u64> },
     /// Change the text of a file as the page's editor did, if this is the version of the text that it had.
     Edit { file: usize, version: u32, changes: Vec<TextChange> },
     /// Remove these lines from the file.

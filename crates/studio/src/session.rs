@@ -34,6 +34,7 @@ use crate::tracks::{self, Copied, Tracks};
 use crate::values::changed;
 use crate::view::Orbit;
 use crate::wanted::Wanted;
+use editing::of_page;
 use hold::Held;
 
 /// The reply to a move of what has no position.
@@ -268,13 +269,17 @@ impl Session {
                 let to = self.line(project, line).and_then(|line| changed(line, first, &values, keying));
                 let is_fit = values.iter().all(|value| value.is_finite()) && first + values.len() <= 64;
                 match to {
-                    // The page's own gestures must differ from those of the pointer.
                     Some(to) if is_fit => {
-                        self.edit(project, vec![edits::set(line, to)], gesture.map(|g| g << 1 | 1), tell);
+                        self.edit(project, vec![edits::set(line, to)], gesture.map(of_page), tell);
                         if gesture.is_some() { Change::Moving } else { Change::Still }
                     }
                     _ => Change::Nothing,
                 }
+            }
+            ClientMessage::GiveUp { gesture } => {
+                self.give_up(project, gesture, tell);
+                self.outline(project, tell);
+                Change::Still
             }
             ClientMessage::Edit { file, version, changes } => {
                 self.edit_text(project, file, version, &changes, tell)

@@ -22,6 +22,11 @@ const NO_MODEL: &str = "There is no model (.obj, .ply, .stl, .glb, .gltf) beside
 /// The number of frames of a new animation.
 const FRAMES: u32 = 50;
 
+/// Returns the gesture of this number of the page. It differs from all of the pointer.
+pub(super) fn of_page(number: u64) -> u64 {
+    number << 1 | 1
+}
+
 impl Session {
     /// Changes the shown file, as one step.
     pub(super) fn edit(
@@ -44,6 +49,17 @@ impl Session {
         let done = project.files[file].apply(splices, Some(gesture));
         self.keep_file(project);
         self.send_splices(done, tell);
+    }
+
+    /// Takes back the changes of a gesture of the page, or of what the pointer holds.
+    pub(super) fn give_up(&mut self, project: &mut Project, gesture: Option<u64>, tell: &mut ServerMessage) {
+        let held = self.held.take().is_some();
+        let gesture = gesture.map(of_page).or(held.then_some(self.gestures << 1));
+        let file = self.place(project).file;
+        let splices = gesture.map(|gesture| project.files[file].give_up(gesture)).unwrap_or_default();
+        self.keep_file(project);
+        self.send_splices(splices, tell);
+        tell.guides = Some(String::new());
     }
 
     /// Returns a new gesture. Those of the pointer are even.

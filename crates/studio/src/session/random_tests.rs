@@ -121,6 +121,7 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
             ClientMessage::Drag { x: 20.0 + 5.0 * x, y, options: DragOptions { upright, snap, whole } }
         }),
         Just(ClientMessage::Release),
+        prop::option::of(0..3u64).prop_map(|gesture| ClientMessage::GiveUp { gesture }),
     ];
     let load = prop_oneof![
         Just(Source::Empty),

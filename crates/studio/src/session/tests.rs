@@ -100,6 +100,30 @@ fn a_drag_changes_one_line_and_one_undo_takes_it_back() {
 }
 
 #[test]
+fn what_is_given_up_while_it_is_held_leaves_no_step() {
+    let mut desk = Desk::new(TEXT);
+    let at = desk.seen(4);
+    let options = DragOptions::default();
+    desk.ask(ClientMessage::Press { x: at.x, y: at.y, extend: false, grip: None, line: None });
+    desk.ask(ClientMessage::Drag { x: at.x + 20.0, y: at.y, options });
+    assert_ne!(desk.text(), TEXT);
+    let tell = desk.ask(ClientMessage::GiveUp { gesture: None }).tell;
+    assert_eq!((desk.text().as_str(), tell.splices.len()), (TEXT, 1));
+    desk.ask(ClientMessage::Drag { x: at.x + 20.0, y: at.y, options });
+    assert_eq!(desk.text(), TEXT, "it is no longer held");
+    // The same for a gesture of a field. Another one's steps stay.
+    let set = |gesture| ClientMessage::Set { line: 4, first: 0, values: vec![2.0], gesture: Some(gesture) };
+    desk.ask(set(3));
+    let changed = desk.text();
+    desk.ask(ClientMessage::GiveUp { gesture: Some(2) });
+    desk.ask(ClientMessage::GiveUp { gesture: None });
+    assert_eq!(desk.text(), changed);
+    desk.ask(ClientMessage::GiveUp { gesture: Some(3) });
+    let state = desk.state();
+    assert_eq!((desk.text().as_str(), state.can_undo, state.can_redo), (TEXT, false, false));
+}
+
+#[test]
 fn an_outline_is_that_of_the_picture_also_in_another_size_and_with_other_numbers() {
     let mut desk = Desk::new(TEXT);
     desk.ask(ClientMessage::Size { width: 160, height: 90 });

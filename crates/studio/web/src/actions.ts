@@ -123,6 +123,7 @@ export const actions = {
 
 /** Whether a field has its own use of a key. */
 function takes(target: HTMLElement, control: string, key: string): boolean {
+  if (control && key === "k") return false;
   if (target.closest("textarea, .code, [role=listbox], [role=separator]")) return true;
   const field = target.closest("input, select");
   if (!field) return false;

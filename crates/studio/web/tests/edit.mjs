@@ -152,6 +152,78 @@ test("undo works in number fields and sliders, and a comma is a decimal point", 
   studio.check();
 });
 
+test("a drag across a number field changes it as one step, finely with Shift, and Escape gives up", async (t) => {
+  const text = HEAD + ball("1.0", 0, 1, 0, "ball") + "Trace\n";
+  const studio = await open(t, { text });
+  const { page } = studio;
+  await page.locator(".item", { hasText: "ball" }).click();
+  const radius = page.getByRole("spinbutton", { name: "radius" });
+  const middle = async () => {
+    const box = await radius.boundingBox();
+    return [box.x + box.width / 2, box.y + box.height / 2];
+  };
+  const [x, y] = await middle();
+  const value = () => radius.inputValue();
+  // Five pixels are a step of an arrow key.
+  await drag(page, [x, y], [x + 40, y + 3]);
+  await until(async () => (await value()) === "1.8");
+  assert.equal(numbers(await studio.saved(), "ball")[0], 1.8);
+  assert.equal(await radius.evaluate((field) => field === document.activeElement), false, "a drag is no click");
+  await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === text);
+  assert.equal(await page.getByRole("button", { name: "Undo", exact: true }).isEnabled(), false, "it is one step");
+  await page.keyboard.down("Shift");
+  await drag(page, [x, y], [x + 40, y]);
+  await page.keyboard.up("Shift");
+  await until(async () => (await value()) === "1.08");
+  await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === text);
+  // It stops at the limits of the table: a radius is not negative.
+  await drag(page, [x, y], [x - 200, y]);
+  await until(async () => (await value()) === "0");
+  assert.equal(numbers(await studio.saved(), "ball")[0], 0);
+  await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === text);
+  // What is given up leaves the bytes as they were, and no step. The selection stays.
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 30, y, { steps: 4 });
+  await until(async () => (await value()) === "1.6");
+  await page.keyboard.press("Escape");
+  await until(async () => (await value()) === "1");
+  await page.mouse.move(x + 60, y, { steps: 4 });
+  await page.mouse.up();
+  assert.equal(await studio.saved(), text);
+  for (const name of ["Undo", "Redo"]) assert.equal(await page.getByRole("button", { name, exact: true }).isEnabled(), false, name);
+  assert.equal(await page.locator(".item[aria-selected=true]").count(), 1);
+  // The same of a body in the picture.
+  const at = await seen(page, 0, 1, 0);
+  await page.mouse.move(...at);
+  await page.mouse.down();
+  await page.mouse.move(at[0] + 40, at[1], { steps: 4 });
+  await until(async () => (await page.getByRole("button", { name: "Undo", exact: true }).isEnabled()));
+  await page.keyboard.press("Escape");
+  await until(async () => !(await page.getByRole("button", { name: "Undo", exact: true }).isEnabled()));
+  await page.mouse.move(at[0] + 80, at[1], { steps: 4 });
+  await page.mouse.up();
+  assert.equal(await studio.saved(), text);
+  // A click goes into the field, which takes what is typed, and a drag selects its text.
+  await page.mouse.click(x, y);
+  await page.keyboard.type("2");
+  await drag(page, [x, y], [x + 20, y]);
+  assert.equal(await value(), "2");
+  await page.keyboard.press("Enter");
+  await until(async () => numbers(await studio.saved(), "ball")[0] === 2);
+  await page.keyboard.type("-3");
+  await page.keyboard.press("Enter");
+  await page.getByText("expected a number from 0").waitFor();
+  assert.equal(await value(), "2");
+  // The search opens from a field, too.
+  await page.keyboard.press("Control+k");
+  await page.getByRole("dialog", { name: "Search" }).waitFor();
+  studio.check();
+});
+
 test("light and dark change all colours, and the page remembers which, and its panels", async (t) => {
   const studio = await open(t, { text: `${HEAD}Trace\n`, blank: true });
   const { page } = studio;

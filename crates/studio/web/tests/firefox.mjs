@@ -64,6 +64,24 @@ test("in Firefox an object is dragged, and undo brings back every byte", async (
   await page.keyboard.press("z");
   await page.keyboard.up("Control");
   await until(() => readFileSync(path, "utf8") === before);
+  // The same across a field for a number, and a click goes into it.
+  const field = await page.waitForSelector(".inspector .field:not(.colour) .slides");
+  const room = await field.boundingBox();
+  const middle = [room.x + room.width / 2, room.y + room.height / 2];
+  await page.mouse.move(...middle);
+  await page.mouse.down();
+  await page.mouse.move(middle[0] + 30, middle[1], { steps: 6 });
+  await page.mouse.up();
+  await until(() => readFileSync(path, "utf8") !== before);
+  assert.equal(await field.evaluate((field) => field === document.activeElement), false);
+  await page.keyboard.down("Control");
+  await page.keyboard.press("z");
+  await page.keyboard.up("Control");
+  await until(() => readFileSync(path, "utf8") === before);
+  await page.mouse.click(...middle);
+  await page.keyboard.type("0.123");
+  await page.keyboard.press("Enter");
+  await until(() => readFileSync(path, "utf8").includes(" 0.123 "));
   assert.deepEqual(faults, []);
 });
 

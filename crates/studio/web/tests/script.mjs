@@ -5,7 +5,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, caret, drag, goLine, open, over, scenes, seenLines, setLine, shot, until } from "./stage.mjs";
+import { audit, caret, drag, goLine, open, over, random, scenes, seenLines, setLine, shot, until } from "./stage.mjs";
 
 const text = "Screen 320 180\nLook 0 1 8  0 0 0  40\nIlight 1 1 1 1 -1 -1\nSphere 1 0 1 0 .1 .1 .1 .8 .2 .2\nTrace\n";
 
@@ -22,8 +22,7 @@ function written(count) {
   return Array.from({ length: count }, (_, n) => kinds[n % kinds.length](n));
 }
 
-// `LINES=200` types a long script.
-for (const [delay, count] of [[0, Number(process.env.LINES ?? 24)], [5, 12], [30, 6], [60, 6]]) {
+for (const [delay, count] of [[0, 200], [5, 12], [30, 6], [60, 6]]) {
   test(`${count} lines typed at ${delay} ms a key are the lines of the file`, async (t) => {
     const studio = await open(t, { text });
     const { page } = studio;
@@ -46,6 +45,35 @@ for (const [delay, count] of [[0, Number(process.env.LINES ?? 24)], [5, 12], [30
     studio.check();
   });
 }
+
+test("200 lines typed at 0 to 60 ms a key, with slips of the finger, are the lines of the file", async (t) => {
+  const below = random(t);
+  const studio = await open(t, { text });
+  const { page } = studio;
+  const lines = Array.from({ length: 200 }, (_, at) => ["# ", "Depth ", "", "Samples "][below(4)] + at);
+  await page.locator(".cm-content").focus();
+  await page.keyboard.press("Control+a");
+  const pause = async () => {
+    const delay = below(61);
+    // Half of the keys follow at once.
+    if (delay % 2 === 0) await page.waitForTimeout(delay);
+  };
+  for (const [at, line] of lines.entries()) {
+    if (at > 0) await page.keyboard.press("Enter");
+    for (const key of line) {
+      await pause();
+      if (below(20) === 0) {
+        await page.keyboard.type("x");
+        await pause();
+        await page.keyboard.press("Backspace");
+      }
+      await page.keyboard.type(key);
+    }
+  }
+  await page.keyboard.press("Escape");
+  await until(() => readFileSync(studio.path, "utf8") === lines.join("\n"));
+  studio.check();
+});
 
 test("Enter splits a line at once, and a paste of several lines stays several lines", async (t) => {
   const studio = await open(t, { text });

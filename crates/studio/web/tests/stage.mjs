@@ -183,6 +183,20 @@ export const caret = (page) =>
     return { text: line.textContent, column: before.toString().length };
   });
 
+/** A source of numbers below a limit. It prints its seed, which `RAYFOLD_SEED` replays. */
+export function random(t) {
+  const seed = Number(process.env.RAYFOLD_SEED ?? Math.floor(Math.random() * 2 ** 32)) >>> 0;
+  t.diagnostic(`RAYFOLD_SEED=${seed}`);
+  // The generator is mulberry32.
+  let state = seed;
+  return (limit) => {
+    state = (state + 0x6d2b79f5) | 0;
+    let mixed = Math.imul(state ^ (state >>> 15), 1 | state);
+    mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
+    return Math.floor((((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32) * limit);
+  };
+}
+
 export async function drag(page, from, to, steps = 8) {
   await page.mouse.move(...from);
   await page.mouse.down();

@@ -9,7 +9,7 @@ import { actions } from "../actions";
 import { Drawn } from "#drawn";
 import { Button } from "../parts/button";
 import { Icon } from "../parts/icon";
-import { NumberField } from "../parts/number";
+import { NumberField, type Slide } from "../parts/number";
 import { Panel } from "../parts/panel";
 import { visible } from "../parts/visible";
 import type { FieldTable, Inspected } from "../protocol";
@@ -26,8 +26,8 @@ let sliding: number | null = null;
 /** The colours whose channels are shown, by the names of their parameters. */
 const unfolded = signal<ReadonlySet<string>>(new Set());
 
-/** Three decimals are finer than a level of a picture. */
-const round = (value: number): number => Math.round(value * 1000) / 1000;
+/** Three decimals are finer than a level of a picture. Small numbers have three digits. */
+const round = (value: number): number => (Math.abs(value) < 0.1 ? Number(value.toPrecision(3)) : Math.round(value * 1000) / 1000);
 
 function set(line: number, first: number, values: readonly number[], under: number | null): void {
   if (values.every(Number.isFinite)) ask({ ask: "set", line, first, values, gesture: under });
@@ -375,11 +375,10 @@ interface SliderProps {
   readonly most: number;
   readonly step: number;
   readonly value: number;
-  /** Takes `null` at the end of a gesture. */
-  readonly set: (value: number | null, under: number | null) => void;
+  readonly slide: Slide;
 }
 
-function Slider({ label, least, most, step, value, set }: SliderProps): JSX.Element {
+function Slider({ label, least, most, step, value, slide }: SliderProps): JSX.Element {
   return (
     <input
       type="range"
@@ -390,10 +389,10 @@ function Slider({ label, least, most, step, value, set }: SliderProps): JSX.Elem
       value={value}
       onPointerDown={() => (sliding = gesture())}
       onKeyDown={() => (sliding = sliding ?? gesture())}
-      onInput={(event) => set(event.currentTarget.valueAsNumber, sliding)}
+      onInput={(event) => slide(Number(event.currentTarget.valueAsNumber.toPrecision(4)), sliding)}
       onChange={() => {
         sliding = null;
-        set(null, null);
+        slide(null, null);
       }}
     />
   );
@@ -404,7 +403,7 @@ function SunRows({ field, inspected, values }: SwatchProps): JSX.Element | null 
   const [x, y, z] = values;
   if (x == null || y == null || z == null) return null;
   const now = sunAngles(x, y, z);
-  const put = (angles: typeof now, under: number | null): void => set(inspected.line, field.first, sunDirection(angles), under);
+  const slide = (name: keyof typeof now): Slide => (to, under) => set(inspected.line, field.first, to === null ? [] : sunDirection({ ...now, [name]: to }), under);
   return (
     <>
       {(["azimuth", "height"] as const).map((name) => (
@@ -416,9 +415,9 @@ function SunRows({ field, inspected, values }: SwatchProps): JSX.Element | null 
             most={name === "azimuth" ? 180 : 90}
             step={1}
             value={now[name]}
-            set={(to, under) => (to === null ? set(inspected.line, field.first, [], null) : put({ ...now, [name]: to }, under))}
+            slide={slide(name)}
           />
-          <NumberField label={`sun ${name}`} value={now[name]} set={(to) => put({ ...now, [name]: to }, null)} />
+          <NumberField label={`sun ${name}`} value={now[name]} set={(to) => slide(name)(to, null)} slide={slide(name)} />
           <span class="unit">°</span>
         </p>
       ))}
@@ -456,6 +455,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
   const [least, most] = ends(field, value ?? 1);
   const step = field.whole ? 1 : (most - least) / 1000;
   const isOpen = most - least <= 1e6;
+  const slide: Slide = (to, under) => set(inspected.line, at, to === null ? [] : [to], under);
   return (
     <p class="number">
       {field.names.length > 1 && <span aria-hidden="true">{short}</span>}
@@ -466,10 +466,19 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
           most={most}
           step={step}
           value={value ?? 0}
-          set={(to, under) => set(inspected.line, at, to === null ? [] : [Number(to.toPrecision(4))], under)}
+          slide={slide}
         />
       )}
-      <NumberField label={label} value={value === undefined ? undefined : round(value)} set={(asked) => set(inspected.line, at, [asked], null)} />
+      <NumberField
+        label={label}
+        value={value === undefined ? undefined : round(value)}
+        least={field.minimum}
+        most={field.maximum}
+        above={field.aboveMinimum}
+        whole={field.whole}
+        set={(asked) => slide(asked, null)}
+        slide={slide}
+      />
       {field.names.length === 1 && unitOf(field.unit) && <span class="unit">{unitOf(field.unit)}</span>}
       {!field.fixed && <KeyButton inspected={inspected} numbers={[at]} label={label} />}
     </p>

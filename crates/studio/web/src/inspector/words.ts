@@ -62,6 +62,8 @@ export function shortOf(name: string, kind: string): string {
 
 /** Commands and clauses in people's words. */
 const NAMES: Readonly<Record<string, string>> = {
+  Ilight: "Sun",
+  Plight: "Lamp",
   Screen: "Picture",
   Samples: "Smooth edges",
   Depth: "Bounces",
@@ -72,6 +74,7 @@ const NAMES: Readonly<Record<string, string>> = {
   ambient: "shadow colour",
   diffuse: "colour",
   shine: "highlight",
+  own: "own colours",
 };
 
 export function nameOf(command: string): string {

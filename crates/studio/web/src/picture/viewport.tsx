@@ -153,17 +153,20 @@ export function Viewport(): JSX.Element {
       ask({ ask: "navigate", how: holding.what, x: (x - left) / height, y: (y - top) / height });
     }
   };
-  /** Turns, moves and zooms the view by keys. */
-  const look = (event: KeyboardEvent): void => {
+  /** Gives up a drag, and turns, moves and zooms the view. */
+  const keyDown = (event: KeyboardEvent): void => {
     const way = ARROWS[event.key];
     const zoom = { "+": -1, "=": -1, "-": 1 }[event.key];
     if (way && event.altKey) {
       ask({ ask: "navigate", how: event.shiftKey ? "pan" : "turn", x: way[0] * VIEW_STEP, y: way[1] * VIEW_STEP });
     } else if (zoom && !event.ctrlKey && !event.metaKey) ask({ ask: "navigate", how: "zoom", x: 0, y: zoom * ZOOM_STEP });
-    else return;
+    else if (event.key === "Escape" && held.current?.what === "drag") {
+      ask({ ask: "give-up", gesture: null });
+      held.current = null;
+    } else return;
     event.preventDefault();
     event.stopPropagation();
-    rest();
+    if (event.key !== "Escape") rest();
   };
   const release = (): void => {
     const rectangle = boxed.value;
@@ -198,7 +201,7 @@ export function Viewport(): JSX.Element {
       role="application"
       aria-label="Viewport: drag objects to move them, drag the background to rotate the view"
       onPointerDown={(event) => press(event, null)}
-      onKeyDown={look}
+      onKeyDown={keyDown}
       onPointerMove={move}
       onPointerUp={release}
       onPointerCancel={release}

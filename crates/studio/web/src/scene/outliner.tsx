@@ -5,6 +5,7 @@ import { Eye, EyeOff, type IconNode, Lock, LockOpen } from "lucide";
 import type { JSX } from "preact";
 
 import { actions } from "../actions";
+import { nameOf } from "../inspector/words";
 import { Icon } from "../parts/icon";
 import { List } from "../parts/list";
 import { Panel } from "../parts/panel";
@@ -149,6 +150,7 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
     );
   }
   const named = isNamed(line) ? line.subject : (line.name ?? line.subject);
+  const place = `in line ${at + 1}`;
   const isLocked = state.value?.locked.includes(at) ?? false;
   const states = [line.hidden && ", hidden", isLocked && ", locked"].filter(Boolean).join("");
   return (
@@ -157,12 +159,12 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
       class={`item ${line.role ?? ""}${line.hidden ? " hidden" : ""}${grouped.value.has(at) ? " inside" : ""}`}
       role="option"
       aria-selected={isSelected}
-      aria-label={`${line.command ?? ""} ${visible(named ?? `in line ${at + 1}`)}${states}`}
+      aria-label={`${line.command ?? ""} ${visible(named ?? place)}${states}`}
       onClick={click}
       onDblClick={() => (renaming.value = at)}
     >
       {line.command && line.role && <Icon of={iconOf(line.command, line.role)} />}
-      <span class={named ? "name" : "name none"}>{named ? visible(named) : `${line.command ?? ""} in line ${at + 1}`}</span>
+      <span class={named ? "name" : "name none"}>{named ? visible(named) : `${line.role === "camera" ? "Camera" : nameOf(line.command ?? "")} ${place}`}</span>
       {line.role !== "material" && line.role !== "group" && (
         <>
           <Mark is={isLocked} icons={[LockOpen, Lock]} title="Lock or unlock (L)" run={() => ask({ ask: "lock", lines: [at] })} />

@@ -3,6 +3,7 @@
 import "./scene.css";
 import type { JSX } from "preact";
 
+import { nameOf } from "../inspector/words";
 import { Icon } from "../parts/icon";
 import { Panel } from "../parts/panel";
 import { ask, lines, tables } from "../store";
@@ -30,7 +31,7 @@ export function Palette(): JSX.Element {
             onClick={() => ask({ ask: "add", command: table.name, at: null })}
           >
             <Icon of={iconOf(table.name, table.role)} />
-            <span>{NAMES[table.name] ?? table.name}</span>
+            <span>{table.role === "camera" ? "Camera here" : nameOf(table.name)}</span>
           </button>
         ))}
         {groups.map((name) => (
@@ -51,6 +52,3 @@ export function Palette(): JSX.Element {
     </Panel>
   );
 }
-
-/** Names in people's words where the command's is not one. */
-const NAMES: Readonly<Record<string, string>> = { Camera: "Camera here", Ilight: "Sun", Plight: "Lamp" };

@@ -98,7 +98,7 @@ function Player({ frame, frames, fps }: { readonly frame: number; readonly frame
         frame {frame + 1} of {frames}
       </output>
       <label class="fps" title={canCreate.value ? "Stored in animation.json" : "As long as the studio runs; rayfold render takes it as --fps"}>
-        <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} /> a second
+        <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} /> fps
       </label>
     </div>
   );
@@ -120,8 +120,7 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
     <div class="tools" role="group" aria-label="Keys">
       {isOne && (
         <label>
-          Frames{" "}
-          <NumberField label="Frames" value={count} least={1} most={1_000_000} whole set={(asked) => wish({ do: "frames", count: asked })} />
+          <NumberField label="Frames" value={count} least={1} most={1_000_000} whole set={(asked) => wish({ do: "frames", count: asked })} /> frames
         </label>
       )}
       {isOne ? (

@@ -64,6 +64,8 @@ const POINTER = [
   ["Move up and down", "Shift and drag"],
   ["Align with other objects, or move in steps", "Ctrl and drag"],
   ["Move all keys of the selection", "drag, then Alt"],
+  ["Change a number", "drag across its field, finely with Shift"],
+  ["Give up a drag", "Escape"],
   ["Rotate the view", "drag the background or the floor; Alt or the middle button, and drag; Alt and arrow keys"],
   ["Move the view", "right button, or Shift and the middle button, and drag; Alt+Shift and arrow keys"],
   ["Zoom in or out", "wheel; + and -"],
