@@ -248,6 +248,7 @@ mod tests {
 
     /// A room of boxes with a window in its left wall, and a place below its ceiling.
     const ROOM: &str = "Screen 8 6
+Samples 16
 Indirect 1
 Sky .1 .1 .1
 Material white diffuse .7 .7 .7
