@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 12] = [
+const TESTS: [&str; 11] = [
     "tests/logic.mjs",
     "tests/site-standing.mjs",
     "tests/page.mjs",
@@ -20,7 +20,6 @@ const TESTS: [&str; 12] = [
     "tests/runs.mjs",
     "tests/time.mjs",
     "tests/history.mjs",
-    "tests/journeys.mjs",
 ];
 
 /// The tests that drive Firefox.

@@ -150,7 +150,8 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
     );
   }
   const named = isNamed(line) ? line.subject : (line.name ?? line.subject);
-  const place = `in line ${at + 1}`;
+  const people = line.role === "camera" ? "Camera" : nameOf(line.command ?? "");
+  const shown = named ? visible(named) : `${people} in line ${at + 1}`;
   const isLocked = state.value?.locked.includes(at) ?? false;
   const states = [line.hidden && ", hidden", isLocked && ", locked"].filter(Boolean).join("");
   return (
@@ -159,12 +160,12 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
       class={`item ${line.role ?? ""}${line.hidden ? " hidden" : ""}${grouped.value.has(at) ? " inside" : ""}`}
       role="option"
       aria-selected={isSelected}
-      aria-label={`${line.command ?? ""} ${visible(named ?? place)}${states}`}
+      aria-label={`${named ? `${line.command ?? ""} ` : ""}${shown}${states}`}
       onClick={click}
       onDblClick={() => (renaming.value = at)}
     >
       {line.command && line.role && <Icon of={iconOf(line.command, line.role)} />}
-      <span class={named ? "name" : "name none"}>{named ? visible(named) : `${line.role === "camera" ? "Camera" : nameOf(line.command ?? "")} ${place}`}</span>
+      <span class={named ? "name" : "name none"}>{shown}</span>
       {line.role !== "material" && line.role !== "group" && (
         <>
           <Mark is={isLocked} icons={[LockOpen, Lock]} title="Lock or unlock (L)" run={() => ask({ ask: "lock", lines: [at] })} />
