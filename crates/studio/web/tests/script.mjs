@@ -47,7 +47,7 @@ for (const [delay, count] of [[0, 200], [5, 12], [30, 6], [60, 6]]) {
 }
 
 test("200 lines typed at 0 to 60 ms a key, with slips of the finger, are the lines of the file", async (t) => {
-  const below = random(t);
+  const below = random(t, 20261128);
   const studio = await open(t, { text });
   const { page } = studio;
   const lines = Array.from({ length: 200 }, (_, at) => ["# ", "Depth ", "", "Samples "][below(4)] + at);

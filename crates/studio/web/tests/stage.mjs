@@ -183,9 +183,9 @@ export const caret = (page) =>
     return { text: line.textContent, column: before.toString().length };
   });
 
-/** A source of numbers below a limit. It prints its seed, which `RAYFOLD_SEED` replays. */
-export function random(t) {
-  const seed = Number(process.env.RAYFOLD_SEED ?? Math.floor(Math.random() * 2 ** 32)) >>> 0;
+/** A source of numbers below a limit. It prints its seed: the test's own one, or `RAYFOLD_SEED`. */
+export function random(t, own) {
+  const seed = Number(process.env.RAYFOLD_SEED ?? own) >>> 0;
   t.diagnostic(`RAYFOLD_SEED=${seed}`);
   // The generator is mulberry32.
   let state = seed;

@@ -185,9 +185,9 @@ impl SunPatch {
     }
 
     fn add(&mut self, at: [usize; 2], point: DVec3, level: f64) {
-        for axis in 0..2 {
-            self.ends[0][axis] = self.ends[0][axis].min(at[axis]);
-            self.ends[1][axis] = self.ends[1][axis].max(at[axis]);
+        let [first, last] = &mut self.ends;
+        for ((first, last), at) in first.iter_mut().zip(last).zip(at) {
+            (*first, *last) = ((*first).min(at), (*last).max(at));
         }
         self.bounds = [self.bounds[0].min(point), self.bounds[1].max(point)];
         self.sum += level;
