@@ -37,8 +37,8 @@ const IDENTITY = "https://cognito-identity.eu-central-1.amazonaws.com/";
 const signIn = { region: "eu-central-1", identityPoolId: "eu-central-1:pool", userPoolId: "eu-central-1_Pool", clientId: "client", loginUrl: LOGIN };
 
 /**
- * Plays Cognito's part for the page at an address: its pages and answers are as its documentation describes them, and nobody
- * asked Cognito. `answer` gives what is to be answered to a request, or nothing for one that goes on; `asked` has what was asked.
+ * Plays Cognito's part for the page at an address: its pages and answers are as its documentation describes them; they were
+ * not compared with Cognito's own. `answer` gives what is to be answered to a request, or nothing for one that goes on; `asked` has what was asked.
  */
 export async function cognito(own) {
   const { credentials: _, ...config } = await (await fetch(`${own}/rayfold.json`)).json();
@@ -46,7 +46,7 @@ export async function cognito(own) {
   const stand = { asked: [], isStateRight: true, answer };
   const json = (value) => ({ status: 200, contentType: "application/json", headers: { "access-control-allow-origin": own, "access-control-allow-headers": "*" }, body: JSON.stringify(value) });
   let challenge = "";
-  /** `body` is the text of the request, where the browser tells it. */
+  /** `body` is the text of the request, where the browser gives it. */
   async function answer(method, address, headers, body) {
     const url = new URL(address);
     const at = url.origin + url.pathname;

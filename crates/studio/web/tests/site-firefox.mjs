@@ -106,7 +106,7 @@ test("in Firefox a person signs in on another page, comes back, submits, has the
     });
     await page.setRequestInterception(true);
     page.on("request", async (request) => {
-      // Bodies of requests are not told here.
+      // Firefox gives no bodies of requests.
       const answer = await stand.answer(request.method(), request.url(), request.headers());
       await (answer ? request.respond(answer) : request.continue());
     });
