@@ -4,8 +4,7 @@
 //! Scenes are random; a failure prints the seed. `RAYFOLD_SEED` sets another one.
 
 use image::DynamicImage;
-use rayfold_scene::model::{Finish, Glass};
-use rayfold_scene::{Background, Camera, Coefficients, Fog, Limits, Material, Scene, Screen, Script, parse};
+use rayfold_scene::{Background, Camera, Fog, Limits, Scene, Screen, Script, parse};
 use rayfold_tracer::{Drawing, Exposure, Precision, RenderOptions, reference};
 
 use super::dice::Dice;
@@ -18,18 +17,7 @@ const ISOLATED: f64 = 1e-3;
 
 impl Dice {
     fn open_scene(&mut self, count: usize, glass: u8) -> Scene {
-        let objects = (0..count)
-            .map(|_| {
-                let material = if self.0.u8(0..4) < glass {
-                    let glass = Glass::new(self.color(), self.within(0.7, 1.8)).unwrap();
-                    let finish = Finish { glass: Some(glass), ..Finish::default() };
-                    Material::finished(Coefficients::default(), finish)
-                } else {
-                    self.material()
-                };
-                self.any(material)
-            })
-            .collect();
+        let objects = self.objects_and_glass(count, glass);
         let mut scene = self.scene(objects);
         if scene.camera != Camera::Orthographic {
             scene.screen = Screen::new(self.0.u32(20..40), self.0.u32(20..40)).unwrap();

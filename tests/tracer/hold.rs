@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use image::RgbImage;
+use rayfold_scene::model::{Finish, Glass};
 use rayfold_scene::{
-    Background, Camera, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Instance, Lamp, Light, Limits,
-    Look, Material, Object, Placement, Plane, Scene, Screen, SharedSlice, Sphere, Tone, Torus, Triangle,
-    parse,
+    Background, Camera, Coefficients, Cone, Cuboid, Cylinder, Depth, DirectionalLight, Disc, Instance, Lamp,
+    Light, Limits, Look, Material, Object, Placement, Plane, Scene, Screen, SharedSlice, Sphere, Tone, Torus,
+    Triangle, parse,
 };
 use rayfold_tracer::{Level, Precision, RenderOptions, reference, render};
 
@@ -52,6 +53,23 @@ impl Dice {
             .map(|_| Light::Directional(DirectionalLight::new(0.6 * self.color(), self.point(1.0)).unwrap()))
             .collect();
         scene
+    }
+
+    /// Returns objects of any kind; of glass are `glass` of four.
+    pub(crate) fn objects_and_glass(&mut self, count: usize, glass: u8) -> Vec<Object> {
+        let material = |dice: &mut Self| {
+            if dice.0.u8(0..4) >= glass {
+                return dice.material();
+            }
+            let glass = Glass::new(dice.color(), dice.within(0.7, 1.8)).unwrap();
+            Material::finished(Coefficients::default(), Finish { glass: Some(glass), ..Finish::default() })
+        };
+        (0..count)
+            .map(|_| {
+                let material = material(self);
+                self.any(material)
+            })
+            .collect()
     }
 
     /// Returns an object of any kind of this material, in a group or not.
@@ -188,4 +206,18 @@ pub(crate) fn scripted(view: &str, objects: &str) -> Scene {
     let parsed = parse("scene.txt", text.as_bytes(), &Limits::default());
     let script = parsed.script.unwrap_or_else(|| panic!("{text}\n{:?}", parsed.diagnostics));
     script.frame(0).unwrap()
+}
+
+/// Checks that a scene with a `Look` has the same picture in units of any power of two.
+pub(crate) fn check_powers_of_two(scene: &Scene) {
+    let Camera::Look(look) = scene.camera else { return };
+    let expected = draw(scene, RenderOptions::default());
+    for exponent in [-300, -9, 7, 300] {
+        let scale = 2f64.powi(exponent);
+        let mut scaled = scene.clone();
+        scaled.objects = scene.objects.iter().map(|o| o.placed(scale, |p| scale * p).unwrap()).collect();
+        let (eye, target) = (scale * look.eye(), scale * look.target());
+        scaled.camera = Camera::Look(Look::new(eye, target, look.field_of_view(), Some(look.up())).unwrap());
+        assert!(expected == draw(&scaled, RenderOptions::default()), "2^{exponent}");
+    }
 }

@@ -9,10 +9,8 @@ use std::sync::{Arc, LazyLock};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, Rgb};
 use rayfold_scene::assets::{Library, MemoryFiles, Picture, Purpose};
-use rayfold_scene::model::{Finish, Glass};
 use rayfold_scene::{
-    Background, Camera, Coefficients, Limits, Material, PictureFile, Scene, Sky, SkyColors, SkyTurn, Tone,
-    parse_with_files,
+    Background, Camera, Limits, PictureFile, Scene, Sky, SkyColors, SkyTurn, Tone, parse_with_files,
 };
 use rayfold_tracer::{Drawing, Exposure, Precision, RenderOptions, reference};
 
@@ -159,18 +157,7 @@ impl Dice {
     }
 
     fn scene_below_a_sky(&mut self, count: usize, glass: u8) -> Scene {
-        let objects = (0..count)
-            .map(|_| {
-                let material = if self.0.u8(0..4) < glass {
-                    let glass = Glass::new(self.color(), self.within(0.7, 1.8)).unwrap();
-                    let finish = Finish { glass: Some(glass), ..Finish::default() };
-                    Material::finished(Coefficients::default(), finish)
-                } else {
-                    self.material()
-                };
-                self.any(material)
-            })
-            .collect();
+        let objects = self.objects_and_glass(count, glass);
         let mut scene = self.scene(objects);
         if self.0.bool() {
             self.add_lamps(&mut scene);

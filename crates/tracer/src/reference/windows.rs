@@ -9,7 +9,7 @@ use super::shapes::{self, Surface};
 use super::world::glass;
 use crate::camera::Ray;
 use crate::pictures::Panorama;
-use crate::sampling::bright::{Bright, half_area};
+use crate::sampling::bright::{Bright, half_area, sides_of};
 use crate::sampling::guide::Windows;
 use crate::sampling::sky_table::brightness;
 use crate::sampling::{coordinate, pixel_seed};
@@ -131,9 +131,7 @@ fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<(f64,
 
 /// Adds what suns light of the walls through a window, of which two opposite corners are given.
 fn add_sun_patches(scene: &Scene, walls: &[&Object], [low, high]: [DVec3; 2], found: &mut Vec<Bright>) {
-    let sides = high - low;
-    let flat = sides.abs().min_position();
-    let [across, down] = [1, 2].map(|k| DVec3::AXES[(flat + k) % 3] * sides / SUN_RAYS as f64);
+    let [across, down] = sides_of([low, high]).map(|side| side / SUN_RAYS as f64);
     let on_window = |[column, row]: [f64; 2]| low + column * across + row * down;
     for light in &scene.lights {
         let Light::Directional(sun) = light else { continue };
@@ -142,13 +140,12 @@ fn add_sun_patches(scene: &Scene, walls: &[&Object], [low, high]: [DVec3; 2], fo
         for at in 0..SUN_RAYS * SUN_RAYS {
             let at = [at % SUN_RAYS, at / SUN_RAYS];
             let origin = on_window(at.map(|part| part as f64 + 0.5));
-            let is_hit = |direction| move |wall: &&Object| shapes::distance(wall, Ray { origin, direction });
-            if walls.iter().any(|wall| is_hit(-along)(wall).is_some()) {
+            if nearest(walls, Ray { origin, direction: -along }).is_some() {
                 continue;
             }
-            let hits = walls.iter().enumerate().filter_map(|(wall, of)| Some((wall, is_hit(along)(of)?)));
-            let Some((wall, distance)) = hits.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-            let surface = shapes::surface(walls[wall], Ray { origin, direction: along }, distance);
+            let ray = Ray { origin, direction: along };
+            let Some((wall, distance)) = nearest(walls, ray) else { continue };
+            let surface = shapes::surface(walls[wall], ray, distance);
             let level =
                 brightness(sun.color() * walls[wall].material().diffuse()) * -along.dot(surface.normal);
             let is_same = |patch: &&mut SunPatch| {
@@ -163,6 +160,12 @@ fn add_sun_patches(scene: &Scene, walls: &[&Object], [low, high]: [DVec3; 2], fo
         }
         found.extend(patches.iter().filter_map(|patch| patch.bright(along, on_window)));
     }
+}
+
+/// Returns the wall that a ray hits first, and the distance to it.
+fn nearest(walls: &[&Object], ray: Ray) -> Option<(usize, f64)> {
+    let hits = walls.iter().enumerate().filter_map(|(at, wall)| Some((at, shapes::distance(wall, ray)?)));
+    hits.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The part of a wall that a sun lights through a window.

@@ -124,11 +124,9 @@ impl Bright {
     }
 
     /// Returns a rectangle of which two opposite corners are given. It is flat along an axis.
-    pub(crate) fn rectangle(brightness: f64, [low, high]: [DVec3; 2]) -> Option<Self> {
-        let sides = high - low;
-        let flat = sides.abs().min_position();
-        let [a, b] = [1, 2].map(|k| DVec3::AXES[(flat + k) % 3] * sides);
-        Some(Self { brightness, form: Form::Pane(Pane::new(Edge::Rectangle, low, [a, b], false)?) })
+    pub(crate) fn rectangle(brightness: f64, corners: [DVec3; 2]) -> Option<Self> {
+        let pane = Pane::new(Edge::Rectangle, corners[0], sides_of(corners), false)?;
+        Some(Self { brightness, form: Form::Pane(pane) })
     }
 
     /// Returns a parallelogram of which a corner and the sides there are given. It is seen from where its normal points.
@@ -239,6 +237,13 @@ impl Bright {
         }
         seen
     }
+}
+
+/// Returns the sides of a rectangle that is flat along an axis.
+pub(crate) fn sides_of([low, high]: [DVec3; 2]) -> [DVec3; 2] {
+    let sides = high - low;
+    let flat = sides.abs().min_position();
+    [1, 2].map(|k| DVec3::AXES[(flat + k) % 3] * sides)
 }
 
 /// Returns the faces of a box, their normals outwards.

@@ -1,7 +1,7 @@
 //! The rays that go on from hits in scenes in which light goes round: this step replaces `reflect` and `spawn_rays` there.
 //!
-//! It goes lane by lane, with the functions of the reference tracer. The directions of scattered rays alone are drawn in packets,
-//! by the same functions.
+//! It goes lane by lane, with the functions of the reference tracer. The directions of scattered rays alone, and of those towards light,
+//! are drawn in packets, by the same functions.
 
 use fearless_simd::{Simd, SimdBase};
 use glam::DVec3;
