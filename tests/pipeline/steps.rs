@@ -1,8 +1,6 @@
 //! The steps with the real renderer and encoder on a store in memory, with events delivered by hand: the contents of a
 //! bucket after users' actions.
 
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

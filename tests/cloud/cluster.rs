@@ -1,20 +1,15 @@
 //! `rayfold dev --endpoint`: the functions on a bucket of an S3 server that is running already, by one invoker or two.
 
-#![allow(clippy::print_stderr, reason = "says what was measured, and what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use super::stage::stores::on_every_store;
+use super::stage::{PATIENCE, frames, functions_beside, locally};
 use rayfold_local::{S3Server, StoreKind, any_port};
 use rayfold_pipeline::store::{ListRequest, PutOptions, S3Store, Store};
-use stage::stores::on_every_store;
-use stage::{PATIENCE, frames, functions_beside, locally};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 const BUCKET: &str = "films";

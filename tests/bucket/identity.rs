@@ -1,8 +1,6 @@
 //! Sessions from the client's side: AWS's own STS and S3 clients against the store. The unit tests of `policy` check
 //! the meaning of policies. Here every request must check the policy, and the replies are verified.
 
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
 use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;

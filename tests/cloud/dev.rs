@@ -1,20 +1,14 @@
 //! `rayfold dev` from the user's side: started, used through the SDK, interrupted, killed, started again.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-#[path = "stage/stores.rs"]
-mod stores;
-
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::stage::stores::on_every_store;
 use rayfold_local::StoreKind;
 use rayfold_pipeline::store::{Connection, PutOptions, S3Store, Store};
-use stores::on_every_store;
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 

@@ -4,22 +4,17 @@
 //! The assemblers are configured to keep so much of their time free that each adds a frame and leaves the rest to the
 //! next one.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::stage::stores::on_every_store;
+use super::stage::{ALL_ITS_TIME, Stage, frames, logged};
 use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Fate, Fates, Settings};
 use rayfold_local::observation::{Observation, RequestKind};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::store::{ListRequest, Store};
-use stage::stores::on_every_store;
-use stage::{ALL_ITS_TIME, Stage, frames, logged};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
@@ -27,7 +22,7 @@ async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
         settings.environment.push(("RAYFOLD_SPARE_FRAMES".into(), ALL_ITS_TIME.into()));
         change(settings);
     };
-    stage::stage(store, functions, settings).await
+    super::stage::stage(store, functions, settings).await
 }
 
 /// Returns a scene with many colours, so that the encoder has state to keep.
@@ -69,7 +64,7 @@ async fn a_gif_in_pieces_has_the_bytes_of_one_in_one_piece() {
         stage.upload("film", &files).await;
         stage.until_gif_of("film", &files).await;
         let seen = stage.seen();
-        assert_eq!((left(&seen), stage::built(&seen)), (vec![1, 2, 3, 4, 5], 1));
+        assert_eq!((left(&seen), super::stage::built(&seen)), (vec![1, 2, 3, 4, 5], 1));
         assert_tidy(&stage).await;
     })
     .await;
@@ -86,7 +81,7 @@ async fn files_of_all_kinds_in_pieces_have_the_bytes_of_those_in_one_piece() {
         stage.upload("film", &files).await;
         stage.until_gif_of("film", &files).await;
         let seen = stage.seen();
-        assert_eq!((left(&seen), stage::built(&seen)), ([1, 2, 3].repeat(4), 4));
+        assert_eq!((left(&seen), super::stage::built(&seen)), ([1, 2, 3].repeat(4), 4));
         assert_tidy(&stage).await;
     })
     .await;

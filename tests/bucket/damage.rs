@@ -1,23 +1,15 @@
 //! Damaged files of the object store: the store detects damage, reports its position, and loses nothing else.
 
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-#![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]
-
-#[path = "bucket/process.rs"]
-mod process;
-#[path = "bucket/stage.rs"]
-mod stage;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use super::process::Process;
+use super::stage::{BUCKET, Stage, client, failure, options, stage};
 use aws_sdk_s3::Client;
 use aws_sdk_s3::types::{ChecksumAlgorithm, CompletedMultipartUpload, CompletedPart};
-use process::Process;
 use rayfold_bucket::{Error, Server, check};
-use stage::{BUCKET, Stage, client, failure, options, stage};
 
 /// Larger bodies are files.
 const LARGE: usize = 200_000;
@@ -267,7 +259,8 @@ async fn a_damaged_body_is_never_served_as_whole() {
         );
     }
     let server = Server::start(options(folder.path(), None)).await.unwrap();
-    let listed = stage::client(server.address()).list_objects_v2().bucket(BUCKET).send().await.unwrap();
+    let listed =
+        super::stage::client(server.address()).list_objects_v2().bucket(BUCKET).send().await.unwrap();
     let keys: Vec<_> = listed.contents().iter().map(|object| object.key().unwrap()).collect();
     assert_eq!(keys, ["150000", "3000000"]);
     server.stop().await;
@@ -377,7 +370,7 @@ async fn a_database_that_has_shrunk_by_half_is_compacted() {
     read(&client).await;
     server.stop().await;
     let server = Server::start(options(folder.path(), None)).await.unwrap();
-    read(&stage::client(server.address())).await;
+    read(&super::stage::client(server.address())).await;
     server.stop().await;
     assert_eq!(check(folder.path(), false).unwrap().damages, []);
 }

@@ -1,20 +1,12 @@
 //! Memory and disk: memory does not grow with an object, and a full disk causes an error and no damage.
 //!
-//! `RAYFOLD_BUCKET_MIB=4096 cargo test -p rayfold-bucket --test bucket_room` streams more.
-
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-#![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]
-
-#[path = "bucket/process.rs"]
-mod process;
-#[path = "bucket/stage.rs"]
-mod stage;
+//! `RAYFOLD_BUCKET_MIB=4096 cargo test -p rayfold-bucket --test bucket room::` streams more.
 
 use std::io::Write;
 
+use super::process::Process;
+use super::stage::{BUCKET, client, failure};
 use aws_sdk_s3::primitives::ByteStream;
-use process::Process;
-use stage::{BUCKET, client, failure};
 
 const MIB: usize = 1024 * 1024;
 

@@ -1,26 +1,22 @@
 //! The pipeline with faults at a chosen moment: processes killed between two requests, replies lost, the invoker down,
 //! events lost. After each fault the animation equals the uploaded set, or reports why it does not.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use super::stage::stores::on_every_store;
+use super::stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, scene};
 use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Chaos, Fate, Fates, Settings};
 use rayfold_local::observation::{Outcome, RequestKind, Seen};
 use rayfold_local::routes::Function;
 use rayfold_pipeline::manifest::{FrameState, Status};
-use stage::stores::on_every_store;
-use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, scene};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
-    stage::stage(store, Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change).await
+    super::stage::stage(store, Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap(), change)
+        .await
 }
 
 /// Returns a fate for the first `times` puts below a prefix by a function.
@@ -229,7 +225,8 @@ async fn lost_events_are_found_by_the_sweep() {
         files.push(frames(12));
         stage.upload("film", &files).await;
         stage.until_gif_of("film", &files).await;
-        let woken: u64 = stage::logged(&stage.seen()).iter().filter_map(|line| line["woken"].as_u64()).sum();
+        let woken: u64 =
+            super::stage::logged(&stage.seen()).iter().filter_map(|line| line["woken"].as_u64()).sum();
         assert!(woken > 0, "with two fifths of the events lost something had to be woken");
     })
     .await;

@@ -1,14 +1,13 @@
 //! The pipeline from end to end: uploads through the SDK, events through the store's webhook, unmodified function
 //! binaries.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::path::Path;
 use std::time::Duration;
 
+use super::stage::stores::on_every_store;
+use super::stage::{
+    SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene, scene_of_a_model,
+};
 use rayfold_lambda::raytracer::RayTracer;
 use rayfold_local::StoreKind;
 use rayfold_local::invoker::{Chaos, Listing, Settings};
@@ -19,13 +18,11 @@ use rayfold_pipeline::manifest::{FrameState, Manifest, Reason, Status};
 use rayfold_pipeline::store::{ListRequest, Store};
 use rayfold_pipeline::{Drawing, Files, Renderer, Source};
 use rayfold_scene::parse_settings;
-use stage::stores::on_every_store;
-use stage::{SMALL_MB, Stage, big_scene, built, drawn, frames, outcomes, requests, scene, scene_of_a_model};
 
 async fn stage(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Stage {
     let functions = Path::new(env!("CARGO_BIN_EXE_rayfold-render")).parent().unwrap();
     assert!(Path::new(env!("CARGO_BIN_EXE_rayfold-assemble")).parent() == Some(functions));
-    stage::stage(store, functions, change).await
+    super::stage::stage(store, functions, change).await
 }
 
 fn failures(manifest: &Manifest) -> Vec<(&str, &Reason)> {
@@ -411,7 +408,7 @@ async fn logs_hold_no_script_contents() {
         ];
         stage.upload("film", &files).await;
         stage.until("film", Status::Failed).await;
-        let lines = stage::logged(&stage.seen());
+        let lines = super::stage::logged(&stage.seen());
         assert!(lines.iter().any(|line| line["message"] == "rendered" && line["animation"] == "film"));
         for line in &lines {
             assert!(!line.to_string().contains("gardener"), "{line}");

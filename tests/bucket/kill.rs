@@ -1,24 +1,16 @@
 //! The object store is killed while it works. Acknowledged objects exist completely, and their events are delivered.
 //!
-//! `RAYFOLD_BUCKET_PUTS=10000 cargo test -p rayfold-bucket --test bucket_kill` puts more objects.
-
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-#![allow(dead_code, reason = "the stage is shared with the tests of the protocol")]
-
-#[path = "bucket/process.rs"]
-mod process;
-#[path = "bucket/stage.rs"]
-mod stage;
+//! `RAYFOLD_BUCKET_PUTS=10000 cargo test -p rayfold-bucket --test bucket kill::` puts more objects.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use super::process::Process;
+use super::stage::{BUCKET, client, listener, notify};
 use aws_sdk_s3::types::{CompletedMultipartUpload, CompletedPart};
 use fastrand::Rng;
-use process::Process;
-use stage::{BUCKET, client, listener, notify};
 
 /// The number of concurrent requests.
 const WRITERS: usize = 32;

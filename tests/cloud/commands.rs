@@ -1,20 +1,15 @@
 //! The subcommands that use a bucket, with an S3 server, the local invoker and the unmodified function binaries.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use super::stage::stores::on_every_store;
+use super::stage::{PATIENCE, Stage, built, drawn, functions_beside, scene};
 use rayfold_local::StoreKind;
 use rayfold_local::invoker::Settings;
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
-use stage::stores::on_every_store;
-use stage::{PATIENCE, Stage, built, drawn, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
@@ -26,7 +21,7 @@ struct Cloud {
 
 async fn cloud(store: StoreKind, change: impl FnOnce(&mut Settings)) -> Cloud {
     let functions = functions_beside(Path::new(RAYFOLD));
-    Cloud { stage: stage::stage(store, functions, change).await, folder: tempfile::tempdir().unwrap() }
+    Cloud { stage: super::stage::stage(store, functions, change).await, folder: tempfile::tempdir().unwrap() }
 }
 
 impl Cloud {

@@ -1,19 +1,14 @@
 //! The subcommands that use a bucket, run under the policy of each kind of user in the document that Terraform prints.
 //! Each kind can do everything that its description promises, and denied operations change nothing.
 
-#![allow(clippy::print_stderr, reason = "says what a test that failed was doing")]
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails, also in the functions that tests share")]
-
-mod stage;
-
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use super::stage::role::environment;
+use super::stage::stores::on_every_store_with_roles;
+use super::stage::{Stage, functions_beside, scene};
 use rayfold_pipeline::manifest::Status;
 use rayfold_pipeline::store::{ListRequest, Store};
-use stage::role::environment;
-use stage::stores::on_every_store_with_roles;
-use stage::{Stage, functions_beside, scene};
 
 const RAYFOLD: &str = env!("CARGO_BIN_EXE_rayfold");
 
@@ -75,7 +70,7 @@ async fn objects(stage: &Stage) -> Vec<(String, String)> {
 #[tokio::test(flavor = "multi_thread")]
 async fn each_kind_of_user_can_do_what_its_name_says_and_no_more() {
     on_every_store_with_roles(async |store| {
-        let mut stage = stage::stage(store, functions_beside(Path::new(RAYFOLD)), |_| {}).await;
+        let mut stage = super::stage::stage(store, functions_beside(Path::new(RAYFOLD)), |_| {}).await;
         {
             let uploader = User::new(&stage, "uploader").await;
             uploader.write("film/f1.txt", &scene(8.0));
