@@ -46,12 +46,13 @@ pub struct Args {
     /// Number of random scenes in addition
     #[arg(long, default_value_t = 0)]
     random: u64,
-    /// Seed of the first random scene; the others have the seeds that follow
+    /// Seed of the first random scene; the others have the seeds that follow. With `--check`, from any other than 1 on only
+    /// random scripts are drawn
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Draw the examples and this many `--random` scripts of all versions of the language, and compare them with the table
     /// of fingerprints: this machine, with each of its instruction sets, draws the same pictures as every other
-    #[arg(long, conflicts_with_all = ["folders", "seed"])]
+    #[arg(long, conflicts_with = "folders")]
     check: bool,
     /// With `--check`: draw them on another kind of machine, too, which is emulated
     #[arg(long, value_enum, requires = "check", value_name = "MACHINE")]
@@ -71,18 +72,16 @@ pub struct Args {
 /// the table.
 pub fn run(args: &Args) -> Result<()> {
     if args.check || args.write {
-        ensure!(
-            args.random.is_multiple_of(machines::IN_A_LINE),
-            "--random must be a multiple of {}",
-            machines::IN_A_LINE
-        );
+        let of = machines::IN_A_LINE;
+        ensure!(args.random.is_multiple_of(of), "--random must be a multiple of {of}");
+        ensure!(args.seed % of == 1, "--seed must be 1 more than a multiple of {of}");
     }
     if args.write {
         ensure!(args.random > 0, "--random says how many random scripts the table has");
         return machines::write(args.random);
     }
     if args.check {
-        return machines::check(args.random, &args.on, args.slice);
+        return machines::check(args.seed..args.seed + args.random, &args.on, args.slice);
     }
     let mut scripts = Vec::new();
     for folder in &args.folders {

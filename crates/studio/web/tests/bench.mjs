@@ -4,7 +4,8 @@
 //
 //     RAYFOLD=target/release/rayfold CHROMIUM=chromium node tests/bench.mjs RUNS SECONDS SCENES
 //
-// SCENES is JSON: a list of { name, script, grab }, where `grab` is the place of an object, in shares of the picture.
+// SCENES is JSON: a list of { name, script, grab, isStatic }, where `grab` is the place of an object, in shares of the
+// picture. The page of a scene with `isStatic` is the static one: SITE is the folder of the site.
 //
 // It speaks the browser's debugging protocol itself, over a pipe and without its Network domain: that one copies every
 // picture to whoever listens, and halves their rate.
@@ -14,6 +15,7 @@ import { cpSync, mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs"
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
+import { linked, serve } from "./host.mjs";
 import { start } from "./processes.mjs";
 
 const [runs, seconds, scenes] = process.argv.slice(2).map((word) => JSON.parse(word));
@@ -39,26 +41,33 @@ const PROBE = `(() => {
   window.probe = probe;
   // Each move waits for a message that was sent with it or after it, and for the picture of that.
   addEventListener("pointerrawupdate", (event) => probe.recording && probe.asked.push({ number: null, at: event.timeStamp, picture: null }), true);
-  const Socket = window.WebSocket;
-  window.WebSocket = class extends Socket {
-    constructor(...args) {
-      super(...args);
-      this.addEventListener("message", ({ data }) => {
-        if (typeof data !== "string" || !data.includes('"asked"')) return;
-        const asked = Number(/"asked":(\\d+)/.exec(data)[1]);
-        const picture = /"picture":\\[(\\d+)/.exec(data);
-        const { settling } = probe;
-        if (settling && settling.number !== null && settling.number <= asked && picture) settling.picture ??= Number(picture[1]);
-        for (const drag of probe.asked) if (drag.picture === null && drag.number !== null && drag.number <= asked && picture) drag.picture = Number(picture[1]);
-      });
-    }
-    send(text) {
-      probe.sent += 1;
-      if (probe.settling && probe.settling.from !== null && /"ask":"(drag|release)"/.test(text)) probe.settling.number ??= probe.sent;
-      if (text.startsWith('{"ask":"drag"')) for (const drag of probe.asked) drag.number ??= probe.sent;
-      super.send(text);
-    }
+  const hear = (data) => {
+    if (typeof data !== "string" || !data.includes('"asked"')) return;
+    const asked = Number(/"asked":(\\d+)/.exec(data)[1]);
+    const picture = /"picture":\\[(\\d+)/.exec(data);
+    const { settling } = probe;
+    if (settling && settling.number !== null && settling.number <= asked && picture) settling.picture ??= Number(picture[1]);
+    for (const drag of probe.asked) if (drag.picture === null && drag.number !== null && drag.number <= asked && picture) drag.picture = Number(picture[1]);
   };
+  const send = (text) => {
+    if (typeof text !== "string") return;
+    probe.sent += 1;
+    if (probe.settling && probe.settling.from !== null && /"ask":"(drag|release)"/.test(text)) probe.settling.number ??= probe.sent;
+    if (text.startsWith('{"ask":"drag"')) for (const drag of probe.asked) drag.number ??= probe.sent;
+  };
+  // The session is behind a socket, or in a worker of the static page.
+  for (const [name, method] of [["WebSocket", "send"], ["Worker", "postMessage"]]) {
+    window[name] = class extends window[name] {
+      constructor(...args) {
+        super(...args);
+        this.addEventListener("message", ({ data }) => hear(data));
+      }
+      [method](...args) {
+        send(args[0]);
+        super[method](...args);
+      }
+    };
+  }
   // Notes how long the final picture takes after the next of these pointer events.
   probe.settles = (...kinds) => {
     probe.final = null;
@@ -135,14 +144,28 @@ function ours(roots) {
   return [...of].filter(([pid]) => isOurs(pid)).reduce((sum, [, { time }]) => sum + time, 0);
 }
 
-async function measure(run, { name, script, grab }) {
-  const folder = mkdtempSync(join(tmpdir(), "rayfold-bench-"));
+/** A studio that has opened a script: its address, its processes, and how it is stopped. */
+async function opened(script, folder, isStatic) {
+  if (isStatic) {
+    const { address, close } = await serve();
+    const url = `${address}studio.html${linked("scene", [["scene.txt", readFileSync(script)]])}`;
+    return { url, pids: [], stop: close };
+  }
   const path = join(folder, "scene.txt");
   cpSync(script, path);
-  const studio = start(process.env.RAYFOLD, ["studio", path, "--no-open"]);
+  const { server, said, ended } = start(process.env.RAYFOLD, ["studio", path, "--no-open"]);
+  const stop = () => {
+    server.kill("SIGINT");
+    return ended;
+  };
+  return { url: (await said((text) => text.includes("\n"))).trim(), pids: [server.pid], stop };
+}
+
+async function measure(run, { name, script, grab, isStatic }) {
+  const folder = mkdtempSync(join(tmpdir(), "rayfold-bench-"));
+  const studio = await opened(script, folder, isStatic);
   const browser = browse(join(folder, "browser"));
   try {
-    const address = (await studio.said((text) => text.includes("\n"))).trim();
     const { targetInfos } = await browser.ask("Target.getTargets");
     const { targetId } = targetInfos.find(({ type }) => type === "page");
     const { sessionId } = await browser.ask("Target.attachToTarget", { targetId, flatten: true });
@@ -157,7 +180,7 @@ async function measure(run, { name, script, grab }) {
     const room = (width, height) => page("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
     await room(1600, 700);
     const open = async () => {
-      await page("Page.navigate", { url: address });
+      await page("Page.navigate", { url: studio.url });
       for (let round = 0; ; round += 1) {
         await wait(50);
         if ((await evaluate("window.probe?.first ?? null")) !== null) return;
@@ -165,6 +188,7 @@ async function measure(run, { name, script, grab }) {
       }
     };
     await open();
+    const cold = await evaluate("probe.first");
     const box = (of) => evaluate(`(() => { const b = document.querySelector("${of}").getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; })()`);
     const [, , width, height] = await box(".viewport");
     await room(1600 + SIZE[0] - width, 700 + SIZE[1] - height);
@@ -182,7 +206,7 @@ async function measure(run, { name, script, grab }) {
     await mouse("mousePressed", x, y, 1);
     const begin = performance.now();
     let [from, before] = [null, null];
-    const pids = [studio.server.pid, browser.pid, process.pid];
+    const pids = [...studio.pids, browser.pid, process.pid];
     const moves = [];
     // The first second is not counted: caches fill, and the browser compiles.
     for (let now = 0; now < 1000 * (1 + seconds); now = performance.now() - begin) {
@@ -218,12 +242,11 @@ async function measure(run, { name, script, grab }) {
     const probe = await evaluate("JSON.stringify({ sizes: probe.sizes, pictures: probe.pictures, waits: probe.waits })");
     const others = (total.busy - before.busy - (own - before.ours)) / (total.all - before.all);
     const processorMs = (1000 * (own - before.ours)) / JIFFIES;
-    console.log(JSON.stringify({ scene: name, run, first, rested, released, seconds: took, others, processorMs, ...JSON.parse(probe) }));
+    console.log(JSON.stringify({ scene: name, run, cold, first, rested, released, seconds: took, others, processorMs, ...JSON.parse(probe) }));
   } finally {
     await browser.ask("Browser.close").catch(() => {});
     await browser.ended;
-    studio.server.kill("SIGINT");
-    await studio.ended;
+    await studio.stop();
     rmSync(folder, { recursive: true, force: true });
   }
 }
