@@ -5,14 +5,14 @@
 //! only printed.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use rayfold_files::OutputFile;
 use rayfold_pipeline::Mutation;
 use rayfold_simulation::explore::{Counterexample, Explored, World, explore, provoke, provoking, worlds};
+
+use crate::report_folder::ReportFolder;
 
 /// Options of `rayfold-bench explore`.
 #[derive(Debug, clap::Args)]
@@ -35,9 +35,8 @@ pub struct Args {
     /// Number of threads [default: all cores]
     #[arg(long)]
     threads: Option<usize>,
-    /// Write the report into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
 }
 
 /// Runs the searches and writes the report.
@@ -47,6 +46,7 @@ pub struct Args {
 /// Fails if a guarantee does not hold (the error lists the steps), if a broken rule is not detected, or if the report
 /// cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.output.prepare()?;
     let threads =
         args.threads.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
     let all: Vec<World> = worlds().into_iter().filter(|world| world.name.contains(&args.world)).collect();
@@ -217,8 +217,7 @@ fn write_report(
     )?;
     let files = [("search.md", page.into_bytes()), ("search.csv", figures.into_inner()?)];
     for (name, bytes) in files {
-        let path = args.output.join(name);
-        OutputFile::write(&path, bytes, false)?;
+        args.output.write(name, bytes)?;
     }
     Ok(())
 }

@@ -7,12 +7,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
-use rayfold_files::OutputFile;
 use rayfold_local::invoker::{Invoker, Settings};
 use rayfold_local::observation::{Observation, Requests, Seen};
 use rayfold_local::routes::Function;
@@ -24,6 +23,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
 use crate::pipeline::put;
 use crate::plot::{Labels, Series, log_log};
+use crate::report_folder::ReportFolder;
 use crate::scale::{ASSEMBLE_MB, LONGEST, RENDER_MB};
 
 /// The numbers of frames of the animations, and the sizes of their pictures.
@@ -54,9 +54,8 @@ pub struct Args {
     /// Leave out animations with more frames; the report then says so
     #[arg(long)]
     most: Option<u64>,
-    /// Write footprint.md, footprint.csv and footprint.svg into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
 }
 
 /// The cost of one invocation.
@@ -84,6 +83,7 @@ const STEPS: [&str; 3] = ["render", "assemble", "sweep"];
 /// # Errors
 /// Fails if the store or the functions cannot be started, an invocation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    args.output.prepare()?;
     let functions = Functions::locate(&mut |line| eprintln!("{line}"))?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let mut rows = Vec::new();
@@ -307,12 +307,10 @@ fn write_report(args: &Args, rows: &[Row]) -> Result<()> {
         let sizes = [frames.to_string(), width.to_string(), height.to_string()];
         figures.write_record(sizes.iter().chain(costs.iter().flatten()))?;
     }
-    std::fs::create_dir_all(&args.output)?;
     for (name, bytes) in [("footprint.md", page.into_bytes()), ("footprint.csv", figures.into_inner()?)] {
-        let path = args.output.join(name);
-        OutputFile::write(&path, bytes, false)?;
+        args.output.write(name, bytes)?;
     }
-    plot(&args.output.join("footprint.svg"), rows)
+    plot(&args.output.path("footprint.svg"), rows)
 }
 
 fn plot(path: &Path, rows: &[Row]) -> Result<()> {

@@ -5,24 +5,22 @@
 //! separately.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use anyhow::Result;
 use fastrand::Rng;
 use glam::{DVec2, DVec3};
-use rayfold_files::OutputFile;
 use rayfold_scene::{Cone, Cuboid, Cylinder, Disc, Material, Object, Scene, Screen, Sphere, Torus, Triangle};
 use rayfold_tracer::{Drawing, RenderOptions};
 
 use crate::cpu_time;
+use crate::report_folder::ReportFolder;
 use crate::scenes::{light, looking_at};
 
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write growth.md into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Measure scenes of at most this many objects
     #[arg(long, default_value_t = 1_000_000)]
     most: usize,
@@ -177,6 +175,9 @@ struct Taken {
 /// # Errors
 /// Fails if a scene cannot be drawn, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    if !args.check {
+        args.output.prepare()?;
+    }
     let mut report = format!(
         "# Cost of objects that a tree cannot separate\n\n\
          Written by `cargo run --release -p rayfold-bench -- growth --seconds {}`. Pictures have {} x {} pixels and \
@@ -200,8 +201,7 @@ pub fn run(args: &Args) -> Result<()> {
         report += &row;
     }
     if !args.check {
-        std::fs::create_dir_all(&args.output)?;
-        OutputFile::write(args.output.join("growth.md"), &report, false)?;
+        args.output.write("growth.md", &report)?;
     }
     Ok(())
 }

@@ -7,12 +7,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use rayfold_files::OutputFile;
 use rayfold_local::invoker::Settings;
 use rayfold_local::routes::Function;
 use rayfold_local::{Functions, Plan, Platform, StoreKind};
 
 use crate::pipeline::{Compiled, Folder, Run, make};
+use crate::report_folder::ReportFolder;
 
 /// Options of `rayfold-bench laptop`.
 #[derive(Debug, clap::Args)]
@@ -26,9 +26,8 @@ pub struct Args {
     /// A folder of scripts that is made, too
     #[arg(long, value_name = "FOLDER", default_value = "scenes/hello")]
     scene: PathBuf,
-    /// Folder of the report
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
 }
 
 /// An animation on a number of places.
@@ -44,11 +43,11 @@ struct Row {
 /// # Errors
 /// When the functions cannot be started, an animation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
-    std::fs::create_dir_all(&args.output)?;
+    args.output.prepare()?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let rows = runtime.block_on(measure(args))?;
-    Ok(OutputFile::write(args.output.join("laptop.md"), report(&rows, load.trim())?, false)?)
+    args.output.write("laptop.md", report(&rows, load.trim())?)
 }
 
 async fn measure(args: &Args) -> Result<Vec<Row>> {

@@ -35,6 +35,7 @@ pub mod paths;
 #[cfg(feature = "bucket")]
 pub mod pipeline;
 mod plot;
+pub mod report_folder;
 pub mod sampling;
 #[cfg(feature = "bucket")]
 pub mod scale;

@@ -5,23 +5,21 @@
 //! ray per pixel.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use glam::DVec3;
-use rayfold_files::OutputFile;
 use rayfold_scene::assets::{Library, MemoryFiles, Smoothing};
 use rayfold_scene::{Limits, Object, Scene, Script, parse_with_files};
 use rayfold_tracer::{Drawing, RenderOptions};
 
 use crate::cpu_time;
+use crate::report_folder::ReportFolder;
 
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write models.md into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Use few triangles and rounds: a check that everything runs, not a measurement
     #[arg(long)]
     quick: bool,
@@ -85,6 +83,7 @@ impl Rounds {
 /// # Errors
 /// Fails if a model cannot be read or drawn, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    args.output.prepare()?;
     let plan = if args.quick { &QUICK } else { &FULL };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut goals = Vec::new();
@@ -110,8 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
     report += "\n";
     report += &parts;
     eprint!("{report}");
-    std::fs::create_dir_all(&args.output)?;
-    Ok(OutputFile::write(args.output.join("models.md"), &report, false)?)
+    args.output.write("models.md", &report)
 }
 
 /// A goal of the project, and what was measured.

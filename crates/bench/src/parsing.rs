@@ -1,20 +1,18 @@
 //! `rayfold-bench parsing`: time and memory to read and write the largest scripts, valid and invalid ones.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
-use rayfold_files::OutputFile;
 use rayfold_scene::{Limits, Parsed, parse};
 
 use crate::cpu_time;
+use crate::report_folder::ReportFolder;
 
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write parsing.md into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Use scripts of this many MiB
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=256))]
     mebibytes: u32,
@@ -50,6 +48,7 @@ fn triangle(rng: &mut fastrand::Rng, decimals: usize) -> String {
 /// # Errors
 /// Fails if the clock cannot be read or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    args.output.prepare()?;
     let mut report = format!(
         "# Parsing\n\n\
          Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are from one run: processor time in \
@@ -66,9 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
         eprintln!("{}", kind.about);
         report += &row(kind, args)?;
     }
-    std::fs::create_dir_all(&args.output)?;
-    let path = args.output.join("parsing.md");
-    Ok(OutputFile::write(&path, report, false)?)
+    args.output.write("parsing.md", report)
 }
 
 fn row(kind: &Kind, args: &Args) -> Result<String> {

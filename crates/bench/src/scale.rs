@@ -10,12 +10,12 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use rayfold_files::OutputFile;
 use rayfold_simulation::{Scale, ScaleReport, measure};
 use rayon::prelude::*;
 use serde::Deserialize;
 
 use crate::plot::{Labels, Series, log_log};
+use crate::report_folder::ReportFolder;
 
 /// The memory of the functions in MiB, by the defaults of the stack.
 pub(crate) const RENDER_MB: f64 = 1_769.0;
@@ -69,9 +69,8 @@ pub struct Args {
     /// Read the prices from this file
     #[arg(long, default_value = "infra/prices.json")]
     prices: PathBuf,
-    /// Write the report into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
 }
 
 #[derive(Deserialize)]
@@ -111,6 +110,7 @@ type Value = fn(&Row) -> f64;
 /// Fails if an animation's result is wrong, or if the report cannot be written.
 #[expect(clippy::print_stdout, reason = "a measurement tells what it finds")]
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.output.prepare()?;
     let text = std::fs::read_to_string(&args.prices)
         .with_context(|| format!("cannot read {}", args.prices.display()))?;
     let prices: Prices = serde_json::from_str(&text)?;
@@ -367,8 +367,7 @@ fn write_report(args: &Args, rows: &[Row], by_places: &[String]) -> anyhow::Resu
         ])?;
     }
     for (name, bytes) in [("scale.md", page.into_bytes()), ("scale.csv", figures.into_inner()?)] {
-        let path = args.output.join(name);
-        OutputFile::write(&path, bytes, false)?;
+        args.output.write(name, bytes)?;
     }
     let plots: [(&str, &str, Value); 3] = [
         ("requests", "requests per frame", |row| row.report.requests_a_frame),
@@ -383,7 +382,7 @@ fn write_report(args: &Args, rows: &[Row], by_places: &[String]) -> anyhow::Resu
             joined: true,
         }];
         let labels = Labels { title: y, x: "frames of the animation", y };
-        log_log(&args.output.join(format!("scale-{name}.svg")), &labels, &series)?;
+        log_log(&args.output.path(format!("scale-{name}.svg")), &labels, &series)?;
     }
     Ok(())
 }

@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use rayfold_files::OutputFile;
 use serde::Deserialize;
 
 use crate::plot::{Labels, Series, shares};
+use crate::report_folder::ReportFolder;
 
 /// The width and height of the picture.
 const SIZE: (u32, u32) = (960, 540);
@@ -94,9 +94,8 @@ const LONGEST_SHOWN_MS: f64 = 60.0;
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write studio.md, studio.csv and studio.svg into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Measure this rayfold program [default: the one beside this program]
     #[arg(long)]
     program: Option<PathBuf>,
@@ -194,6 +193,7 @@ impl Run {
 /// # Errors
 /// Fails if the program, Node or the browser cannot be run, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    args.output.prepare()?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folder = tempfile::tempdir()?;
     let mut scenes = Vec::new();
@@ -230,10 +230,9 @@ pub fn run(args: &Args) -> Result<()> {
     for run in &quietest {
         ensure!(run.waits.len() > 10, "the browser has shown next to nothing of {}", run.scene);
     }
-    std::fs::create_dir_all(&args.output)?;
-    OutputFile::write(args.output.join("studio.md"), report(&runs, &quietest), false)?;
-    write_csv(&args.output.join("studio.csv"), &runs)?;
-    plot(&args.output.join("studio.svg"), &quietest)
+    args.output.write("studio.md", report(&runs, &quietest))?;
+    write_csv(&args.output.path("studio.csv"), &runs)?;
+    plot(&args.output.path("studio.svg"), &quietest)
 }
 
 /// Returns the run with the least other load of each scene.

@@ -1,14 +1,13 @@
 //! Compares frames of all example scenes, drawn as users get them (with samples and shutter), with the plain tracer.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use anyhow::{Context, Result};
 use image::RgbImage;
-use rayfold_files::OutputFile;
 use rayfold_scene::Script;
 use rayfold_tracer::{Exposure, RenderOptions, precision, reference, render_frame};
 
+use crate::report_folder::ReportFolder;
 use crate::scenes::{EXAMPLES, MOVING_EXAMPLES, script};
 
 /// The number of frames compared per animation, spread evenly.
@@ -39,7 +38,7 @@ impl Row {
 ///
 /// # Errors
 /// Fails if a scene cannot be drawn or the report cannot be written.
-pub(super) fn run(folder: &Path, quick: bool) -> Result<()> {
+pub(super) fn run(output: &ReportFolder, quick: bool) -> Result<()> {
     let names = EXAMPLES.into_iter().chain(MOVING_EXAMPLES);
     let rows: Vec<Row> = names
         .map(|name| {
@@ -47,8 +46,7 @@ pub(super) fn run(folder: &Path, quick: bool) -> Result<()> {
             compared(name, &script(name)?, if quick { 1 } else { FRAMES })
         })
         .collect::<Result<_>>()?;
-    let path = folder.join("accuracy-examples.md");
-    Ok(OutputFile::write(&path, report(&rows, quick)?, false)?)
+    output.write("accuracy-examples.md", report(&rows, quick)?)
 }
 
 fn compared(name: &'static str, script: &Script, most: usize) -> Result<Row> {

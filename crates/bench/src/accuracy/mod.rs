@@ -7,17 +7,16 @@ mod naive;
 pub(crate) mod rays;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use rayfold_files::OutputFile;
 use rayfold_tracer::MAX_BOUNCES;
 
 use crate::backends;
 use crate::cpu_time::{self, median};
 use crate::hard_cases::{CASES, Report, Run, Size, one_of_each};
 use crate::plot::{Labels, Series, log_log};
+use crate::report_folder::ReportFolder;
 use crate::scenes::{EXAMPLES, example, rock, table};
 pub(crate) use naive::NAME as NAIVE;
 
@@ -26,9 +25,8 @@ use images::{Comparison, DEEPEST, Measurement, Subject, compare};
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write accuracy.md and plots, or hard-cases.md and the figures of its cases, into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Use small images, each drawn once, and hard cases at the sizes of the tests
     #[arg(long)]
     quick: bool,
@@ -51,7 +49,7 @@ pub struct Args {
 /// # Errors
 /// Fails if a scene cannot be rendered or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
-    std::fs::create_dir_all(&args.output)?;
+    args.output.prepare()?;
     if args.hard_cases {
         return hard_cases(args);
     }
@@ -70,8 +68,7 @@ pub fn run(args: &Args) -> Result<()> {
         let plots = plots(&args.output, &comparisons)?;
         introduction(args.quick) + &cost + &plots + &tables(&comparisons)?
     };
-    let path = args.output.join("accuracy.md");
-    Ok(OutputFile::write(&path, report, false)?)
+    args.output.write("accuracy.md", report)
 }
 
 fn introduction(quick: bool) -> String {
@@ -208,7 +205,7 @@ fn tables(comparisons: &[Comparison]) -> Result<String> {
 const NONE: f64 = 1e-4;
 
 /// Plots the error over time: all scenes at the language's depth, and each scene with mirrors at all depths.
-fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
+fn plots(output: &ReportFolder, comparisons: &[Comparison]) -> Result<String> {
     let mut text = String::from("## Error over time\n\n![Error over time](accuracy-images.svg)\n\n");
     let count = comparisons.first().map_or(0, |c| c.pictures().count());
     let names = comparisons.first().into_iter().flat_map(Comparison::pictures).map(|m| m.backend.clone());
@@ -228,7 +225,7 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
         x: "CPU seconds an image",
         y: "RMSE in levels (1e-4: none)",
     };
-    log_log(&folder.join("accuracy-images.svg"), &labels, &series)?;
+    log_log(&output.path("accuracy-images.svg"), &labels, &series)?;
     for c in comparisons.iter().filter(|c| c.measurements.len() > count) {
         let mut series: Vec<Series> = Vec::new();
         for m in c.measurements.iter().filter(|m| m.backend != "reference") {
@@ -245,7 +242,7 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
             x: "CPU seconds an image",
             y: "RMSE in levels relative to the greatest depth (1e-4: none)",
         };
-        log_log(&folder.join(&file), &labels, &series)?;
+        log_log(&output.path(&file), &labels, &series)?;
         writeln!(text, "![{title}]({file})\n")?;
     }
     Ok(text)
@@ -254,7 +251,7 @@ fn plots(folder: &Path, comparisons: &[Comparison]) -> Result<String> {
 /// Measures the hard cases, or one of them, and writes their page and the files beside it.
 fn hard_cases(args: &Args) -> Result<()> {
     let size = if args.quick { Size::Quick } else { Size::Full };
-    let folder = args.output.join("hard-cases");
+    let folder = args.output.path("hard-cases");
     let mut report = Report::read(&folder)?;
     if !args.page {
         let mut all = backends::all();
@@ -271,6 +268,5 @@ fn hard_cases(args: &Args) -> Result<()> {
         }
         report.write(&folder)?;
     }
-    let path = args.output.join("hard-cases.md");
-    Ok(OutputFile::write(&path, report.page(NAIVE)?, false)?)
+    args.output.write("hard-cases.md", report.page(NAIVE)?)
 }

@@ -9,25 +9,23 @@ mod placed;
 mod relations;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use fastrand::Rng;
 use image::RgbImage;
-use rayfold_files::OutputFile;
 use rayfold_scene::Scene;
 use rayfold_tracer::{RenderOptions, reference, render};
 use rayon::prelude::*;
 
 use self::relations::{Other, RELATIONS, Relation};
 use crate::hard_cases::{SEED, exact_at, is_wrong_at, random_scene};
+use crate::report_folder::ReportFolder;
 
 /// What to draw.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives metamorphic.md
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// How many scenes to draw at random
     #[arg(long, default_value_t = 3_000)]
     scenes: u64,
@@ -62,6 +60,9 @@ struct Found {
 /// # Errors
 /// When a scene cannot be drawn, a pixel is not explained, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    if !args.check {
+        args.output.prepare()?;
+    }
     let mut found = vec![Found::default(); RELATIONS.len()];
     for from in (0..args.scenes).step_by(100) {
         let seeds = args.seed + from..args.seed + args.scenes.min(from + 100);
@@ -71,9 +72,7 @@ pub fn run(args: &Args) -> Result<()> {
     let report = report(args, &found)?;
     eprintln!("{report}");
     if !args.check {
-        std::fs::create_dir_all(&args.output)?;
-        let path = args.output.join("metamorphic.md");
-        OutputFile::write(&path, &report, false)?;
+        args.output.write("metamorphic.md", &report)?;
     }
     let unexplained: usize = found.iter().map(|found| found.unexplained).sum();
     anyhow::ensure!(unexplained == 0, "{unexplained} pixels are not explained");

@@ -13,7 +13,6 @@ use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context, Result, ensure};
-use rayfold_files::OutputFile;
 use rayon::prelude::*;
 
 pub(crate) use self::parts::parts;
@@ -21,12 +20,13 @@ use self::parts::{Build, builds, uses};
 pub(crate) use self::subjects::SKY;
 use self::subjects::{Subject, subjects};
 
+use crate::report_folder::ReportFolder;
+
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write needs.md into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Print the table and write nothing
     #[arg(long)]
     check: bool,
@@ -103,6 +103,9 @@ impl Row {
 /// Fails if a part costs too much to a scene that does not use it, if a build draws a scene whose parts it lacks or
 /// draws another picture, or if valgrind or cargo fails.
 pub fn run(args: &Args) -> Result<()> {
+    if !args.check {
+        args.output.prepare()?;
+    }
     ensure!(
         Command::new("valgrind").arg("--version").output().is_ok_and(|run| run.status.success()),
         "valgrind cannot be run; on Debian: apt-get install valgrind"
@@ -133,9 +136,7 @@ pub fn run(args: &Args) -> Result<()> {
     let report = report(&rows)?;
     eprintln!("{report}");
     if !args.check && !args.slice && args.only.is_empty() {
-        std::fs::create_dir_all(&args.output)?;
-        let path = args.output.join("needs.md");
-        OutputFile::write(&path, &report, false)?;
+        args.output.write("needs.md", &report)?;
     }
     let beyond: Vec<_> = rows.iter().filter(|row| row.is_beyond()).map(Row::summary).collect();
     ensure!(beyond.is_empty(), "scenes execute over {MOST} % more than they need: {}", beyond.join("; "));

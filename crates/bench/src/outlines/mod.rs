@@ -8,7 +8,6 @@
 mod families;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use image::{Rgb, RgbImage};
@@ -19,12 +18,13 @@ use rayon::prelude::*;
 
 use self::families::{FAMILIES, Family};
 
+use crate::report_folder::ReportFolder;
+
 /// The scenes to draw.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives outlines.md
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Pixels to draw, in millions
     #[arg(long, default_value_t = 100)]
     millions: u64,
@@ -71,6 +71,9 @@ struct Found {
 /// # Errors
 /// When a scene cannot be drawn, there is a dot, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
+    if !args.check {
+        args.output.prepare()?;
+    }
     if let Some(seed) = args.replay {
         return replay(seed);
     }
@@ -84,9 +87,7 @@ pub fn run(args: &Args) -> Result<()> {
     let report = report(args, &found)?;
     eprintln!("{report}");
     if !args.check {
-        std::fs::create_dir_all(&args.output)?;
-        let path = args.output.join("outlines.md");
-        std::fs::write(&path, &report).with_context(|| path.display().to_string())?;
+        args.output.write("outlines.md", &report)?;
     }
     let dots: usize = found.iter().map(|found| found.dots.len()).sum();
     ensure!(dots == 0, "{dots} dots");

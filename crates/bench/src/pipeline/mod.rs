@@ -14,10 +14,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use rayfold_files::OutputFile;
 use rayfold_local::{Functions, Plan, Platform, StoreKind};
 use rayfold_scene::{Limits, parse};
 use rayfold_tracer::{RenderOptions, render};
+
+use crate::report_folder::ReportFolder;
 
 pub(crate) use run::{Compiled, Folder, Run, put, run as make};
 
@@ -27,9 +28,8 @@ pub struct Args {
     /// Use this S3 store
     #[arg(long, value_name = "STORE", default_value = StoreKind::BuiltIn.name(), value_parser = stores())]
     store: StoreKind,
-    /// Write pipeline.md and its plot, or the pages of another store, into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Read the scenes from this folder
     #[arg(long, default_value = "scenes")]
     scenes: PathBuf,
@@ -78,7 +78,7 @@ pub(crate) struct Runs {
 /// # Errors
 /// Fails if the store or the functions cannot be started, an animation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
-    std::fs::create_dir_all(&args.output)?;
+    args.output.prepare()?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let scenes = runtime.block_on(measure(args))?;
@@ -88,9 +88,8 @@ pub fn run(args: &Args) -> Result<()> {
         StoreKind::SeaweedFs => "pipeline-seaweedfs",
     };
     let plot = format!("{name}-timeline.svg");
-    timeline::plot(&args.output.join(&plot), scenes.last().context("no scene")?)?;
-    let path = args.output.join(format!("{name}.md"));
-    Ok(OutputFile::write(&path, report::text(args.store, &scenes, load.trim(), &plot)?, false)?)
+    timeline::plot(&args.output.path(&plot), scenes.last().context("no scene")?)?;
+    args.output.write(format!("{name}.md"), report::text(args.store, &scenes, load.trim(), &plot)?)
 }
 
 async fn measure(args: &Args) -> Result<Vec<Scene>> {

@@ -6,7 +6,6 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use fastrand::Rng;
 use glam::DVec3;
-use rayfold_files::OutputFile;
 use rayfold_scene::Samples;
 use rayfold_scene::assets::{Library, MemoryFiles};
 use rayfold_tracer::{RenderOptions, Sampler};
@@ -251,8 +250,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         eprint!("{page}");
         return Ok(());
     }
-    OutputFile::write(args.output.join("light.md"), page, false)?;
-    Ok(())
+    args.output.write("light.md", page)
 }
 
 fn page(args: &Args, (width, height): (u32, u32), all: &[Compared]) -> Result<String> {

@@ -1,7 +1,5 @@
 //! A picture of means, measured: its time, its rays, its error.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, Result};
 use glam::DVec3;
 use rayfold_scene::{Samples, Scene};
@@ -9,13 +7,13 @@ use rayfold_tracer::{Drawing, Exposure, Means, Precision, RenderOptions};
 
 use super::scenes::Picture;
 use crate::cpu_time;
+use crate::report_folder::ReportFolder;
 
 /// The parts of the report to measure.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that receives sampling.md, sampling.csv and its plots
-    #[arg(long, default_value = "docs/reports")]
-    pub(super) output: PathBuf,
+    #[command(flatten)]
+    pub(super) output: ReportFolder,
     /// Columns of the pictures; rows are three quarters of that
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(16..))]
     pub(super) width: u32,

@@ -36,6 +36,9 @@ const ERRORS: [(u32, f64); 6] = [(16, 4.0), (64, 2.0), (64, 1.0), (256, 1.0), (2
 /// # Errors
 /// When a picture cannot be drawn or a file not written.
 pub fn run(args: &Args) -> Result<()> {
+    if !args.check {
+        args.output.prepare()?;
+    }
     if args.targets {
         return targets::run(args);
     }

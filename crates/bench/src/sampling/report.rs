@@ -8,7 +8,6 @@ use super::measure::{Agreement, Args, Drawn};
 use super::scenes::EFFECTS;
 use super::small;
 use crate::plot::{Labels, Series, log_log};
-use rayfold_files::OutputFile;
 
 const WAYS: [(&str, &str); 4] = [
     ("adaptive", "adaptive"),
@@ -23,8 +22,8 @@ pub(super) fn write(
     drawn: &[Drawn],
     agreements: &[Agreement],
 ) -> Result<()> {
-    let (folder, truth) = (args.output.as_path(), args.truth);
-    let mut table = csv::Writer::from_path(folder.join("sampling.csv"))?;
+    let truth = args.truth;
+    let mut table = csv::Writer::from_path(args.output.path("sampling.csv"))?;
     table.write_record([
         "effect",
         "way",
@@ -78,11 +77,10 @@ pub(super) fn write(
         }
         let file = format!("sampling-{}.svg", effect.name);
         let labels = Labels { title: effect.about, x: "processor time, ms", y: "error, levels" };
-        log_log(&folder.join(&file), &labels, &series)?;
+        log_log(&args.output.path(&file), &labels, &series)?;
         writeln!(page, "![{}: {}]({file})\n", effect.name, effect.about)?;
     }
-    OutputFile::write(folder.join("sampling.md"), page.trim_end().to_owned() + "\n", false)?;
-    Ok(())
+    args.output.write("sampling.md", page.trim_end().to_owned() + "\n")
 }
 
 /// Renews the part of the page on floors and scenes drawn at random, and leaves the rest.
@@ -91,12 +89,10 @@ pub(super) fn renew_random(args: &Args, part: &str) -> Result<()> {
         eprint!("{part}");
         return Ok(());
     }
-    let path = args.output.join("sampling.md");
-    let page = std::fs::read_to_string(&path)?;
+    let page = std::fs::read_to_string(args.output.path("sampling.md"))?;
     let next = page.find("## Against").context("no page to renew")?;
     let before = page.find(small::HEADING).unwrap_or(next);
-    OutputFile::write(path, format!("{}{part}{}", &page[..before], &page[next..]), false)?;
-    Ok(())
+    args.output.write("sampling.md", format!("{}{part}{}", &page[..before], &page[next..]))
 }
 
 fn rows<'a>(drawn: &'a [Drawn], effect: &'a str, way: &'a str) -> impl Iterator<Item = &'a Drawn> {

@@ -35,7 +35,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
         eprint!("{page}");
         return Ok(());
     }
-    Ok(std::fs::write(args.output.join("sampling-small.md"), page.trim_end().to_owned() + "\n")?)
+    args.output.write("sampling-small.md", page.trim_end().to_owned() + "\n")
 }
 
 fn script(text: &str) -> Result<Script> {

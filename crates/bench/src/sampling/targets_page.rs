@@ -10,7 +10,6 @@ use super::mitsuba::{self, Truth};
 use super::works::{PEER, WORKS};
 use crate::plot::{Labels, Series, log_log};
 use crate::speed::{self, povray};
-use rayfold_files::OutputFile;
 
 /// The errors at which times are given.
 const ERRORS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
@@ -61,15 +60,14 @@ pub(super) fn write(
             .collect();
         let file = format!("time-to-error-{}.svg", work.name);
         let labels = Labels { title: work.about, x: "processor time, ms", y: "error, levels" };
-        log_log(&args.output.join(&file), &labels, &series)?;
+        log_log(&args.output.path(&file), &labels, &series)?;
         writeln!(page, "\n![{}]({file})\n", work.about)?;
     }
-    OutputFile::write(args.output.join("time-to-error.md"), page.trim_end().to_owned() + "\n", false)?;
-    Ok(())
+    args.output.write("time-to-error.md", page.trim_end().to_owned() + "\n")
 }
 
 fn table(args: &Args, curves: &[Curve]) -> Result<()> {
-    let mut table = csv::Writer::from_path(args.output.join("time-to-error.csv"))?;
+    let mut table = csv::Writer::from_path(args.output.path("time-to-error.csv"))?;
     table.write_record(["work", "way", "ms", "rays a pixel", "error", "off by > 4 %"])?;
     for curve in curves {
         for point in &curve.points {

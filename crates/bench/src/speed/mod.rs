@@ -6,25 +6,23 @@ pub(crate) mod povray;
 pub mod shapes;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use image::RgbImage;
-use rayfold_files::OutputFile;
 use rayfold_scene::Scene;
 use rayfold_tracer::{Drawing, RenderOptions};
 
 use crate::backends::{Backend, levels, packets, reference};
 use crate::cpu_time::{self, median};
 use crate::plot::{Labels, Series, log_log};
+use crate::report_folder::ReportFolder;
 use crate::scenes::{EXAMPLES, cloud, example, rock, table};
 
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write speed.md and its plots into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Use small sizes and few rounds: a check that everything runs, not a measurement
     #[arg(long)]
     quick: bool,
@@ -64,7 +62,7 @@ const QUICK: Plan = Plan {
 /// Fails if a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     let plan = if args.quick { &QUICK } else { &FULL };
-    std::fs::create_dir_all(&args.output)?;
+    args.output.prepare()?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let command = if args.quick { " --quick" } else { "" };
     let widths: Vec<_> = levels().iter().map(|(name, _)| *name).collect();
@@ -87,8 +85,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     report += "\n";
     report += &rest;
-    let path = args.output.join("speed.md");
-    Ok(OutputFile::write(&path, report, false)?)
+    args.output.write("speed.md", report)
 }
 
 /// The peer's time divided by ours.
@@ -303,7 +300,7 @@ fn examples(plan: &Plan, one: &rayon::ThreadPool, ratios: &mut Vec<Ratio>) -> Re
 }
 
 /// Plots time by objects, triangles and pixels, and fits the exponent of the power.
-fn growth(plan: &Plan, folder: &Path) -> Result<String> {
+fn growth(plan: &Plan, output: &ReportFolder) -> Result<String> {
     let backend = best();
     let time = |scene: Result<Scene>, rounds: usize| -> Result<f64> {
         let seconds = in_turn(&scene?, &[&backend], rounds)?;
@@ -357,7 +354,7 @@ fn growth(plan: &Plan, folder: &Path) -> Result<String> {
         x: "spheres, triangles, pixels",
         y: "CPU seconds per image",
     };
-    log_log(&folder.join("speed-growth.svg"), &labels, &series)?;
+    log_log(&output.path("speed-growth.svg"), &labels, &series)?;
     Ok(text)
 }
 

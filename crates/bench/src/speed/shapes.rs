@@ -2,14 +2,12 @@
 //! peers.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use fastrand::Rng;
 use glam::{DMat3, DVec3};
 use image::RgbImage;
-use rayfold_files::OutputFile;
 use rayfold_scene::model::{Finish, Glass, Pattern, Shine, Weight};
 use rayfold_scene::{
     Capsule, Coefficients, Cone, Cuboid, Cylinder, Disc, Instance, Lamp, Material, Object, Placement, Plane,
@@ -21,14 +19,14 @@ use super::{mitsuba, povray};
 use crate::accuracy::rays;
 use crate::backends::{Backend, levels, packets};
 use crate::cpu_time::{self, median};
+use crate::report_folder::ReportFolder;
 use crate::scenes::{light, looking_at};
 
 /// The options of the subcommand.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Write shapes.md and shapes.csv into this folder
-    #[arg(long, default_value = "docs/reports")]
-    output: PathBuf,
+    #[command(flatten)]
+    output: ReportFolder,
     /// Use small pictures, drawn once: a check that everything runs, not a measurement
     #[arg(long)]
     quick: bool,
@@ -108,15 +106,14 @@ struct Row {
 /// # Errors
 /// Fails if a scene cannot be rendered, a peer that is here fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
-    std::fs::create_dir_all(&args.output)?;
+    args.output.prepare()?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut rows = Vec::new();
     for subject in SUBJECTS.iter().filter(|(name, ..)| name.contains(&args.scene)) {
         eprintln!("{}", subject.0);
         rows.push(one.install(|| measured(subject, args))?);
     }
-    let path = args.output.join("shapes.md");
-    OutputFile::write(&path, report(args, &rows)?, false)?;
+    args.output.write("shapes.md", report(args, &rows)?)?;
     write_csv(args, &rows)
 }
 
@@ -246,7 +243,7 @@ fn short_of(row: &Row) -> Vec<String> {
 }
 
 fn write_csv(args: &Args, rows: &[Row]) -> Result<()> {
-    let path = args.output.join("shapes.csv");
+    let path = args.output.path("shapes.csv");
     let mut csv = csv::Writer::from_path(&path).with_context(|| path.display().to_string())?;
     csv.write_record(["scene", "objects", "rays", "backend", "milliseconds", "nanoseconds_a_ray"])?;
     for row in rows {
