@@ -5,11 +5,21 @@ import { collab, receiveUpdates, sendableUpdates } from "@codemirror/collab";
 import { ChangeSet, type ChangeSpec, type Extension, Text, Transaction } from "@codemirror/state";
 import { EditorView } from "@codemirror/view";
 
-import type { LineState, ServerMessage, TextChange } from "../protocol";
+import type { LineState, ServerMessage, TextChange, TextState } from "../protocol";
 import { ask, lines, playing } from "../store";
 
 const PAGE = "page";
 const STUDIO = "studio";
+
+/** The milliseconds between two changes of the shown text: showing one takes as long as a picture of a drag. */
+const APART = 100;
+
+/** A change of the server, and the number of lines after it. */
+interface Change {
+  readonly splices: NonNullable<ServerMessage["splices"]>;
+  readonly text: TextState;
+  readonly count: number;
+}
 
 export interface Sync {
   /** The extension that sends changes; made anew with each state. */
@@ -21,6 +31,9 @@ export interface Sync {
 export function sync(): Sync {
   let synced = Text.empty;
   let [file, version] = [0, 0];
+  /** Changes that are not shown yet, and when the last ones were shown. */
+  let waiting: Change[] = [];
+  let [shown, timer] = [-APART, 0];
 
   const send = (before: Text, changes: ChangeSet, after: Text): void => {
     ask({ ask: "edit", file, version, changes: lineChanges(before, changes, after) });
@@ -42,14 +55,37 @@ export function sync(): Sync {
     view.dispatch(transaction);
   };
 
+  const show = (view: EditorView): void => {
+    clearTimeout(timer);
+    timer = 0;
+    if (waiting.length === 0) return;
+    let all = ChangeSet.empty(synced.length);
+    for (const { splices, text, count } of waiting.splice(0)) {
+      version = text.version;
+      const changes = serverChanges(synced, splices, text.ends, count);
+      synced = changes.apply(synced);
+      all = all.compose(changes);
+    }
+    take(view, all, STUDIO);
+    let before = synced;
+    for (const update of sendableUpdates(view.state)) {
+      const after = update.changes.apply(before);
+      send(before, update.changes, after);
+      before = after;
+    }
+    shown = performance.now();
+  };
+
   const hear = (view: EditorView, tell: ServerMessage, reset: (text: Text) => void): void => {
     if (tell.lines && tell.text) {
+      waiting = [];
       ({ file, version } = tell.text);
       synced = Text.of(textLines(tell.lines, tell.text.ends));
       reset(synced);
       return;
     }
     if (tell.accepted === true) {
+      show(view);
       const [first] = sendableUpdates(view.state);
       if (!first) return;
       synced = first.changes.apply(synced);
@@ -57,16 +93,12 @@ export function sync(): Sync {
       return;
     }
     if (!tell.splices || !tell.text) return;
-    version = tell.text.version;
-    const changes = serverChanges(synced, tell.splices, tell.text.ends);
-    synced = changes.apply(synced);
-    take(view, changes, STUDIO);
-    let before = synced;
-    for (const update of sendableUpdates(view.state)) {
-      const after = update.changes.apply(before);
-      send(before, update.changes, after);
-      before = after;
-    }
+    waiting.push({ splices: tell.splices, text: tell.text, count: lines.value.length });
+    // A drag changes numbers within lines.
+    const isDrag = tell.splices.every((splice) => splice.removed === splice.lines.length);
+    const left = shown + APART - performance.now();
+    if (!isDrag || left <= 0) show(view);
+    else timer ||= window.setTimeout(() => show(view), left);
   };
   return { extension, hear };
 }
@@ -99,7 +131,7 @@ export function lineChanges(before: Text, changes: ChangeSet, after: Text): read
 }
 
 /** The changes of a text by the server's splices, as small as they can be, so that the caret stays. */
-export function serverChanges(text: Text, splices: NonNullable<ServerMessage["splices"]>, ends: boolean): ChangeSet {
+export function serverChanges(text: Text, splices: NonNullable<ServerMessage["splices"]>, ends: boolean, count: number): ChangeSet {
   let doc = text;
   let all = ChangeSet.empty(doc.length);
   const change = (spec: ChangeSpec): void => {
@@ -108,7 +140,6 @@ export function serverChanges(text: Text, splices: NonNullable<ServerMessage["sp
     all = all.compose(changes);
   };
   for (const { at, removed, lines: inserted } of splices) change(spliceChange(doc, at, removed, inserted.map((line) => line.text)));
-  const count = lines.value.length;
   const wanted = ends || count === 0 ? count + 1 : count;
   if (doc.lines > wanted) change({ from: doc.line(wanted).to, to: doc.length });
   if (doc.lines < wanted) change({ from: doc.length, insert: Text.of(["", ""]) });
