@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 11] = [
+const TESTS: [&str; 12] = [
     "tests/logic.mjs",
     "tests/site-standing.mjs",
+    "tests/site-cost.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
     "tests/script.mjs",

@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 
 import type { Listener, Send } from "../connection/listener";
 import { place, opened as remember } from "./address";
-import type { Question, Start, ToDesk, ToPage } from "./messages";
+import type { FramePlace, Question, Sample, Start, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
 import { moduleFile } from "./variant";
 
@@ -39,6 +39,8 @@ export const projects = async (): Promise<readonly string[]> => ((await ask({ is
 export const removeProject = (name: string): Promise<unknown> => ask({ is: "remove", name });
 export const zip = async (): Promise<Uint8Array<ArrayBuffer> | null> => (await ask({ is: "zip" })) as Uint8Array<ArrayBuffer> | null;
 export const unzip = async (content: Uint8Array): Promise<readonly File[] | null> => (await ask({ is: "unzip", content })) as readonly File[] | null;
+/** Draws frames on one thread: as many of them as some seconds allow, and none if the first takes longer. */
+export const samples = async (frames: readonly FramePlace[]): Promise<readonly Sample[]> => ((await ask({ is: "samples", frames })) as readonly Sample[] | null) ?? [];
 /** Keeps files as a new project, and returns its name. */
 export const importProject = async (name: string, files: readonly File[]): Promise<string | null> =>
   (await ask({ is: "import", name, files })) as string | null;

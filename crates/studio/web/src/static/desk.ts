@@ -4,9 +4,10 @@
 import type { OutputState, ServerMessage } from "../protocol";
 import { Film } from "./film";
 import { Helper } from "./helper";
-import type { Place, Post, Question, ToDesk } from "./messages";
+import type { FramePlace, Place, Post, Question, Sample, ToDesk } from "./messages";
 import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File, type Program } from "./module";
 import { Folder, keep, project, projects, remove } from "./projects";
+import { sampled } from "./samples";
 
 /** The milliseconds between two looks at the files. */
 const TICK = 250;
@@ -211,6 +212,12 @@ export class Session {
     }
   }
 
+  async #samples(frames: readonly FramePlace[]): Promise<Sample[]> {
+    if (!this.#program) throw new Error("no project is open");
+    const [, ...files] = unpacked(this.#call(Call.files));
+    return sampled(this.#program, this.#post, files, frames);
+  }
+
   #newFilm(): Film {
     if (!this.#program) throw new Error("no project is open");
     return new Film(this.#program, this.#post, Math.min(Math.max(1, navigator.hardwareConcurrency), MOST));
@@ -248,6 +255,8 @@ export class Session {
         const [, ...files] = unpacked(this.#call(Call.files));
         return this.#call(Call.zip, 0, packed(files));
       }
+      case "samples":
+        return this.#samples(question.frames);
       case "unzip":
         return this.#unzip(question.content);
       case "import":
