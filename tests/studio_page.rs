@@ -34,7 +34,7 @@ const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 const NODE: u32 = 20;
 
 /// The tests of the page without a server, alone and beside the bucket of `rayfold dev`.
-const OF_THE_SITE: [&str; 2] = ["tests/site.mjs", "tests/site-runs.mjs"];
+const OF_THE_SITE: [&str; 3] = ["tests/site.mjs", "tests/site-disk.mjs", "tests/site-runs.mjs"];
 const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
 
 #[test]

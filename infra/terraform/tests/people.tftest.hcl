@@ -67,12 +67,12 @@ run "rights" {
     error_message = "no old versions, tags, ACLs, listings of uploads, or settings"
   }
   assert {
-    condition = [for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement :
-      sort([for name in flatten([statement.Resource]) : trimprefix(name, "arn:aws:s3:::demo-123456789012-eu-central-1/")]) if contains(["s3:PutObject", "s3:DeleteObject"], statement.Action)
-      ] == [
-      ["retries/$${cognito-identity.amazonaws.com:sub}/*/1", "scripts/$${cognito-identity.amazonaws.com:sub}/*"],
-      ["frames/$${cognito-identity.amazonaws.com:sub}/*.begun-?", "frames/$${cognito-identity.amazonaws.com:sub}/*.error.json", "scripts/$${cognito-identity.amazonaws.com:sub}/*"],
-    ]
+    condition = jsonencode([for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement :
+      [for name in flatten([statement.Resource]) : trimprefix(name, "arn:aws:s3:::demo-123456789012-eu-central-1/")] if contains(["s3:PutObject", "s3:DeleteObject"], statement.Action)
+      ]) == jsonencode([
+      ["scripts/$${cognito-identity.amazonaws.com:sub}/*", "retries/$${cognito-identity.amazonaws.com:sub}/*/1"],
+      ["scripts/$${cognito-identity.amazonaws.com:sub}/*", "frames/$${cognito-identity.amazonaws.com:sub}/*.error.json", "frames/$${cognito-identity.amazonaws.com:sub}/*.begun-?"],
+    ])
     error_message = "a person writes scripts and first orders to draw again, and deletes scripts and what a failure has left"
   }
 }

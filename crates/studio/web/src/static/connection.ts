@@ -3,7 +3,8 @@
 import { signal } from "@preact/signals";
 
 import type { Listener, Send } from "../connection/listener";
-import { place, opened as remember } from "./address";
+import { addressOf, place, opened as remember } from "./address";
+import { FOLDER } from "./disk";
 import type { FramePlace, Question, Sample, Start, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
 import { moduleFile } from "./variant";
@@ -77,7 +78,7 @@ export function open({ opened, told, shown, closed }: Listener): Send {
     } else if (data.is === "closed") end(data.why);
     else {
       project.value = data.project;
-      if (!data.folder) remember(data.project);
+      remember(data.folder ? FOLDER : addressOf(data.project));
       opened();
     }
   };

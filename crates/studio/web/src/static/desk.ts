@@ -15,6 +15,9 @@ const TICK = 250;
 /** The milliseconds between two looks at the files of a folder on the disk. */
 const DISK = 1000;
 
+/** The milliseconds until a file that could not be written is tried again. */
+const AGAIN = 2000;
+
 /** The most workers that draw. */
 const MOST = 8;
 
@@ -32,7 +35,11 @@ export class Session {
   #drawers: Helper[] = [];
   #folder = new Folder(null);
   /** The time at which each file on the disk was last modified, as far as it is known here. */
-  #times = new Map<string, number>();
+  #times: Map<string, number> | null = null;
+  /** The newest contents of files that are not written yet. */
+  readonly #unwritten = new Map<string, File>();
+  /** The writing in progress: one file after the other. */
+  #writing: Promise<void> = Promise.resolve();
   #waking = 0;
   #film: Film | null = null;
   #made: Uint8Array = new Uint8Array();
@@ -59,7 +66,7 @@ export class Session {
     const { name, files } = await this.#files(place);
     const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
     this.#drawers = Array.from({ length: workers }, () => new Helper(program, this.#post));
-    this.#alone(name);
+    this.#alone(place.is === "folder" ? `folder ${name}` : name);
     this.#post({ is: "opened", project: name, folder: place.is === "folder" });
     this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
     if (!this.#folder.isKept) this.#tell({ notice: "This browser keeps no files in this window: save the project as a zip file." });
@@ -74,14 +81,16 @@ export class Session {
   async #files(place: Place): Promise<{ readonly name: string; readonly files: readonly File[] }> {
     if (place.is === "folder") {
       this.#folder = new Folder(place.handle);
-      const files = await this.#folder.files();
-      this.#times = new Map(files.map(({ name, modified }) => [name, modified]));
+      const { files, leftOut } = await this.#folder.files();
+      this.#times = await this.#folder.times();
+      for (const { name, modified } of files) this.#times.set(name, modified);
+      if (leftOut.length > 0) this.#tell({ notice: `The studio cannot hold all of this folder. It leaves out ${leftOut.join(", ")}.` });
       return { name: place.handle.name, files };
     }
     if (place.is === "project") {
       const name = place.name ?? (await projects())[0] ?? "scene";
       this.#folder = await project(name);
-      return { name, files: await this.#folder.files() };
+      return { name, files: (await this.#folder.files()).files };
     }
     let files: readonly File[];
     if (place.is === "files") files = place.files;
@@ -110,14 +119,23 @@ export class Session {
   /** Takes files that other programs have written to a folder on the disk. */
   #look(): void {
     const look = async (): Promise<void> => {
-      for (const [name, time] of await this.#folder.times()) {
-        if (this.#times.get(name) === time) continue;
-        this.#times.set(name, time);
-        this.#do(Call.insert, 0, packed([{ name, content: await this.#folder.read(name) }]));
+      const [known, now] = [this.#times ?? new Map<string, number>(), await this.#folder.times()];
+      for (const [name, time] of now) {
+        const before = known.get(name);
+        if (before === time) continue;
+        known.set(name, time);
+        // The session takes no further scripts.
+        if (before === undefined && name.endsWith(".txt")) this.#tell({ notice: `${name} is new in the folder. Load the page again to see it.` });
+        else this.#do(Call.insert, 0, packed([{ name, content: await this.#folder.read(name) }]));
+      }
+      for (const name of known.keys()) {
+        if (now.has(name)) continue;
+        known.delete(name);
+        this.#tell({ notice: `${name} was deleted from the folder. What is here is written with its next change.` });
       }
     };
-    // What cannot be read now is looked at again.
-    setInterval(() => void look().catch(() => undefined), DISK);
+    const again = (): unknown => setTimeout(() => void look().catch(() => undefined).then(again), DISK);
+    again();
   }
 
   /** The names of files that are left out, as the content of a file without name, and the files. */
@@ -163,7 +181,7 @@ export class Session {
       };
       this.#drawers[number]?.call(Call.draw, 0, content).then(drawn, failed);
     } else if (kind === Kind.save) {
-      for (const file of unpacked(content)) void this.#write(file);
+      for (const file of unpacked(content)) this.#write(file);
     } else if (kind === Kind.answer) {
       if (this.#asked.delete(number)) this.#post({ is: "answer", number, value: content }, [content.buffer]);
     } else if (kind === Kind.wake) {
@@ -184,12 +202,27 @@ export class Session {
     this.#do(Call.lost, number);
   }
 
-  async #write(file: File): Promise<void> {
+  /** Writes a file after those before it. What cannot be written is tried again, until a newer content of the file is. */
+  #write(file: File): void {
+    this.#unwritten.set(file.name, file);
+    this.#writing = this.#writing.then(() => this.#put(file));
+  }
+
+  async #put(file: File, isFirst = true): Promise<void> {
+    const { name } = file;
+    if (this.#unwritten.get(name) !== file) return;
     try {
-      await this.#folder.write(file);
-      if (this.#times.size > 0) this.#times = await this.#folder.times();
+      const known = this.#times?.get(name);
+      const now = known === undefined ? null : await this.#folder.time(name);
+      if (now === null || now === known) {
+        await this.#folder.write(file);
+        const time = this.#times && (await this.#folder.time(name));
+        if (time !== null) this.#times?.set(name, time);
+      } else this.#tell({ notice: `Another program has changed ${name} at the same time, and its version is shown. Undo restores yours.` });
+      if (this.#unwritten.get(name) === file) this.#unwritten.delete(name);
     } catch (error) {
-      this.#tell({ notice: `${file.name} cannot be written: ${why(error)}` });
+      if (isFirst) this.#tell({ notice: `${name} cannot be written: ${why(error)}. It is tried again; a zip file keeps it, too.` });
+      setTimeout(() => (this.#writing = this.#writing.then(() => this.#put(file, false))), AGAIN);
     }
   }
 
@@ -263,7 +296,7 @@ export class Session {
         return keep(question.name, question.files);
       case "write":
         this.#do(Call.tick, 1);
-        return this.#folder.settle();
+        return this.#writing;
     }
   }
 }

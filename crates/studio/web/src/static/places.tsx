@@ -8,12 +8,19 @@ import { notice } from "../store";
 import { visible } from "../parts/visible";
 import { addressOf } from "./address";
 import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
-import { hasDisk, openFolder } from "./disk";
+import { chosenFolder, hasDisk, openAgain, openFolder } from "./disk";
 import { linked } from "./link";
 import { textOf, type File } from "./module";
 import { save } from "./save";
 
 const names = signal<readonly string[]>([]);
+
+/** A folder of the disk that was chosen before, and may be used again if the user agrees. */
+const before = signal<FileSystemDirectoryHandle | null>(null);
+
+const failed = (error: unknown): void => {
+  notice.value = error instanceof Error ? error.message : String(error);
+};
 
 /** Opens what an address names, once everything here is written. */
 async function go(address: string): Promise<void> {
@@ -61,7 +68,11 @@ async function saveZip(): Promise<void> {
 }
 
 export function Places(): JSX.Element {
-  useEffect(() => void projects().then((found) => (names.value = found)), []);
+  useEffect(() => {
+    void projects().then((found) => (names.value = found));
+    if (hasDisk) void chosenFolder().then((chosen) => (before.value = chosen && !chosen.isOpen ? chosen.handle : null));
+  }, []);
+  const asked = before.value;
   const others = names.value.filter((name) => name !== project.value);
   return (
     <section class="places" aria-label="Projects">
@@ -104,8 +115,13 @@ export function Places(): JSX.Element {
           Copy a link
         </button>
         {hasDisk && (
-          <button type="button" onClick={() => void write().then(openFolder)}>
+          <button type="button" onClick={() => void write().then(openFolder).catch(failed)}>
             Open a folder
+          </button>
+        )}
+        {asked && (
+          <button type="button" onClick={() => void openAgain(asked).catch(failed)}>
+            Open the folder {visible(asked.name)} again
           </button>
         )}
       </div>
