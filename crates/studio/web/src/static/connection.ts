@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 
 import type { Listener, Send } from "../connection/listener";
-import { addressOf, place, opened as remember } from "./address";
+import { addressOf, NEW, place, opened as remember } from "./address";
 import { FOLDER } from "./disk";
 import type { FramePlace, Question, Sample, Start, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
@@ -47,6 +47,12 @@ export const importProject = async (name: string, files: readonly File[]): Promi
   (await ask({ is: "import", name, files })) as string | null;
 /** Waits until the files are written. */
 export const write = (): Promise<unknown> => ask({ is: "write" });
+
+/** Leaves what is open for a new project, also if the studio has stopped. */
+export const openNew: (() => void) | null = () => {
+  location.hash = NEW;
+  location.reload();
+};
 
 const newWorker = (): Worker => new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
 

@@ -18,6 +18,9 @@ const DISK = 1000;
 /** The milliseconds until a file that could not be written is tried again. */
 const AGAIN = 2000;
 
+/** The milliseconds for which another page may write before its project is taken over. */
+const PATIENCE = 2000;
+
 /** The most workers that draw. */
 const MOST = 8;
 
@@ -34,6 +37,8 @@ export class Session {
   #module: Module | null = null;
   #drawers: Helper[] = [];
   #folder = new Folder(null);
+  /** Why files are not kept. */
+  #refusal = "";
   /** The time at which each file on the disk was last modified, as far as it is known here. */
   #times: Map<string, number> | null = null;
   /** The newest contents of files that are not written yet. */
@@ -66,10 +71,9 @@ export class Session {
     const { name, files } = await this.#files(place);
     const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
     this.#drawers = Array.from({ length: workers }, () => new Helper(program, this.#post));
-    this.#alone(place.is === "folder" ? `folder ${name}` : name);
     this.#post({ is: "opened", project: name, folder: place.is === "folder" });
     this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
-    if (!this.#folder.isKept) this.#tell({ notice: "This browser keeps no files in this window: save the project as a zip file." });
+    if (!this.#folder.isKept) this.#tell({ notice: `This browser keeps no files${this.#refusal && `: ${this.#refusal}`}. Save the project as a zip file.` });
     const early = this.#early ?? [];
     this.#early = null;
     for (const message of early) this.take(message);
@@ -77,18 +81,21 @@ export class Session {
     if (place.is === "folder") this.#look();
   }
 
-  /** Reads the files of a place. Those from outside become a project of the browser. */
+  /** Takes a place over from another page, and reads its files. Those from outside become a project of the browser. */
   async #files(place: Place): Promise<{ readonly name: string; readonly files: readonly File[] }> {
     if (place.is === "folder") {
+      const { name } = place.handle;
+      await this.#takeOver(`folder ${name}`);
       this.#folder = new Folder(place.handle);
       const { files, leftOut } = await this.#folder.files();
       this.#times = await this.#folder.times();
       for (const { name, modified } of files) this.#times.set(name, modified);
       if (leftOut.length > 0) this.#tell({ notice: `The studio cannot hold all of this folder. It leaves out ${leftOut.join(", ")}.` });
-      return { name: place.handle.name, files };
+      return { name, files };
     }
     if (place.is === "project") {
       const name = place.name ?? (await projects())[0] ?? "scene";
+      await this.#takeOver(name);
       this.#folder = await project(name);
       return { name, files: (await this.#folder.files()).files };
     }
@@ -99,20 +106,37 @@ export class Session {
       if (!answer.ok) throw new Error(`there is no example ${place.name}`);
       files = this.#unzip(new Uint8Array(await answer.arrayBuffer())).slice(1);
     }
-    const name = await keep(place.name, files);
-    this.#folder = await project(name);
-    return { name, files };
+    try {
+      const name = await keep(place.name, files);
+      await this.#takeOver(name);
+      this.#folder = await project(name);
+      return { name, files: this.#folder.isKept ? (await this.#folder.files()).files : files };
+    } catch (error) {
+      // As where the storage is full.
+      this.#refusal = why(error);
+      return { name: place.name, files };
+    }
   }
 
-  /** One page works on a project: a new one takes over. */
-  #alone(name: string): void {
+  /** Lets one page work on a project: a new one takes over, once the other has written what it has. */
+  async #takeOver(name: string): Promise<void> {
+    let release = (): void => undefined;
     const held = navigator.locks.request(`rayfold ${name}`, { steal: true }, () => new Promise<never>(() => undefined));
     held.catch(() => {
       this.#tell({ notice: "Another page has taken over; this one rests." });
       this.#post({ is: "closed", why: "" });
       this.#film?.cancel();
       for (const drawer of this.#drawers) drawer.end();
+      this.#do(Call.tick, 1);
       this.#module = null;
+      void this.#writing.then(release);
+    });
+    await new Promise<void>((done) => {
+      const writes = (): Promise<void> => {
+        done();
+        return new Promise((ended) => (release = ended));
+      };
+      navigator.locks.request(`rayfold ${name} is written`, { signal: AbortSignal.timeout(PATIENCE) }, writes).catch(() => done());
     });
   }
 

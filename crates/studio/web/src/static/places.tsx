@@ -6,7 +6,7 @@ import { useEffect } from "preact/hooks";
 
 import { notice } from "../store";
 import { visible } from "../parts/visible";
-import { addressOf } from "./address";
+import { addressOf, NEW } from "./address";
 import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
 import { chosenFolder, hasDisk, openAgain, openFolder } from "./disk";
 import { linked } from "./link";
@@ -108,6 +108,9 @@ export function Places(): JSX.Element {
         </label>
       </div>
       <div class="buttons">
+        <button type="button" onClick={() => void go(NEW)}>
+          New project
+        </button>
         <button type="button" onClick={() => void saveZip()}>
           Save as zip
         </button>

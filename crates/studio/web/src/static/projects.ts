@@ -8,6 +8,9 @@ const ROOT = "projects";
 /** The most bytes of a folder that the studio holds. */
 const MOST = 256 << 20;
 
+/** Returns whether a name is that of a file or a folder, and of no hidden one, as those of zip files are (`browser/archive.rs`). */
+export const isPlain = (name: string): boolean => name !== "" && !name.startsWith(".") && !/[\p{Cc}/\\:]/u.test(name);
+
 async function root(): Promise<FileSystemDirectoryHandle | null> {
   try {
     const all = await navigator.storage.getDirectory();
