@@ -79,10 +79,30 @@ test("curves and samples become the command's GIF, and a zip file holds the proj
   await page.getByRole("button", { name: "File", exact: true }).click();
   const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Save as zip" }).click()]);
   assert.equal(zip.suggestedFilename(), "film.zip");
+  const damaged = { name: "damaged.zip", mimeType: "application/zip", buffer: Buffer.from("PK is not enough") };
+  await page.getByLabel("Open a project").setInputFiles(damaged);
+  await page.locator(".places").getByText(/the zip file cannot be used/).waitFor();
   const chosen = { name: "again.zip", mimeType: "application/zip", buffer: readFileSync(await zip.path()) };
   await page.getByLabel("Open a project").setInputFiles(chosen);
   await page.waitForURL(/#project=again$/);
   await page.locator("output", { hasText: "frame 1 of 6" }).waitFor();
+  check();
+});
+
+test("a model is added to a project, and drawn by a script that names it", async (t) => {
+  const tent = 'Screen 48 32\nLook 0 1 6  0 1 0  40\nIlight 1 1 1  1 -1 -1\nMesh "tent.obj"  .1 .1 .1  .5 .6 .7  0 0 0\nTrace\n';
+  const model = "v -1 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
+  const { page, drawn, check } = await open(t, `studio.html${linked("film", [["a.txt", film]])}`);
+  await drawn();
+  await page.getByRole("button", { name: "File", exact: true }).click();
+  const file = (name, text) => ({ name, mimeType: "application/octet-stream", buffer: Buffer.from(text) });
+  await page.getByLabel("Add files").setInputFiles([file("tent.obj", model)]);
+  await page.getByText("tent.obj can be named by the scripts of the project.").first().waitFor();
+  page.on("dialog", (dialog) => void dialog.accept());
+  await page.getByLabel("Add files").setInputFiles([file("a.txt", tent), file("b.txt", tent)]);
+  await page.locator("output", { hasText: "frame 1 of 2" }).waitFor();
+  await drawn();
+  assert.ok((await gif(page)).equals(expected(t, [["a.txt", tent], ["b.txt", tent], ["tent.obj", model]])), "the same bytes");
   check();
 });
 

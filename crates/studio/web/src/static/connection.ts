@@ -40,8 +40,10 @@ export const projects = async (): Promise<readonly string[]> => ((await ask({ is
 export const removeProject = (name: string): Promise<unknown> => ask({ is: "remove", name });
 export const zip = async (): Promise<Uint8Array<ArrayBuffer> | null> => (await ask({ is: "zip" })) as Uint8Array<ArrayBuffer> | null;
 export const unzip = async (content: Uint8Array): Promise<readonly File[] | null> => (await ask({ is: "unzip", content })) as readonly File[] | null;
-/** Draws frames on one thread: as many of them as some seconds allow, and none if the first takes longer. */
-export const samples = async (frames: readonly FramePlace[]): Promise<readonly Sample[]> => ((await ask({ is: "samples", frames })) as readonly Sample[] | null) ?? [];
+/** Draws frames on one thread: as many of them as some seconds allow, and none if the first takes longer. Nothing if one cannot be drawn. */
+export const samples = async (frames: readonly FramePlace[]): Promise<readonly Sample[] | null> => (await ask({ is: "samples", frames })) as readonly Sample[] | null;
+/** Puts files into the project. Returns whether the page has to be loaded again to show them. */
+export const addFiles = async (files: readonly File[]): Promise<boolean> => (await ask({ is: "add", files })) === true;
 /** Keeps files as a new project, and returns its name. */
 export const importProject = async (name: string, files: readonly File[]): Promise<string | null> =>
   (await ask({ is: "import", name, files })) as string | null;

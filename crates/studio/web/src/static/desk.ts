@@ -269,6 +269,18 @@ export class Session {
     }
   }
 
+  /** Puts files into the project. The session takes no further scripts. */
+  async #add(files: readonly File[]): Promise<boolean> {
+    const known = new Set(unpacked(this.#call(Call.files)).map(({ name }) => name));
+    const isNew = ({ name }: File): boolean => name.endsWith(".txt") && !known.has(name);
+    for (const file of files) {
+      if (!isNew(file)) this.#do(Call.insert, 0, packed([file]));
+      this.#write(file);
+    }
+    await this.#writing;
+    return files.some(isNew);
+  }
+
   async #samples(frames: readonly FramePlace[]): Promise<Sample[]> {
     if (!this.#program) throw new Error("no project is open");
     const [, ...files] = unpacked(this.#call(Call.files));
@@ -316,6 +328,8 @@ export class Session {
         return this.#samples(question.frames);
       case "unzip":
         return this.#unzip(question.content);
+      case "add":
+        return this.#add(question.files);
       case "import":
         return keep(question.name, question.files);
       case "write":

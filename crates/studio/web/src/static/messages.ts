@@ -36,6 +36,8 @@ export type Question =
   | { readonly is: "samples"; readonly frames: readonly FramePlace[] }
   /** The names of files that are left out, as the content of a file without name, and the files of a zip file. */
   | { readonly is: "unzip"; readonly content: Uint8Array }
+  /** Whether new scripts are among these files of the project, which are shown once the page is loaded again. */
+  | { readonly is: "add"; readonly files: readonly File[] }
   /** The name of a new project of these files. */
   | { readonly is: "import"; readonly name: string; readonly files: readonly File[] }
   /** Whether everything is written. */

@@ -7,7 +7,7 @@ import { useEffect } from "preact/hooks";
 import { notice } from "../store";
 import { visible } from "../parts/visible";
 import { addressOf, NEW } from "./address";
-import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
+import { addFiles, importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
 import { chosenFolder, hasDisk, openAgain, openFolder } from "./disk";
 import { linked } from "./link";
 import { textOf, type File } from "./module";
@@ -45,6 +45,16 @@ async function openFiles(chosen: FileList | null): Promise<void> {
   if (files.length === 0) return;
   const own = await importProject(name, files);
   if (own) await go(addressOf(own));
+}
+
+/** Puts files into the project that is open. */
+async function add(chosen: FileList | null): Promise<void> {
+  const files = await Promise.all(Array.from(chosen ?? [], async (file): Promise<File> => ({ name: file.name, content: new Uint8Array(await file.arrayBuffer()) })));
+  const known = new Set((await ownFiles()).map(({ name }) => name));
+  const replaced = files.filter(({ name }) => known.has(name)).map(({ name }) => name);
+  if (replaced.length > 0 && !confirm(`Replace ${replaced.join(", ")}?`)) return;
+  if (await addFiles(files)) location.reload();
+  else notice.value = `${files.map(({ name }) => name).join(", ")} can be named by the scripts of the project.`;
 }
 
 async function share(): Promise<void> {
@@ -104,7 +114,13 @@ export function Places(): JSX.Element {
       <div class="buttons">
         <label>
           Open a zip file, or scripts and their files:{" "}
-          <input type="file" multiple aria-label="Open a project" onChange={(event) => void openFiles(event.currentTarget.files)} />
+          <input type="file" multiple aria-label="Open a project" onChange={(event) => void openFiles(event.currentTarget.files).catch(failed)} />
+        </label>
+      </div>
+      <div class="buttons">
+        <label>
+          Add scripts, models and pictures to {visible(project.value)}:{" "}
+          <input type="file" multiple aria-label="Add files" onChange={(event) => void add(event.currentTarget.files).catch(failed)} />
         </label>
       </div>
       <div class="buttons">
@@ -128,6 +144,7 @@ export function Places(): JSX.Element {
           </button>
         )}
       </div>
+      {notice.value && <p role="status">{visible(notice.value)}</p>}
     </section>
   );
 }

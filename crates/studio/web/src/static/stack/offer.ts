@@ -33,6 +33,7 @@ export async function wanted(): Promise<Wanted> {
   const faulty = files.value.find((file) => file.faulty);
   if (faulty) throw new Refused(`${faulty.name} has an error`, { script: faulty.name.replace(/\.txt$/, "") });
   const frames = state.value?.frames ?? 0;
+  if (frames === 0) throw new Refused("nothing is rendered: expected a Trace");
   const [, ...own] = await ownFiles();
   const isScript = ({ name }: File): boolean => name.endsWith(".txt");
   const settings = own.find(({ name }) => name === "animation.json");
@@ -51,10 +52,11 @@ function sampled(): { readonly script: string; readonly frame: number }[] {
   return all.filter((_, at) => at % step === 0);
 }
 
-/** Draws some frames, and returns what all of them are as work for the functions. */
+/** Draws some frames, and returns what all of them are as work for the functions; nothing if that is not known. */
 async function workload({ files: sent, outputs }: Wanted): Promise<Workload | null> {
   const drawn = await samples(sampled());
-  if (drawn.length === 0) return null;
+  if (drawn?.length === 0) notice.value = "There is no estimate of the cost: a frame takes longer than a minute to draw in this browser.";
+  if (!drawn?.length) return null;
   const [first] = drawn;
   const other = drawn.find(({ width, height }) => width !== first?.width || height !== first.height);
   if (first && other) {
@@ -75,13 +77,10 @@ async function workload({ files: sent, outputs }: Wanted): Promise<Workload | nu
   };
 }
 
-/** Returns the cost, as the page shows it; nothing if a frame takes too long to draw. */
+/** Returns the cost, as the page shows it; nothing if it is not known. */
 export async function estimated(of: Wanted): Promise<object | null> {
   const work = await workload(of);
-  if (!work) {
-    notice.value = "There is no estimate of the cost: a frame takes too long to draw in this browser.";
-    return null;
-  }
+  if (!work) return null;
   const { frames, width, height, drawingMs } = work;
   const prices = `${priced}; drawn by this browser, which takes longer than the functions`;
   return { frames, size: [width, height], drawingMs, prices, sections: estimate(work) };
