@@ -39,7 +39,7 @@ const CELL = [168, 132] as const;
 /** The part of the window's width that the dialog does not use, including its borders. */
 const EDGES = 60;
 
-const name = signal("");
+const name = signal<string | null>(null);
 const mayDelete = signal(false);
 const columns = signal(4);
 
@@ -93,7 +93,7 @@ function NoBucket(): JSX.Element {
 function Submit(): JSX.Element {
   const known = list.value;
   const now = offer.value;
-  const chosen = name.value === "" ? ownName.value : name.value;
+  const chosen = name.value ?? ownName.value;
   const gone = now?.delete ?? [];
   return (
     <>
