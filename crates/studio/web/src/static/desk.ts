@@ -129,7 +129,11 @@ export class Session {
       for (const drawer of this.#drawers) drawer.end();
       this.#do(Call.tick, 1);
       this.#module = null;
-      void this.#writing.then(release);
+      void this.#writing.then(() => {
+        // What could not be written is the other page's now.
+        this.#unwritten.clear();
+        release();
+      });
     });
     await new Promise<void>((done) => {
       const writes = (): Promise<void> => {

@@ -20,6 +20,9 @@ async function root(): Promise<FileSystemDirectoryHandle | null> {
   }
 }
 
+/** Returns whether a file of a folder is not read: a hidden one, or one that Chromium writes before it takes another's place. */
+const isSkipped = (name: string): boolean => name.startsWith(".") || name.endsWith(".crswap");
+
 /** A folder of files, in the browser's storage or on the disk. */
 export class Folder {
   readonly #handle: FileSystemDirectoryHandle | null;
@@ -37,7 +40,7 @@ export class Folder {
   async files(): Promise<{ readonly files: readonly (File & { readonly modified: number })[]; readonly leftOut: readonly string[] }> {
     const found = [];
     for await (const handle of this.#handle?.values() ?? []) {
-      if (handle.kind === "file" && !handle.name.startsWith(".")) found.push(await (handle as FileSystemFileHandle).getFile());
+      if (handle.kind === "file" && !isSkipped(handle.name)) found.push(await (handle as FileSystemFileHandle).getFile());
     }
     // Scripts are small: what is left out are pictures, models and films.
     found.sort((a, b) => a.size - b.size);
@@ -55,7 +58,7 @@ export class Folder {
   async times(): Promise<Map<string, number>> {
     const times = new Map<string, number>();
     for await (const name of this.#handle?.keys() ?? []) {
-      const time = name.startsWith(".") ? null : await this.time(name);
+      const time = isSkipped(name) ? null : await this.time(name);
       if (time !== null) times.set(name, time);
     }
     return times;
