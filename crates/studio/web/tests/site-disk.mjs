@@ -175,7 +175,7 @@ test("a folder that the browser asks about again is opened once the user agrees"
   await page.getByRole("button", { name: "File", exact: true }).click();
   const again = page.getByRole("button", { name: "Open the folder film of the disk again" });
   await again.click();
-  await page.getByText("the browser may not use the folder film of the disk").waitFor();
+  await page.getByText("the browser may not use the folder film of the disk").first().waitFor();
   await page.evaluate(() => {
     localStorage.setItem("permission", "prompt");
     localStorage.setItem("answer", "granted");
