@@ -185,6 +185,16 @@ test("after the first load the studio opens and draws without a network", async 
   check();
 });
 
+test("after the start page was loaded, an example opens and is drawn without a network", async (t) => {
+  const { page, context, drawn, check } = await open(t, "");
+  await page.evaluate(() => navigator.serviceWorker.ready);
+  await context.setOffline(true);
+  await page.getByRole("link", { name: "hello" }).click();
+  await page.waitForURL(/studio\.html#project=hello$/);
+  await drawn();
+  check();
+});
+
 test("the page says that a worker failed, and a new one draws", async (t) => {
   const { page, drawn, check } = await open(t, `faulty/studio.html${linked("film", [["film.txt", film]])}`);
   await drawn();
