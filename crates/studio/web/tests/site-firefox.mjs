@@ -83,7 +83,7 @@ test("in Firefox curves and samples become the command's GIF, and an object is d
 
 test("in Firefox the start page shows an example playing, and a click opens it", async (t) => {
   const { page, drawn, check } = await open(t, "", "img");
-  const hello = await page.waitForSelector("::-p-aria(hello)");
+  const hello = await page.waitForSelector("::-p-aria(hello)", { timeout: 120_000 });
   const looks = new Set();
   for (let look = 0; look < 20 && looks.size < 3; look++) {
     looks.add(await hello.screenshot({ encoding: "base64" }));
