@@ -30,18 +30,24 @@ const OTHERS: [&str; 3] = [
 ];
 
 /// The keys of an animation below a folder, with the rights of the folder's owner: read, write, delete.
-const KEYS: [(&str, [bool; 3]); 12] = [
+const KEYS: [(&str, [bool; 3]); 18] = [
     ("scripts/{}/hello/1.txt", [true, true, true]),
     ("scripts/{}/hello/animation.json", [true, true, true]),
     ("scripts/{}/hello/model.obj", [true, true, true]),
     ("manifests/{}/hello.json", [true, false, false]),
     ("animations/{}/hello.gif", [true, false, false]),
     ("frames/{}/hello/1@v-p1.png", [true, false, false]),
-    ("frames/{}/hello/1@v-p1.error.json", [false, false, false]),
+    ("frames/{}/hello/1@v-p1.error.json", [false, false, true]),
+    ("frames/{}/hello/1@v-p1/2.error.json", [false, false, true]),
+    ("frames/{}/hello/1@v-p1.begun-1", [false, false, true]),
+    ("frames/{}/hello/1@v-p1.cut-2", [false, false, false]),
+    ("frames/{}/hello/1@v-p1.1-of-2.band", [false, false, false]),
+    ("frames/{}/hello/1@v-p1.taken", [false, false, false]),
     ("frames/{}/hello/@assembler.json", [false, false, false]),
     ("parts/{}/hello/1@v-p1/2.json", [false, false, false]),
     ("assemblies/{}/hello/1-g.json", [false, false, false]),
-    ("retries/{}/hello/1@v-p1/1", [false, false, false]),
+    ("retries/{}/hello/1@v-p1/1", [false, true, false]),
+    ("retries/{}/hello/1@v-p1/2", [false, false, false]),
     ("checkpoints/{}/hello.state", [false, false, false]),
 ];
 
@@ -173,7 +179,7 @@ async fn a_person_lists_the_own_folder_alone() {
             let names = names.unwrap_or_default();
             denied(answer).map(|()| names)
         };
-        for folder in ["scripts", "manifests"] {
+        for folder in ["scripts", "frames", "manifests"] {
             for rest in ["", "hello", "hello/"] {
                 let prefix = format!("{folder}/{PERSON}/{rest}");
                 let found = list(Some(&prefix), None).await.unwrap();
@@ -189,6 +195,8 @@ async fn a_person_lists_the_own_folder_alone() {
             );
             refused.extend(OTHERS.map(|other| Some(format!("{folder}/{other}/"))));
         }
+        let others = ["animations", "parts", "retries", "assemblies"];
+        refused.extend(others.map(|folder| Some(format!("{folder}/{PERSON}/"))));
         // Not a way up, for S3 has none; and neither are other spellings.
         refused.push(Some(format!("scripts/{PERSON}%2F")));
         refused.push(Some(format!("Scripts/{PERSON}/")));

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 11] = [
+const TESTS: [&str; 12] = [
     "tests/logic.mjs",
     "tests/site-standing.mjs",
+    "tests/site-cost.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
     "tests/script.mjs",
@@ -33,7 +34,7 @@ const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 const NODE: u32 = 20;
 
 /// The tests of the page without a server, alone and beside the bucket of `rayfold dev`.
-const OF_THE_SITE: [&str; 2] = ["tests/site.mjs", "tests/site-runs.mjs"];
+const OF_THE_SITE: [&str; 3] = ["tests/site.mjs", "tests/site-disk.mjs", "tests/site-runs.mjs"];
 const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
 
 #[test]

@@ -52,12 +52,12 @@ run "rights" {
   assert {
     condition = alltrue(flatten([for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement : [
       for name in flatten([try(statement.Condition.StringLike["s3:prefix"], []), statement.Sid == "List" ? [] : flatten([statement.Resource])]) :
-      can(regex("^(arn:aws:s3:::demo-123456789012-eu-central-1/)?(scripts|frames|manifests|animations)/[$][{]cognito-identity.amazonaws.com:sub[}]/[*]([.]png)?$", name))
+      can(regex("^(arn:aws:s3:::demo-123456789012-eu-central-1/)?(scripts|frames|manifests|animations|retries)/[$][{]cognito-identity.amazonaws.com:sub[}]/[*](/1|[.](png|error[.]json|begun-[?]))?$", name))
     ]]))
     error_message = "each right must end at the person's own folder, the slash included"
   }
   assert {
-    condition     = [for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement : try(keys(statement.Condition), [])] == [["StringLike"], [], []]
+    condition     = [for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement : try(keys(statement.Condition), [])] == [["StringLike"], [], [], []]
     error_message = "a listing without a prefix must be refused"
   }
   assert {
@@ -65,6 +65,15 @@ run "rights" {
       for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement : statement.Action
     ])))) == "s3:DeleteObject s3:GetObject s3:ListBucket s3:PutObject"
     error_message = "no old versions, tags, ACLs, listings of uploads, or settings"
+  }
+  assert {
+    condition = jsonencode([for statement in jsondecode(aws_iam_role_policy.person[0].policy).Statement :
+      [for name in flatten([statement.Resource]) : trimprefix(name, "arn:aws:s3:::demo-123456789012-eu-central-1/")] if contains(["s3:PutObject", "s3:DeleteObject"], statement.Action)
+      ]) == jsonencode([
+      ["scripts/$${cognito-identity.amazonaws.com:sub}/*", "retries/$${cognito-identity.amazonaws.com:sub}/*/1"],
+      ["scripts/$${cognito-identity.amazonaws.com:sub}/*", "frames/$${cognito-identity.amazonaws.com:sub}/*.error.json", "frames/$${cognito-identity.amazonaws.com:sub}/*.begun-?"],
+    ])
+    error_message = "a person writes scripts and first orders to draw again, and deletes scripts and what a failure has left"
   }
 }
 
@@ -74,7 +83,7 @@ run "with_a_key" {
   }
 
   assert {
-    condition = jsondecode(aws_iam_role_policy.person[0].policy).Statement[3] == jsondecode(jsonencode({
+    condition = jsondecode(aws_iam_role_policy.person[0].policy).Statement[4] == jsondecode(jsonencode({
       Sid       = "UseTheKeyThroughTheBucket"
       Effect    = "Allow"
       Action    = ["kms:Decrypt", "kms:GenerateDataKey"]

@@ -309,6 +309,9 @@ mod tests {
         for (name, text) in case["scripts"].as_object().unwrap() {
             put(format!("scripts/film/{name}"), text.as_str().unwrap(), None).await;
         }
+        for receipt in case["receipts"].as_array().into_iter().flatten() {
+            put(format!("frames/film/{}", receipt.as_str().unwrap()), "", None).await;
+        }
         for (ending, file) in case["files"].as_object().unwrap() {
             let text = file["text"].as_str().unwrap();
             put(format!("animations/film.{ending}"), text, file["generation"].as_str()).await;

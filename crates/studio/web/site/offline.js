@@ -19,16 +19,18 @@ addEventListener("activate", (event) => {
 
 async function answer(request) {
   const cache = await caches.open(VERSION);
+  // Where the storage is full, the page works all the same.
+  const keep = (found) => cache.put(request, found.clone()).catch(() => undefined);
   if (new URL(request.url).pathname.endsWith(`/${OF_THE_HOST}`)) {
     const found = await fetch(request, { cache: "no-cache" }).catch(() => null);
-    if (found?.ok) await cache.put(request, found.clone());
+    if (found?.ok) await keep(found);
     return found ?? (await cache.match(request)) ?? new Response("{}");
   }
   const kept = await cache.match(request, { ignoreSearch: true });
   if (kept) return kept;
   const found = await fetch(request);
   // Pictures of examples are kept once they were shown.
-  if (found.ok && found.type === "basic") await cache.put(request, found.clone());
+  if (found.ok && found.type === "basic") await keep(found);
   return found;
 }
 

@@ -6,7 +6,7 @@ import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync, writeF
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
-import { deflateRawSync } from "node:zlib";
+import { crc32, deflateRawSync } from "node:zlib";
 
 const { RAYFOLD: program, SITE: site } = process.env;
 const KINDS = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
@@ -56,4 +56,19 @@ export function expected(t, files) {
   const run = spawnSync(program, ["render", folder, "-o", out]);
   assert.equal(run.status, 0, String(run.stderr));
   return readFileSync(out);
+}
+
+/** The files of a zip file that stores them, by its directory. */
+export function unzipped(zip) {
+  const end = zip.lastIndexOf(Buffer.from("PK\x05\x06"));
+  let at = zip.readUInt32LE(end + 16);
+  return Array.from({ length: zip.readUInt16LE(end + 10) }, () => {
+    const [crc, size, name, place] = [zip.readUInt32LE(at + 16), zip.readUInt32LE(at + 24), zip.readUInt16LE(at + 28), zip.readUInt32LE(at + 42)];
+    const text = String(zip.subarray(at + 46, at + 46 + name));
+    const start = place + 30 + zip.readUInt16LE(place + 26) + zip.readUInt16LE(place + 28);
+    const content = zip.subarray(start, start + size);
+    assert.equal(crc32(content), crc, text);
+    at += 46 + name + zip.readUInt16LE(at + 30) + zip.readUInt16LE(at + 32);
+    return [text, content];
+  });
 }

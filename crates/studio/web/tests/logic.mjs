@@ -122,7 +122,7 @@ test("a selection that stays is the same array", async (t) => {
 });
 
 test("the state of a run follows from its manifest, its outputs and its scripts", async () => {
-  const { summary, isBehind, faults, frameFile, frameUpdate } = await load("static/stack/standing.ts");
+  const { summary, isBehind, faults, frameUpdate } = await load("static/stack/standing.ts");
   const frame = (script, state, more = {}) => ({ script, version: "v1", state, ...more });
   const manifest = {
     status: "done", generation: "g", total: 2, done: 2, failed: 0, settings: { version: "s", value: { frames: 2 } },
@@ -139,9 +139,9 @@ test("the state of a run follows from its manifest, its outputs and its scripts"
   for (const unknown of ["new", "unreadable"]) assert.equal(of(unknown).status, unknown);
   for (const [status, settled] of [["waiting", false], ["rendering", false], ["failed", true], ["refused", true]]) assert.equal(of({ ...manifest, status }).settled, settled, status);
 
-  const there = new Map([["1.txt", "v1"], ["2.txt", "v2"], ["animation.json", "s"], ["model.obj", "m"]]);
+  const there = new Map([["1.txt", "v1"], ["2.txt", "v2+f"], ["animation.json", "s"]]);
   assert.ok(!isBehind(manifest, there));
-  for (const [name, version] of [["1.txt", "new"], ["3.txt", "v3"], ["animation.json", "t"]]) assert.ok(isBehind(manifest, new Map([...there, [name, version]])), name);
+  for (const [name, version] of [["1.txt", "new"], ["2.txt", "v2+g"], ["3.txt", "v3"], ["animation.json", "t"]]) assert.ok(isBehind(manifest, new Map([...there, [name, version]])), name);
   for (const name of ["1.txt", "animation.json"]) assert.ok(isBehind(manifest, new Map([...there].filter(([other]) => other !== name))), `${name} is gone`);
 
   const reason = { message: "m", diagnostics: [{ line: 2, column: 3, message: "unknown", expected: "Sphere" }], omitted: 4 };
@@ -156,8 +156,34 @@ test("the state of a run follows from its manifest, its outputs and its scripts"
     moreFaults: 0,
   });
   assert.deepEqual(frameUpdate(failed.frames[1]), { script: "2", version: "v1", state: "pending" });
-  assert.equal(frameFile("a b", "x+y.z", "3", null), "a b@x~2by~2ez-p3.png");
-  assert.equal(frameFile("1", "v", "3", "7"), "1@v-p3/7.png");
+});
+
+test("receipts are read and written by their names, and what failed is drawn again", async () => {
+  const { named, receiptOf } = await load("static/stack/receipts.ts");
+  const { retryOf } = await load("static/stack/retry.ts");
+  assert.equal(named("a b", "x+y.z", 3), "a b@x~2by~2ez-p3");
+  assert.equal(named("1", "v", 3, 7), "1@v-p3/7");
+  assert.deepEqual(receiptOf("a@b-p1.c@v~2bf-p3/7.begun-2"), { script: "a@b-p1.c", version: "v~2bf", pixels: 3, part: 7, kind: "begun-2" });
+  for (const name of ["@assembler.json", `@${"0".repeat(32)}.error.json`, "sub/1@v-p1.png", "1.png", "1@v.png", "1@v-p1"]) assert.equal(receiptOf(name), null, name);
+
+  const frames = [
+    { script: "1", version: "v", state: "done", pixels: 3 },
+    { script: "2", version: "w+f", part: 1, state: "failed" },
+    { script: "2", version: "w+f", part: 2, state: "done", pixels: 3 },
+    { script: "3", version: "x", state: "pending" },
+  ];
+  const refusal = `@${"0123".repeat(8)}.webp.error.json`;
+  const receipts = [
+    "1@v-p3.png", "1@old-p3.error.json", "1@v-p2.error.json", "2@w~2bf-p3/1.error.json", "2@w~2bf-p2/1.begun-1", "2@w~2bf-p3/1.cut-4", "2@w~2bf-p3/1.1-of-4.band",
+    "2@w~2bf-p3/2.png", "2@w~2bf-p3/2.error.json", "2@w-p3/1.error.json", "3@x-p3.begun-2", "3@x-p3.begun-12", "3@x-p3.taken", "@assembler.json", refusal,
+  ];
+  assert.deepEqual(retryOf({ frames }, receipts, {}), {
+    remove: [refusal, "2@w~2bf-p3/1.error.json", "2@w~2bf-p2/1.begun-1", "3@x-p3.begun-2"],
+    orders: ["2@w~2bf-p3/1/1", "3@x-p3/1"],
+    reassembled: true,
+  });
+  assert.deepEqual(retryOf({ frames }, receipts.slice(0, -1), { script: "2", part: 2 }), { remove: ["2@w~2bf-p3/2.error.json"], orders: ["2@w~2bf-p3/2/1"], reassembled: false });
+  assert.deepEqual(retryOf({ frames }, [], { script: "2" }).orders, [], "a part is not the script");
 });
 
 // The example of the documentation of AWS has other headers: this is its method, in another implementation.

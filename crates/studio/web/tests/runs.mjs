@@ -75,7 +75,7 @@ async function becomes(page, wanted) {
 }
 
 async function downloaded(page, link) {
-  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: link }).click()]);
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: link, exact: typeof link === "string" }).click()]);
   return readFileSync(await download.path());
 }
 
@@ -122,6 +122,7 @@ test("a run goes on without its page, and gives the GIF of the command line", as
   assert.deepEqual(await audit(again), []);
   assert.ok((await downloaded(again, /Download GIF/)).equals(rendered(path, folder)), "the same bytes");
   assert.equal(filesOfZip(await downloaded(again, "Download frames")), 50);
+  assert.equal(String((await downloaded(again, "Frame 1")).subarray(1, 4)), "PNG");
   await again.getByRole("link", { name: "All runs" }).click();
   await again.getByText("done: 50 of 50 frames").waitFor();
   await again.getByRole("link", { name: "hello", exact: true }).waitFor();

@@ -18,18 +18,29 @@ async function freePort() {
   return port;
 }
 
-/** Starts a bucket with a page. */
-export async function dev() {
+/** Starts a bucket with a page; `again` starts it with the data and the addresses that it had. */
+export async function dev(env = {}) {
   const data = mkdtempSync(join(tmpdir(), "rayfold-dev-"));
-  const address = `127.0.0.1:${await freePort()}`;
-  const run = start(program, ["dev", "--data", data, "--address", "127.0.0.1:0", "--site", site, "--site-address", address]);
-  const stop = async () => {
+  const [address, siteAddress] = [`127.0.0.1:${await freePort()}`, `127.0.0.1:${await freePort()}`];
+  let run;
+  const begin = async (env) => {
+    run = start(program, ["dev", "--data", data, "--address", address, "--site", site, "--site-address", siteAddress], env);
+    await run.said((text) => text.includes("aws s3 sync"));
+  };
+  const end = async () => {
     run.server.kill("SIGINT");
     await run.ended;
+  };
+  const again = async (env = {}) => {
+    await end();
+    await begin(env);
+  };
+  const stop = async () => {
+    await end();
     rmSync(data, { recursive: true, force: true });
   };
-  await run.said((text) => text.includes("aws s3 sync"));
-  return { own: `http://${address}`, stop };
+  await begin(env);
+  return { own: `http://${siteAddress}`, again, stop };
 }
 
 const LOGIN = "https://demo.auth.eu-central-1.amazoncognito.com";

@@ -5,7 +5,7 @@ import { after, before, test } from "node:test";
 
 import puppeteer from "puppeteer-core";
 
-import { expected, film, linked, many, serve } from "./host.mjs";
+import { expected, film, linked, many, serve, unzipped } from "./host.mjs";
 import { cognito, dev } from "./site-dev.mjs";
 
 let browser, host;
@@ -47,6 +47,7 @@ async function gif(page) {
 }
 
 async function saved(page, link) {
+  await page.evaluate(() => void (globalThis.saved = null));
   await (await page.waitForSelector(link, { timeout: 120_000 })).click();
   await page.waitForFunction(() => globalThis.saved);
   const text = await page.evaluate(async () => {
@@ -82,7 +83,7 @@ test("in Firefox curves and samples become the command's GIF, and an object is d
 
 test("in Firefox the start page shows an example playing, and a click opens it", async (t) => {
   const { page, drawn, check } = await open(t, "", "img");
-  const hello = await page.waitForSelector("::-p-aria(hello)");
+  const hello = await page.waitForSelector("::-p-aria(hello)", { timeout: 120_000 });
   const looks = new Set();
   for (let look = 0; look < 20 && looks.size < 3; look++) {
     looks.add(await hello.screenshot({ encoding: "base64" }));
@@ -119,13 +120,21 @@ test("in Firefox a person signs in on another page, comes back, submits, has the
   await page.waitForSelector("::-p-text(Runs in rayfold)", { timeout: 120_000 });
   assert.deepEqual(stand.asked, ["password", "token", "GetId", "GetCredentialsForIdentity"]);
   await show("#submit");
-  await page.locator("form.submit input.rename").setTimeout(120_000).fill("signed");
-  await click("form.submit button.main");
+  await page.waitForSelector("form.submit input.rename", { timeout: 120_000 });
+  // At once: puppeteer clears the field without an event first, and types into what the page has drawn meanwhile.
+  await page.$eval("form.submit input.rename", (input) => {
+    input.value = "signed";
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  await click("form.submit button.main:not(:disabled)");
   await page.waitForSelector("::-p-text(to upload)", { timeout: 120_000 });
+  await page.waitForSelector("::-p-text(6 frames of 160 × 120 pixels)");
+  await page.waitForSelector("::-p-text(Making it, once)");
   await click("form.submit button.main:not(:disabled)");
   await drawn(".standing [role=status][data-status=done][data-settled=true]");
   assert.equal(new URL(page.url()).hash, "#run=signed");
   assert.ok((await saved(page, "a[download$='.gif']")).equals(expected(t, [["film.txt", film]])), "the same bytes");
+  assert.deepEqual(unzipped(await saved(page, "a[download$='-frames.zip']")).map(([name]) => name), [1, 2, 3, 4, 5, 6].map((at) => `frame${at}.png`));
   await show("#runs");
   await page.waitForSelector("a[href='#run=signed']", { timeout: 120_000 });
   await page.waitForSelector("::-p-text(done: 6 of 6 frames)", { timeout: 120_000 });

@@ -9,18 +9,19 @@ import { after, before, test } from "node:test";
 import { createServer } from "vite";
 
 const root = join(import.meta.dirname, "..");
-let server, standing;
+let server, standing, receipts;
 before(async () => {
   server = await createServer({ root, configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
   standing = await server.ssrLoadModule("/src/static/stack/standing.ts");
+  receipts = await server.ssrLoadModule("/src/static/stack/receipts.ts");
 });
 after(() => server?.close());
 
 /** The version of an object in the store of the program's test. */
 const versionOf = (text) => createHash("sha256").update(text).digest("hex").slice(0, 32);
 
-function computed({ scripts, files, manifest }) {
-  const { faults, frameFile, frameUpdate, isBehind, manifestOf, outputsOf, summary } = standing;
+async function computed({ scripts, files, manifest, receipts: found = [] }) {
+  const { faults, frameUpdate, isBehind, manifestOf, outputsOf, summary } = standing;
   const text = manifest === null || typeof manifest === "string" ? manifest : JSON.stringify(manifest);
   const known = manifestOf("film", text);
   const there = new Map(Object.entries(scripts).map(([name, text]) => [name, versionOf(text)]));
@@ -31,12 +32,12 @@ function computed({ scripts, files, manifest }) {
   const frames = known.frames.map(frameUpdate);
   const keys = frames
     .filter(({ state }) => state === "done")
-    .map(({ script, version, pixels, part }) => `frames/film/${frameFile(script, version, String(pixels), part === undefined ? null : String(part))}`);
-  return { summary: summary("film", known, outputs, isBehind(known, there)), ...faults("film", known), frames, keys };
+    .map(({ script, version, pixels, part }) => `frames/film/${receipts.named(script, version, pixels, part)}.png`);
+  return { summary: summary("film", known, outputs, isBehind(known, await receipts.versionsOf(there, found))), ...faults("film", known), frames, keys };
 }
 
-test("the state of a run is what the program computes", () => {
+test("the state of a run is what the program computes", async () => {
   for (const { title, expected, ...given } of JSON.parse(readFileSync(join(root, "../src/runs/standing.json")))) {
-    assert.deepEqual(JSON.parse(JSON.stringify(computed(given))), expected, title);
+    assert.deepEqual(JSON.parse(JSON.stringify(await computed(given))), expected, title);
   }
 });

@@ -79,10 +79,97 @@ test("curves and samples become the command's GIF, and a zip file holds the proj
   await page.getByRole("button", { name: "File", exact: true }).click();
   const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Save as zip" }).click()]);
   assert.equal(zip.suggestedFilename(), "film.zip");
+  const damaged = { name: "damaged.zip", mimeType: "application/zip", buffer: Buffer.from("PK is not enough") };
+  await page.getByLabel("Open a project").setInputFiles(damaged);
+  await page.locator(".places").getByText(/the zip file cannot be used/).waitFor();
   const chosen = { name: "again.zip", mimeType: "application/zip", buffer: readFileSync(await zip.path()) };
   await page.getByLabel("Open a project").setInputFiles(chosen);
   await page.waitForURL(/#project=again$/);
   await page.locator("output", { hasText: "frame 1 of 6" }).waitFor();
+  check();
+});
+
+test("a model is added to a project, and drawn by a script that names it", async (t) => {
+  const tent = 'Screen 48 32\nLook 0 1 6  0 1 0  40\nIlight 1 1 1  1 -1 -1\nMesh "tent.obj"  .1 .1 .1  .5 .6 .7  0 0 0\nTrace\n';
+  const model = "v -1 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n";
+  const { page, drawn, check } = await open(t, `studio.html${linked("film", [["a.txt", film]])}`);
+  await drawn();
+  await page.getByRole("button", { name: "File", exact: true }).click();
+  const file = (name, text) => ({ name, mimeType: "application/octet-stream", buffer: Buffer.from(text) });
+  await page.getByLabel("Add files").setInputFiles([file("tent.obj", model)]);
+  await page.getByText("tent.obj can be named by the scripts of the project.").first().waitFor();
+  page.on("dialog", (dialog) => void dialog.accept());
+  await page.getByLabel("Add files").setInputFiles([file("a.txt", tent), file("b.txt", tent)]);
+  await page.locator("output", { hasText: "frame 1 of 2" }).waitFor();
+  await drawn();
+  assert.ok((await gif(page)).equals(expected(t, [["a.txt", tent], ["b.txt", tent], ["tent.obj", model]])), "the same bytes");
+  check();
+});
+
+test("a second page of a project takes over with what was typed last, and the first one says so", async (t) => {
+  const { page, context, drawn } = await open(t, `studio.html${linked("film", [["film.txt", film]])}`);
+  await drawn();
+  await page.locator(".cm-content").click();
+  await page.keyboard.press("Control+Home");
+  const other = await context.newPage();
+  // The other page reads before this one would write by itself.
+  await other.goto(`${address}studio.html`);
+  await other.waitForFunction(() => document.querySelector("canvas")?.dataset.final === "true");
+  await page.getByText("Another page has taken over").waitFor();
+  await page.getByRole("link", { name: "Open the page again" }).click();
+  await drawn();
+  await other.getByText("Another page has taken over").waitFor();
+  await page.locator(".cm-content").click();
+  await page.keyboard.press("Control+Home");
+  await page.keyboard.type("# typed last\n");
+  await other.getByRole("link", { name: "Open the page again" }).click();
+  await other.locator(".cm-content", { hasText: "typed last" }).waitFor();
+});
+
+for (const [what, hash, why] of [
+  ["is cut off", linked("film", [["film.txt", film]]).slice(0, -20), /the link is damaged or cut off/],
+  ["is no link", "#scene=%%%", /the link is damaged or cut off/],
+  ["is damaged", "#project=%E0%A4%A", /the address is damaged/],
+  ["leads out of the storage", "#project=..", /.. is no name of a project/],
+  ["names no example", "#example=..%2Fx", /there is no example/],
+  ["has settings with an error", linked("film", [["film.txt", film], ["animation.json", "{"]]), /animation.json:1/],
+]) {
+  test(`an address that ${what} is refused with its reason, and a new project is a click away`, async (t) => {
+    const { page, drawn } = await open(t, `studio.html${hash}`);
+    await page.getByText(why).first().waitFor();
+    await page.getByRole("button", { name: "Open a new project" }).click();
+    await page.waitForURL(/#project=scene/);
+    await drawn();
+  });
+}
+
+test("files of a link whose names lead elsewhere are left out, by name", async (t) => {
+  const { page, drawn, check } = await open(t, `studio.html${linked("../up", [["../up.txt", film], ["a/b.txt", film], [".c.txt", film], ["d.txt", film]])}`);
+  await page.getByText(/are left out, because their names are none of a folder: ..\/up.txt, a\/b.txt, .c.txt/).waitFor();
+  await drawn();
+  assert.equal(new URL(page.url()).hash, "#project=-up");
+  check();
+});
+
+test("with a full storage the page says what is not kept, and keeps it once there is room", async (t) => {
+  const { page, context, drawn, check } = await open(t, `studio.html${linked("film", [["film.txt", film]])}`);
+  await drawn();
+  const devtools = await context.newCDPSession(page);
+  const origin = address.slice(0, -1);
+  await devtools.send("Storage.overrideQuotaForOrigin", { origin, quotaSize: 1 });
+  await page.locator(".cm-content").click();
+  await page.keyboard.press("Control+Home");
+  await page.keyboard.type(`# ${"long ".repeat(50)}\n`);
+  await page.getByText(/film.txt cannot be written: .*quota/).waitFor();
+  await page.evaluate((hash) => (location.hash = hash), linked("other", [["other.txt", film]]));
+  await page.reload();
+  await page.getByText(/This browser keeps no files: .*quota/).waitFor();
+  await drawn();
+  await devtools.send("Storage.overrideQuotaForOrigin", { origin });
+  await page.evaluate((hash) => (location.hash = hash), linked("other", [["other.txt", film]]));
+  await page.reload();
+  await page.waitForURL(/#project=other/);
+  await drawn();
   check();
 });
 
@@ -94,6 +181,16 @@ test("after the first load the studio opens and draws without a network", async 
   await drawn();
   await context.setOffline(true);
   await page.reload();
+  await drawn();
+  check();
+});
+
+test("after the start page was loaded, an example opens and is drawn without a network", async (t) => {
+  const { page, context, drawn, check } = await open(t, "");
+  await page.evaluate(() => navigator.serviceWorker.ready);
+  await context.setOffline(true);
+  await page.getByRole("link", { name: "hello" }).click();
+  await page.waitForURL(/studio\.html#project=hello$/);
   await drawn();
   check();
 });

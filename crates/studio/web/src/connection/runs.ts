@@ -8,9 +8,6 @@ export interface Answer {
   readonly text: string;
 }
 
-/** What the owner of a bucket may do besides: draw failed frames again, estimate the cost, and fetch all frames at once. */
-export const isOwner = true;
-
 export async function ask(what: string, body?: object): Promise<Answer> {
   const sent = body === undefined ? {} : { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
   try {

@@ -2,6 +2,9 @@
 
 import type { Listener, Send } from "./listener";
 
+/** Leaves what is open for a new project. The program has one project. */
+export const openNew: (() => void) | null = null;
+
 export function open({ opened, told, shown, closed }: Listener): Send {
   const address = new URL("socket", location.href);
   address.protocol = "ws:";

@@ -7,9 +7,9 @@ import type { JSX } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 
 import { Drawn } from "#drawn";
-import { isOwner } from "#runs";
 
 import { List } from "../parts/list";
+import { visible } from "../parts/visible";
 import {
   address,
   fetchOffer,
@@ -31,7 +31,7 @@ import {
 } from "./runs";
 import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../protocol";
 import { openPlace } from "../script/panel";
-import { files } from "../store";
+import { files, notice } from "../store";
 
 /** Width and height of a frame in the grid, in pixels of the window. */
 const CELL = [168, 132] as const;
@@ -39,7 +39,7 @@ const CELL = [168, 132] as const;
 /** The part of the window's width that the dialog does not use, including its borders. */
 const EDGES = 60;
 
-const name = signal("");
+const name = signal<string | null>(null);
 const mayDelete = signal(false);
 const columns = signal(4);
 
@@ -76,6 +76,7 @@ export function Runs(): JSX.Element | null {
       {what === "list" && <All />}
       {view.value.what === "run" && <One name={view.value.run} />}
       {refusal.value && <Refused refusal={refusal.value} />}
+      {notice.value && <p role="status">{visible(notice.value)}</p>}
     </dialog>
   );
 }
@@ -92,7 +93,7 @@ function NoBucket(): JSX.Element {
 function Submit(): JSX.Element {
   const known = list.value;
   const now = offer.value;
-  const chosen = name.value === "" ? ownName.value : name.value;
+  const chosen = name.value ?? ownName.value;
   const gone = now?.delete ?? [];
   return (
     <>
@@ -135,7 +136,7 @@ function Submit(): JSX.Element {
           )}
           <p>
             <button class="main" disabled={waiting.value || (gone.length > 0 && !mayDelete.value)}>
-              {waiting.value ? "Please wait" : now ? "Submit" : isOwner ? "Estimate the cost" : "Compare with the bucket"}
+              {waiting.value ? "Please wait" : now ? "Submit" : "Estimate the cost"}
             </button>
           </p>
         </form>
@@ -307,11 +308,9 @@ function Result({ run: now, first }: { readonly run: Run; readonly first: RunFil
               Download {file.format} ({size(file.bytes)})
             </a>
           ))}
-          {isOwner && (
-            <a class="button" href={resource("frames.zip", { run: now.run })} download={`${name}-frames.zip`}>
-              Download frames
-            </a>
-          )}
+          <a class="button" href={resource("frames.zip", { run: now.run })} download={`${name}-frames.zip`}>
+            Download frames
+          </a>
         </span>
       </figcaption>
     </figure>
@@ -329,11 +328,9 @@ function Faults({ run: now }: { readonly run: Run }): JSX.Element {
       </ul>
       {now.moreFaults > 0 && <p>and {now.moreFaults} more</p>}
       <p>
-        {isOwner && (
-          <button type="button" disabled={waiting.value} onClick={() => void retry(now.run)}>
-            Retry all that failed
-          </button>
-        )}{" "}
+        <button type="button" disabled={waiting.value} onClick={() => void retry(now.run)}>
+          Retry all that failed
+        </button>{" "}
         A script with an error fails again: fix it and submit again. Only changed scripts are rendered.
       </p>
     </section>
@@ -347,7 +344,7 @@ function FaultRow({ run, fault }: { readonly run: string; readonly fault: FaultI
       {fault.place ? `, line ${fault.place[0]}, column ${fault.place[1]}` : ""}: {fault.message}. {fault.help && <i>{fault.help}</i>}{" "}
       <span class="buttons">
         {fault.place && <Place script={fault.script} place={fault.place} />}
-        {isOwner && fault.script !== undefined && (
+        {fault.script !== undefined && (
           <button type="button" disabled={waiting.value} onClick={() => void retry(run, fault)}>
             Retry this frame
           </button>
@@ -363,7 +360,7 @@ function Grid({ run: now }: { readonly run: Run }): JSX.Element {
     <section aria-labelledby="frames-title">
       <h3 id="frames-title">Frames</h3>
       <List
-        class="list grid"
+        class="list cells"
         count={Math.ceil(now.frames.length / across)}
         height={CELL[1]}
         reveal={null}

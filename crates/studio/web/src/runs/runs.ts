@@ -131,7 +131,7 @@ export async function submit(name: string, deleting: readonly string[]): Promise
 export async function retry(name: string, fault?: FaultInfo): Promise<void> {
   const one = fault?.script === undefined ? {} : { script: fault.script, part: fault.part };
   const woken = (await asked("runs/retry", { run: name, ...one })) as { readonly woken: number } | null;
-  if (woken) notice.value = woken.woken === 1 ? "1 frame is drawn again." : `${woken.woken} frames are drawn again.`;
+  if (woken) notice.value = woken.woken === 1 ? "1 frame is drawn again." : woken.woken ? `${woken.woken} frames are drawn again.` : "The files are made again.";
 }
 
 function receive(update: RunUpdate): void {

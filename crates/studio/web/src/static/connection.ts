@@ -3,8 +3,9 @@
 import { signal } from "@preact/signals";
 
 import type { Listener, Send } from "../connection/listener";
-import { place, opened as remember } from "./address";
-import type { Question, Start, ToDesk, ToPage } from "./messages";
+import { addressOf, NEW, place, opened as remember } from "./address";
+import { FOLDER } from "./disk";
+import type { FramePlace, Question, Sample, Start, ToDesk, ToPage } from "./messages";
 import type { File } from "./module";
 import { moduleFile } from "./variant";
 
@@ -39,11 +40,21 @@ export const projects = async (): Promise<readonly string[]> => ((await ask({ is
 export const removeProject = (name: string): Promise<unknown> => ask({ is: "remove", name });
 export const zip = async (): Promise<Uint8Array<ArrayBuffer> | null> => (await ask({ is: "zip" })) as Uint8Array<ArrayBuffer> | null;
 export const unzip = async (content: Uint8Array): Promise<readonly File[] | null> => (await ask({ is: "unzip", content })) as readonly File[] | null;
+/** Draws frames on one thread: as many of them as some seconds allow, and none if the first takes longer. Nothing if one cannot be drawn. */
+export const samples = async (frames: readonly FramePlace[]): Promise<readonly Sample[] | null> => (await ask({ is: "samples", frames })) as readonly Sample[] | null;
+/** Puts files into the project. Returns whether the page has to be loaded again to show them. */
+export const addFiles = async (files: readonly File[]): Promise<boolean> => (await ask({ is: "add", files })) === true;
 /** Keeps files as a new project, and returns its name. */
 export const importProject = async (name: string, files: readonly File[]): Promise<string | null> =>
   (await ask({ is: "import", name, files })) as string | null;
 /** Waits until the files are written. */
 export const write = (): Promise<unknown> => ask({ is: "write" });
+
+/** Leaves what is open for a new project, also if the studio has stopped. */
+export const openNew: (() => void) | null = () => {
+  location.hash = NEW;
+  location.reload();
+};
 
 const newWorker = (): Worker => new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
 
@@ -75,7 +86,7 @@ export function open({ opened, told, shown, closed }: Listener): Send {
     } else if (data.is === "closed") end(data.why);
     else {
       project.value = data.project;
-      if (!data.folder) remember(data.project);
+      remember(data.folder ? FOLDER : addressOf(data.project));
       opened();
     }
   };

@@ -4,15 +4,22 @@
 import type { OutputState, ServerMessage } from "../protocol";
 import { Film } from "./film";
 import { Helper } from "./helper";
-import type { Place, Post, Question, ToDesk } from "./messages";
+import type { FramePlace, Place, Post, Question, Sample, ToDesk } from "./messages";
 import { Call, Fault, Module, bytesOf, packed, textOf, unpacked, type File, type Program } from "./module";
 import { Folder, keep, project, projects, remove } from "./projects";
+import { sampled } from "./samples";
 
 /** The milliseconds between two looks at the files. */
 const TICK = 250;
 
 /** The milliseconds between two looks at the files of a folder on the disk. */
 const DISK = 1000;
+
+/** The milliseconds until a file that could not be written is tried again. */
+const AGAIN = 2000;
+
+/** The milliseconds for which another page may write before its project is taken over. */
+const PATIENCE = 2000;
 
 /** The most workers that draw. */
 const MOST = 8;
@@ -30,8 +37,14 @@ export class Session {
   #module: Module | null = null;
   #drawers: Helper[] = [];
   #folder = new Folder(null);
+  /** Why files are not kept. */
+  #refusal = "";
   /** The time at which each file on the disk was last modified, as far as it is known here. */
-  #times = new Map<string, number>();
+  #times: Map<string, number> | null = null;
+  /** The newest contents of files that are not written yet. */
+  readonly #unwritten = new Map<string, File>();
+  /** The writing in progress: one file after the other. */
+  #writing: Promise<void> = Promise.resolve();
   #waking = 0;
   #film: Film | null = null;
   #made: Uint8Array = new Uint8Array();
@@ -58,10 +71,9 @@ export class Session {
     const { name, files } = await this.#files(place);
     const workers = Math.min(Math.max(1, navigator.hardwareConcurrency), MOST);
     this.#drawers = Array.from({ length: workers }, () => new Helper(program, this.#post));
-    this.#alone(name);
     this.#post({ is: "opened", project: name, folder: place.is === "folder" });
     this.#do(Call.open, workers, packed([{ name, content: new Uint8Array() }, ...files]));
-    if (!this.#folder.isKept) this.#tell({ notice: "This browser keeps no files in this window: save the project as a zip file." });
+    if (!this.#folder.isKept) this.#tell({ notice: `This browser keeps no files${this.#refusal && `: ${this.#refusal}`}. Save the project as a zip file.` });
     const early = this.#early ?? [];
     this.#early = null;
     for (const message of early) this.take(message);
@@ -69,18 +81,23 @@ export class Session {
     if (place.is === "folder") this.#look();
   }
 
-  /** Reads the files of a place. Those from outside become a project of the browser. */
+  /** Takes a place over from another page, and reads its files. Those from outside become a project of the browser. */
   async #files(place: Place): Promise<{ readonly name: string; readonly files: readonly File[] }> {
     if (place.is === "folder") {
+      const { name } = place.handle;
+      await this.#takeOver(`folder ${name}`);
       this.#folder = new Folder(place.handle);
-      const files = await this.#folder.files();
-      this.#times = new Map(files.map(({ name, modified }) => [name, modified]));
-      return { name: place.handle.name, files };
+      const { files, leftOut } = await this.#folder.files();
+      this.#times = await this.#folder.times();
+      for (const { name, modified } of files) this.#times.set(name, modified);
+      if (leftOut.length > 0) this.#tell({ notice: `The studio cannot hold all of this folder. It leaves out ${leftOut.join(", ")}.` });
+      return { name, files };
     }
     if (place.is === "project") {
       const name = place.name ?? (await projects())[0] ?? "scene";
+      await this.#takeOver(name);
       this.#folder = await project(name);
-      return { name, files: await this.#folder.files() };
+      return { name, files: (await this.#folder.files()).files };
     }
     let files: readonly File[];
     if (place.is === "files") files = place.files;
@@ -89,34 +106,64 @@ export class Session {
       if (!answer.ok) throw new Error(`there is no example ${place.name}`);
       files = this.#unzip(new Uint8Array(await answer.arrayBuffer())).slice(1);
     }
-    const name = await keep(place.name, files);
-    this.#folder = await project(name);
-    return { name, files };
+    try {
+      const name = await keep(place.name, files);
+      await this.#takeOver(name);
+      this.#folder = await project(name);
+      return { name, files: this.#folder.isKept ? (await this.#folder.files()).files : files };
+    } catch (error) {
+      // As where the storage is full.
+      this.#refusal = why(error);
+      return { name: place.name, files };
+    }
   }
 
-  /** One page works on a project: a new one takes over. */
-  #alone(name: string): void {
+  /** Lets one page work on a project: a new one takes over, once the other has written what it has. */
+  async #takeOver(name: string): Promise<void> {
+    let release = (): void => undefined;
     const held = navigator.locks.request(`rayfold ${name}`, { steal: true }, () => new Promise<never>(() => undefined));
     held.catch(() => {
       this.#tell({ notice: "Another page has taken over; this one rests." });
       this.#post({ is: "closed", why: "" });
       this.#film?.cancel();
       for (const drawer of this.#drawers) drawer.end();
+      this.#do(Call.tick, 1);
       this.#module = null;
+      void this.#writing.then(() => {
+        // What could not be written is the other page's now.
+        this.#unwritten.clear();
+        release();
+      });
+    });
+    await new Promise<void>((done) => {
+      const writes = (): Promise<void> => {
+        done();
+        return new Promise((ended) => (release = ended));
+      };
+      navigator.locks.request(`rayfold ${name} is written`, { signal: AbortSignal.timeout(PATIENCE) }, writes).catch(() => done());
     });
   }
 
   /** Takes files that other programs have written to a folder on the disk. */
   #look(): void {
     const look = async (): Promise<void> => {
-      for (const [name, time] of await this.#folder.times()) {
-        if (this.#times.get(name) === time) continue;
-        this.#times.set(name, time);
-        this.#do(Call.insert, 0, packed([{ name, content: await this.#folder.read(name) }]));
+      const [known, now] = [this.#times ?? new Map<string, number>(), await this.#folder.times()];
+      for (const [name, time] of now) {
+        const before = known.get(name);
+        if (before === time) continue;
+        known.set(name, time);
+        // The session takes no further scripts.
+        if (before === undefined && name.endsWith(".txt")) this.#tell({ notice: `${name} is new in the folder. Load the page again to see it.` });
+        else this.#do(Call.insert, 0, packed([{ name, content: await this.#folder.read(name) }]));
+      }
+      for (const name of known.keys()) {
+        if (now.has(name)) continue;
+        known.delete(name);
+        this.#tell({ notice: `${name} was deleted from the folder. What is here is written with its next change.` });
       }
     };
-    // What cannot be read now is looked at again.
-    setInterval(() => void look().catch(() => undefined), DISK);
+    const again = (): unknown => setTimeout(() => void look().catch(() => undefined).then(again), DISK);
+    again();
   }
 
   /** The names of files that are left out, as the content of a file without name, and the files. */
@@ -162,7 +209,7 @@ export class Session {
       };
       this.#drawers[number]?.call(Call.draw, 0, content).then(drawn, failed);
     } else if (kind === Kind.save) {
-      for (const file of unpacked(content)) void this.#write(file);
+      for (const file of unpacked(content)) this.#write(file);
     } else if (kind === Kind.answer) {
       if (this.#asked.delete(number)) this.#post({ is: "answer", number, value: content }, [content.buffer]);
     } else if (kind === Kind.wake) {
@@ -183,12 +230,27 @@ export class Session {
     this.#do(Call.lost, number);
   }
 
-  async #write(file: File): Promise<void> {
+  /** Writes a file after those before it. What cannot be written is tried again, until a newer content of the file is. */
+  #write(file: File): void {
+    this.#unwritten.set(file.name, file);
+    this.#writing = this.#writing.then(() => this.#put(file));
+  }
+
+  async #put(file: File, isFirst = true): Promise<void> {
+    const { name } = file;
+    if (this.#unwritten.get(name) !== file) return;
     try {
-      await this.#folder.write(file);
-      if (this.#times.size > 0) this.#times = await this.#folder.times();
+      const known = this.#times?.get(name);
+      const now = known === undefined ? null : await this.#folder.time(name);
+      if (now === null || now === known) {
+        await this.#folder.write(file);
+        const time = this.#times && (await this.#folder.time(name));
+        if (time !== null) this.#times?.set(name, time);
+      } else this.#tell({ notice: `Another program has changed ${name} at the same time, and its version is shown. Undo restores yours.` });
+      if (this.#unwritten.get(name) === file) this.#unwritten.delete(name);
     } catch (error) {
-      this.#tell({ notice: `${file.name} cannot be written: ${why(error)}` });
+      if (isFirst) this.#tell({ notice: `${name} cannot be written: ${why(error)}. It is tried again; a zip file keeps it, too.` });
+      setTimeout(() => (this.#writing = this.#writing.then(() => this.#put(file, false))), AGAIN);
     }
   }
 
@@ -209,6 +271,24 @@ export class Session {
     } finally {
       this.#film = null;
     }
+  }
+
+  /** Puts files into the project. The session takes no further scripts. */
+  async #add(files: readonly File[]): Promise<boolean> {
+    const known = new Set(unpacked(this.#call(Call.files)).map(({ name }) => name));
+    const isNew = ({ name }: File): boolean => name.endsWith(".txt") && !known.has(name);
+    for (const file of files) {
+      if (!isNew(file)) this.#do(Call.insert, 0, packed([file]));
+      this.#write(file);
+    }
+    await this.#writing;
+    return files.some(isNew);
+  }
+
+  async #samples(frames: readonly FramePlace[]): Promise<Sample[]> {
+    if (!this.#program) throw new Error("no project is open");
+    const [, ...files] = unpacked(this.#call(Call.files));
+    return sampled(this.#program, this.#post, files, frames);
   }
 
   #newFilm(): Film {
@@ -248,13 +328,17 @@ export class Session {
         const [, ...files] = unpacked(this.#call(Call.files));
         return this.#call(Call.zip, 0, packed(files));
       }
+      case "samples":
+        return this.#samples(question.frames);
       case "unzip":
         return this.#unzip(question.content);
+      case "add":
+        return this.#add(question.files);
       case "import":
         return keep(question.name, question.files);
       case "write":
         this.#do(Call.tick, 1);
-        return this.#folder.settle();
+        return this.#writing;
     }
   }
 }

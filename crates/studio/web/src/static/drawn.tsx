@@ -12,7 +12,8 @@ export function Drawn({ src, alt = "", ...of }: Drawing): JSX.Element {
     let address = "";
     let isGone = false;
     if (src) {
-      void get(src).then((content) => {
+      const found = get(src).catch(() => null);
+      void found.then((content) => {
         if (!content || isGone) return;
         address = URL.createObjectURL(new Blob([content], { type: "image/png" }));
         setShown(address);

@@ -3,5 +3,5 @@
 import * as studio from "./connection";
 import * as runs from "./stack/runs";
 
-export const get = (address: string): Promise<Uint8Array<ArrayBuffer> | null> =>
-  address.startsWith("runs/") ? runs.get(address).catch(() => null) : studio.get(address);
+export const get = (address: string): Promise<Uint8Array<ArrayBuffer> | Blob | null> =>
+  address.startsWith("runs/") ? runs.get(address) : studio.get(address);

@@ -10,6 +10,20 @@ export type Place =
   | { readonly is: "files"; readonly name: string; readonly files: readonly File[] }
   | { readonly is: "folder"; readonly handle: FileSystemDirectoryHandle };
 
+/** A frame in its script. */
+export interface FramePlace {
+  readonly script: string;
+  readonly frame: number;
+}
+
+/** A frame that was drawn on one thread: the time that this took, and its file. */
+export interface Sample extends FramePlace {
+  readonly ms: number;
+  readonly bytes: number;
+  readonly width: number;
+  readonly height: number;
+}
+
 /** What the page wants to know. */
 export type Question =
   | { readonly is: "get"; readonly address: string }
@@ -18,8 +32,12 @@ export type Question =
   | { readonly is: "projects" }
   | { readonly is: "remove"; readonly name: string }
   | { readonly is: "zip" }
+  /** The samples of frames, as many as can be drawn in some seconds. */
+  | { readonly is: "samples"; readonly frames: readonly FramePlace[] }
   /** The names of files that are left out, as the content of a file without name, and the files of a zip file. */
   | { readonly is: "unzip"; readonly content: Uint8Array }
+  /** Whether new scripts are among these files of the project, which are shown once the page is loaded again. */
+  | { readonly is: "add"; readonly files: readonly File[] }
   /** The name of a new project of these files. */
   | { readonly is: "import"; readonly name: string; readonly files: readonly File[] }
   /** Whether everything is written. */

@@ -6,14 +6,21 @@ import { useEffect } from "preact/hooks";
 
 import { notice } from "../store";
 import { visible } from "../parts/visible";
-import { addressOf } from "./address";
-import { importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
-import { hasDisk, openFolder } from "./disk";
+import { addressOf, NEW } from "./address";
+import { addFiles, importProject, ownFiles, project, projects, removeProject, unzip, write, zip } from "./connection";
+import { chosenFolder, hasDisk, openAgain, openFolder } from "./disk";
 import { linked } from "./link";
 import { textOf, type File } from "./module";
 import { save } from "./save";
 
 const names = signal<readonly string[]>([]);
+
+/** A folder of the disk that was chosen before, and may be used again if the user agrees. */
+const before = signal<FileSystemDirectoryHandle | null>(null);
+
+const failed = (error: unknown): void => {
+  notice.value = error instanceof Error ? error.message : String(error);
+};
 
 /** Opens what an address names, once everything here is written. */
 async function go(address: string): Promise<void> {
@@ -40,6 +47,16 @@ async function openFiles(chosen: FileList | null): Promise<void> {
   if (own) await go(addressOf(own));
 }
 
+/** Puts files into the project that is open. */
+async function add(chosen: FileList | null): Promise<void> {
+  const files = await Promise.all(Array.from(chosen ?? [], async (file): Promise<File> => ({ name: file.name, content: new Uint8Array(await file.arrayBuffer()) })));
+  const known = new Set((await ownFiles()).map(({ name }) => name));
+  const replaced = files.filter(({ name }) => known.has(name)).map(({ name }) => name);
+  if (replaced.length > 0 && !confirm(`Replace ${replaced.join(", ")}?`)) return;
+  if (await addFiles(files)) location.reload();
+  else notice.value = `${files.map(({ name }) => name).join(", ")} can be named by the scripts of the project.`;
+}
+
 async function share(): Promise<void> {
   const [, ...files] = await ownFiles();
   const fragment = await linked(project.value, files);
@@ -61,7 +78,11 @@ async function saveZip(): Promise<void> {
 }
 
 export function Places(): JSX.Element {
-  useEffect(() => void projects().then((found) => (names.value = found)), []);
+  useEffect(() => {
+    void projects().then((found) => (names.value = found));
+    if (hasDisk) void chosenFolder().then((chosen) => (before.value = chosen && !chosen.isOpen ? chosen.handle : null));
+  }, []);
+  const asked = before.value;
   const others = names.value.filter((name) => name !== project.value);
   return (
     <section class="places" aria-label="Projects">
@@ -93,10 +114,19 @@ export function Places(): JSX.Element {
       <div class="buttons">
         <label>
           Open a zip file, or scripts and their files:{" "}
-          <input type="file" multiple aria-label="Open a project" onChange={(event) => void openFiles(event.currentTarget.files)} />
+          <input type="file" multiple aria-label="Open a project" onChange={(event) => void openFiles(event.currentTarget.files).catch(failed)} />
         </label>
       </div>
       <div class="buttons">
+        <label>
+          Add scripts, models and pictures to {visible(project.value)}:{" "}
+          <input type="file" multiple aria-label="Add files" onChange={(event) => void add(event.currentTarget.files).catch(failed)} />
+        </label>
+      </div>
+      <div class="buttons">
+        <button type="button" onClick={() => void go(NEW)}>
+          New project
+        </button>
         <button type="button" onClick={() => void saveZip()}>
           Save as zip
         </button>
@@ -104,11 +134,17 @@ export function Places(): JSX.Element {
           Copy a link
         </button>
         {hasDisk && (
-          <button type="button" onClick={() => void write().then(openFolder)}>
+          <button type="button" onClick={() => void write().then(openFolder).catch(failed)}>
             Open a folder
           </button>
         )}
+        {asked && (
+          <button type="button" onClick={() => void openAgain(asked).catch(failed)}>
+            Open the folder {visible(asked.name)} again
+          </button>
+        )}
       </div>
+      {notice.value && <p role="status">{visible(notice.value)}</p>}
     </section>
   );
 }

@@ -5,6 +5,12 @@ import type { File } from "./module";
 
 const ROOT = "projects";
 
+/** The most bytes of a folder that the studio holds. */
+const MOST = 256 << 20;
+
+/** Returns whether a name is that of a file or a folder, and of no hidden one, as those of zip files are (`browser/archive.rs`). */
+export const isPlain = (name: string): boolean => name !== "" && !name.startsWith(".") && !/[\p{Cc}/\\:]/u.test(name);
+
 async function root(): Promise<FileSystemDirectoryHandle | null> {
   try {
     const all = await navigator.storage.getDirectory();
@@ -14,11 +20,12 @@ async function root(): Promise<FileSystemDirectoryHandle | null> {
   }
 }
 
+/** Returns whether a file of a folder is not read: a hidden one, or one that Chromium writes before it takes another's place. */
+const isSkipped = (name: string): boolean => name.startsWith(".") || name.endsWith(".crswap");
+
 /** A folder of files, in the browser's storage or on the disk. */
 export class Folder {
   readonly #handle: FileSystemDirectoryHandle | null;
-  /** The writing in progress: one after the other, so that the last content stays. */
-  #writing: Promise<void> = Promise.resolve();
 
   constructor(handle: FileSystemDirectoryHandle | null) {
     this.#handle = handle;
@@ -29,23 +36,38 @@ export class Folder {
     return this.#handle !== null;
   }
 
-  async files(): Promise<(File & { readonly modified: number })[]> {
-    const files = [];
-    for await (const [name, handle] of this.#handle?.entries() ?? []) {
-      if (handle.kind !== "file") continue;
-      const file = await (handle as FileSystemFileHandle).getFile();
-      files.push({ name, content: new Uint8Array(await file.arrayBuffer()), modified: file.lastModified });
+  /** Returns the files, and the names of those that are left out, because the studio cannot hold them. */
+  async files(): Promise<{ readonly files: readonly (File & { readonly modified: number })[]; readonly leftOut: readonly string[] }> {
+    const found = [];
+    for await (const handle of this.#handle?.values() ?? []) {
+      if (handle.kind === "file" && !isSkipped(handle.name)) found.push(await (handle as FileSystemFileHandle).getFile());
     }
-    return files;
+    // Scripts are small: what is left out are pictures, models and films.
+    found.sort((a, b) => a.size - b.size);
+    const [files, leftOut] = [[] as (File & { readonly modified: number })[], [] as string[]];
+    let room = MOST;
+    for (const file of found) {
+      room -= file.size;
+      if (room < 0) leftOut.push(file.name);
+      else files.push({ name: file.name, content: new Uint8Array(await file.arrayBuffer()), modified: file.lastModified });
+    }
+    return { files, leftOut };
   }
 
   /** Returns the time at which each file was last modified. */
   async times(): Promise<Map<string, number>> {
     const times = new Map<string, number>();
-    for await (const [name, handle] of this.#handle?.entries() ?? []) {
-      if (handle.kind === "file") times.set(name, (await (handle as FileSystemFileHandle).getFile()).lastModified);
+    for await (const name of this.#handle?.keys() ?? []) {
+      const time = isSkipped(name) ? null : await this.time(name);
+      if (time !== null) times.set(name, time);
     }
     return times;
+  }
+
+  /** Returns the time at which a file was last modified; nothing if it is a folder, or is gone. */
+  async time(name: string): Promise<number | null> {
+    const handle = await this.#handle?.getFileHandle(name).catch(() => null);
+    return (await handle?.getFile())?.lastModified ?? null;
   }
 
   async read(name: string): Promise<Uint8Array> {
@@ -54,22 +76,14 @@ export class Folder {
   }
 
   /** Writes files of different names at the same time, each whole or not at all. */
-  write(...files: readonly File[]): Promise<void> {
-    const handle = this.#handle;
+  async write(...files: readonly File[]): Promise<void> {
     const write = async ({ name, content }: File): Promise<void> => {
-      const file = await handle?.getFileHandle(name, { create: true });
+      const file = await this.#handle?.getFileHandle(name, { create: true });
       const stream = await file?.createWritable();
       await stream?.write(content as Uint8Array<ArrayBuffer>);
       await stream?.close();
     };
-    const written = this.#writing.then(async () => void (await Promise.all(files.map(write))));
-    this.#writing = written.catch(() => undefined);
-    return written;
-  }
-
-  /** Waits until everything is written. */
-  settle(): Promise<void> {
-    return this.#writing;
+    await Promise.all(files.map(write));
   }
 }
 
@@ -102,7 +116,7 @@ async function nameFor(name: string, files: readonly File[]): Promise<string> {
   const known = new Set(await projects());
   for (let number = 1; ; number += 1) {
     const own = number === 1 ? plain : `${plain}-${number}`;
-    if (!known.has(own) || isSame(await (await project(own)).files(), files)) return own;
+    if (!known.has(own) || isSame((await (await project(own)).files()).files, files)) return own;
   }
 }
 

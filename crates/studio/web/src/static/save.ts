@@ -3,7 +3,7 @@
 import { notice } from "../store";
 import { get } from "./files";
 
-export function save(content: Uint8Array<ArrayBuffer>, name: string): void {
+export function save(content: Uint8Array<ArrayBuffer> | Blob, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([content]));
   link.download = name;
@@ -22,10 +22,13 @@ export function listenDownloads(): void {
       if (!link || !address || /^\w+:/.test(address)) return;
       event.preventDefault();
       const name = link.getAttribute("download") ?? "";
-      void get(address).then((content) => {
-        if (content) save(content, name);
-        else notice.value = `There is no ${name} to save.`;
-      });
+      get(address).then(
+        (content) => {
+          if (content) save(content, name);
+          else notice.value = `There is no ${name} to save.`;
+        },
+        (error: unknown) => (notice.value = `${name} cannot be saved: ${error instanceof Error ? error.message : String(error)}`),
+      );
     },
     true,
   );

@@ -2,6 +2,8 @@
 
 import type { JSX } from "preact";
 
+import { openNew } from "#connection";
+
 import { visible } from "../parts/visible";
 import { ask, connected, files, notice, state } from "../store";
 
@@ -12,7 +14,16 @@ export function Notices(): JSX.Element {
     <div class="notices" role="alert">
       {!connected.value && (
         <p>
-          The connection was lost. <a href="">Open the page again</a>, if <code>rayfold studio</code> still runs.
+          {openNew ? "The studio has stopped." : "The connection was lost."} <a href="">Open the page again</a>
+          {openNew ? (
+            <button type="button" onClick={openNew}>
+              Open a new project
+            </button>
+          ) : (
+            <>
+              , if <code>rayfold studio</code> still runs.
+            </>
+          )}
         </p>
       )}
       {now?.saved === "conflict" && (

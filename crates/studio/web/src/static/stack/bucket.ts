@@ -68,13 +68,13 @@ export class Bucket {
     if (!answer.ok) throw new Error(`the bucket does not delete ${key} (${answer.status})`);
   }
 
-  /** Lists all objects whose keys have a prefix. */
-  async list(prefix: string): Promise<Listed[]> {
+  /** Lists all objects whose keys have a prefix; of a level, those that have no slash after it. */
+  async list(prefix: string, isLevel = false): Promise<Listed[]> {
     const all: Listed[] = [];
     let more = "";
     do {
       // In the order of the names, as signatures want it.
-      const query = `?${more && `continuation-token=${encoded(more)}&`}list-type=2&prefix=${encoded(prefix)}`;
+      const query = `?${more && `continuation-token=${encoded(more)}&`}${isLevel ? "delimiter=%2F&" : ""}list-type=2&prefix=${encoded(prefix)}`;
       const answer = await this.#send("GET", "", query);
       if (!answer.ok) throw new Error(`the bucket refuses a listing (${answer.status})`);
       const page = new DOMParser().parseFromString(await answer.text(), "application/xml");

@@ -3,18 +3,20 @@
 
 import type { Answer } from "../../connection/runs";
 import type { RunState, RunUpdate, Summary, UploadProgress } from "../../protocol";
-import { files, state } from "../../store";
-import { ownFiles, write } from "../connection";
+import { notice, state } from "../../store";
+import { write } from "../connection";
 import { bytesOf, textOf, type File } from "../module";
 import { Bucket } from "./bucket";
+import { estimated, wanted, type Wanted } from "./offer";
 import { isSignedIn, leave } from "./person";
+import { named, versionsOf } from "./receipts";
+import { Refused } from "./refused";
+import { retryOf, type Scope } from "./retry";
 import { stack } from "./stack";
-import { faults, frameFile, frameUpdate, isBehind, manifestOf, outputsOf, summary, type Known, type Manifest, type Output } from "./standing";
+import { faults, frameUpdate, isBehind, manifestOf, outputsOf, summary, type Known, type Manifest, type Output } from "./standing";
+import { Zip } from "./zip";
 
 export type { Answer } from "../../connection/runs";
-
-/** A person has neither the rights to draw frames again, nor an estimate, nor a zip file of frames. */
-export const isOwner = false;
 
 /** The most runs of a list. */
 const LISTED = 200;
@@ -22,15 +24,8 @@ const LISTED = 200;
 /** Milliseconds between two looks at a run, at first and later. */
 const PAUSE = [500, 3000] as const;
 
-/** A refusal, as the page shows it. */
-class Refused extends Error {
-  readonly more: object;
-
-  constructor(why: string, more: object = {}) {
-    super(why);
-    this.more = more;
-  }
-}
+/** The most frames that are fetched at the same time, or objects that are changed. */
+const AT_ONCE = 8;
 
 const uploads = new Map<string, UploadProgress>();
 let ended = 0;
@@ -61,10 +56,25 @@ async function outputs(own: Bucket, animation: string, known: Known): Promise<Ou
   return (await Promise.all(found)).filter((output) => output !== null);
 }
 
-async function scripts(own: Bucket, animation: string): Promise<Map<string, { readonly etag: string; readonly size: number }>> {
-  const folder = `scripts/${animation}/`;
-  const listed = (await own.list(folder)).map(({ key, etag, size }) => [key.slice(folder.length), { etag, size }] as const);
-  return new Map(listed.filter(([name]) => !name.includes("/")));
+/** Returns the names of the objects below a folder, with their versions and sizes. */
+async function below(own: Bucket, folder: string, isLevel: boolean): Promise<Map<string, { readonly etag: string; readonly size: number }>> {
+  return new Map((await own.list(folder, isLevel)).map(({ key, etag, size }) => [key.slice(folder.length), { etag, size }]));
+}
+
+const scripts = (own: Bucket, animation: string): ReturnType<typeof below> => below(own, `scripts/${animation}/`, true);
+
+const receipts = async (own: Bucket, animation: string, isLevel: boolean): Promise<string[]> => [...(await below(own, `frames/${animation}/`, isLevel)).keys()];
+
+/** Returns the versions of a run's scripts and settings as they are now. */
+async function versions(own: Bucket, animation: string): Promise<Map<string, string>> {
+  const there = new Map(Array.from(await scripts(own, animation), ([name, { etag }]) => [name, etag]));
+  const hasFiles = [...there.keys()].some((name) => !name.endsWith(".txt") && name !== "animation.json");
+  return versionsOf(there, hasFiles ? await receipts(own, animation, true) : []);
+}
+
+/** Does something to all items, some of them at the same time. */
+async function each<T>(items: readonly T[], act: (item: T) => Promise<unknown>): Promise<void> {
+  for (let at = 0; at < items.length; at += AT_ONCE) await Promise.all(items.slice(at, at + AT_ONCE).map(act));
 }
 
 /** A run as it was looked at last. */
@@ -84,9 +94,8 @@ async function look(own: Bucket, folder: string, run: string, before: Seen | nul
   const known = manifestOf(animation, text);
   if (known === "new") return { text, summary: summary(run, known, [], false), manifest: null };
   if (known === "unreadable") return { text, summary: summary(run, known, await outputs(own, animation, known), false), manifest: null };
-  const [made, there] = await Promise.all([outputs(own, animation, known), scripts(own, animation)]);
-  const versions = new Map(Array.from(there, ([name, { etag }]) => [name, etag]));
-  return { text, summary: summary(run, known, made, isBehind(known, versions)), manifest: known };
+  const [made, there] = await Promise.all([outputs(own, animation, known), versions(own, animation)]);
+  return { text, summary: summary(run, known, made, isBehind(known, there)), manifest: known };
 }
 
 async function list(): Promise<object> {
@@ -98,21 +107,6 @@ async function list(): Promise<object> {
   return { bucket: name, runs, more: Math.max(0, names.length - LISTED) };
 }
 
-/** The files that the bucket's folder of a run should have, in the order in which they are sent. */
-async function wanted(): Promise<File[]> {
-  await write();
-  const faulty = files.value.find((file) => file.faulty);
-  if (faulty) throw new Refused(`${faulty.name} has an error`, { script: faulty.name.replace(/\.txt$/, "") });
-  const [, ...own] = await ownFiles();
-  const isScript = ({ name }: File): boolean => name.endsWith(".txt");
-  const settings = own.find(({ name }) => name === "animation.json");
-  const given = settings ? (JSON.parse(textOf(settings.content)) as { readonly frames?: number }) : { fps: state.value?.fps };
-  // So that no animation is made before the last script is there.
-  const counted = bytesOf(`${JSON.stringify({ frames: state.value?.frames, ...given }, null, 2)}\n`);
-  const beside = own.filter((file) => !isScript(file) && file !== settings);
-  return [{ name: "animation.json", content: counted }, ...beside, ...own.filter(isScript)];
-}
-
 interface Difference {
   readonly upload: readonly File[];
   readonly unchanged: number;
@@ -120,8 +114,8 @@ interface Difference {
   readonly remove: readonly string[];
 }
 
-async function difference(own: Bucket, animation: string): Promise<Difference> {
-  const [all, there] = await Promise.all([wanted(), scripts(own, animation)]);
+async function difference(own: Bucket, animation: string, { files: all }: Wanted): Promise<Difference> {
+  const there = await scripts(own, animation);
   const upload: File[] = [];
   for (const file of all) {
     const known = there.get(file.name);
@@ -135,16 +129,19 @@ async function difference(own: Bucket, animation: string): Promise<Difference> {
 
 async function offer(run: string): Promise<object> {
   const { bucket: own, folder } = await bucket(true);
-  const { upload, unchanged, remove } = await difference(own, `${folder}/${checked(run)}`);
+  const animation = `${folder}/${checked(run)}`;
+  const all = await wanted();
+  const estimate = await estimated(all);
+  const { upload, unchanged, remove } = await difference(own, animation, all);
   const frames = state.value?.frames ?? 0;
-  return { estimate: null, frames, folder: `scripts/${folder}/${run}/`, upload: upload.length, unchanged, delete: remove };
+  return { estimate, frames, folder: `scripts/${folder}/${run}/`, upload: upload.length, unchanged, delete: remove };
 }
 
 async function submit(run: string, deletable: readonly string[]): Promise<object> {
   const { bucket: own, folder } = await bucket(true);
   const animation = `${folder}/${checked(run)}`;
   if (uploads.get(run)?.is === "uploading") throw new Refused("it is being sent already");
-  const { upload, remove } = await difference(own, animation);
+  const { upload, remove } = await difference(own, animation, await wanted());
   if (remove.some((key) => !deletable.includes(key))) throw new Refused("the bucket holds scripts that are not on the page", { delete: remove });
   uploads.set(run, { is: "uploading", done: 0, total: upload.length });
   const send = async (): Promise<void> => {
@@ -161,20 +158,60 @@ async function submit(run: string, deletable: readonly string[]): Promise<object
   return {};
 }
 
+/** Draws a frame again, or all that are not drawn. */
+async function retry(run: string, scope: Scope): Promise<object> {
+  const { bucket: own, folder } = await bucket(true);
+  const animation = `${folder}/${checked(run)}`;
+  const content = await own.get(`manifests/${animation}.json`);
+  const known = manifestOf(animation, content && textOf(content));
+  if (typeof known === "string") throw new Refused(known === "new" ? `there is no run ${run}` : `the manifest of ${run} cannot be read`);
+  const { remove, orders, reassembled } = retryOf(known, await receipts(own, animation, false), scope);
+  await each(remove, (name) => own.remove(`frames/${animation}/${name}`));
+  const body = bytesOf(JSON.stringify({ woken_by: "the page" })) as Uint8Array<ArrayBuffer>;
+  await each(orders, (name) => own.put(`retries/${animation}/${name}`, body.slice()));
+  return { woken: orders.length, reassembled };
+}
+
+/** Returns a zip file of the frames that are drawn, and says which are not. */
+async function framesZip(own: Bucket, animation: string, run: string): Promise<Blob> {
+  const content = await own.get(`manifests/${animation}.json`);
+  const known = manifestOf(animation, content && textOf(content));
+  if (typeof known === "string") throw new Refused(`${run} has no frames`);
+  const { frames } = known;
+  const zip = new Zip();
+  const digits = String(frames.length).length;
+  const fetched = frames.map((frame, at) => ({ frame, at })).filter(({ frame }) => frame.state === "done");
+  for (let next = 0; next < fetched.length; next += AT_ONCE) {
+    notice.value = `Fetching frames: ${next} of ${fetched.length}.`;
+    const some = fetched.slice(next, next + AT_ONCE);
+    const contents = await Promise.all(some.map(({ frame: { script, version, pixels = 1, part } }) => own.get(`frames/${animation}/${named(script, version, pixels, part)}.png`)));
+    for (const [place, { at }] of some.entries()) {
+      const picture = contents[place];
+      if (!picture) throw new Refused(`frame ${at + 1} of ${run} is gone: it is being drawn again`);
+      zip.add(`frame${String(at + 1).padStart(digits, "0")}.png`, picture);
+    }
+  }
+  const missing = frames.flatMap(({ state }, at) => (state === "done" ? [] : [at + 1]));
+  const more = missing.length > 10 ? ` and ${missing.length - 10} more` : "";
+  notice.value = missing.length > 0 ? `The zip file lacks what is not drawn: frame ${missing.slice(0, 10).join(", ")}${more}.` : `All ${frames.length} frames are in the zip file.`;
+  return zip.finish();
+}
+
 const why = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 /** Answers as the program does at these addresses. */
 export async function ask(what: string, body?: object): Promise<Answer> {
   try {
     const { pathname, searchParams } = new URL(what, "rayfold://page/");
-    const wish = (body ?? {}) as { readonly run?: string; readonly delete?: readonly string[] };
+    const wish = (body ?? {}) as Scope & { readonly run?: string; readonly delete?: readonly string[] };
     const of: Readonly<Record<string, () => Promise<object>>> = {
       "/runs/list": list,
       "/runs/offer": () => offer(searchParams.get("run") ?? ""),
       "/runs/submit": () => submit(wish.run ?? "", wish.delete ?? []),
+      "/runs/retry": () => retry(wish.run ?? "", wish),
     };
     const answer = of[pathname];
-    if (!answer) throw new Refused("only the owner of the bucket can do this");
+    if (!answer) throw new Error(`there is no ${pathname}`);
     return { ok: true, text: JSON.stringify(await answer()) };
   } catch (error) {
     return { ok: false, text: JSON.stringify({ why: why(error), ...(error instanceof Refused && error.more) }) };
@@ -182,13 +219,16 @@ export async function ask(what: string, body?: object): Promise<Answer> {
 }
 
 /** Returns a file of a run by its address, or nothing if there is none. */
-export async function get(address: string): Promise<Uint8Array<ArrayBuffer> | null> {
+export async function get(address: string): Promise<Uint8Array<ArrayBuffer> | Blob | null> {
   const { pathname, searchParams } = new URL(address, "rayfold://page/");
-  const named = (name: string): string => searchParams.get(name) ?? "";
+  const of = (name: string): string => searchParams.get(name) ?? "";
   const { bucket: own, folder } = await bucket();
-  const animation = `${folder}/${checked(named("run"))}`;
-  if (pathname === "/runs/file") return own.get(`animations/${animation}.${named("output")}`);
-  return own.get(`frames/${animation}/${frameFile(named("script"), named("version"), named("pixels"), searchParams.get("part"))}`);
+  const run = checked(of("run"));
+  const animation = `${folder}/${run}`;
+  if (pathname === "/runs/file") return own.get(`animations/${animation}.${of("output")}`);
+  if (pathname === "/runs/frames.zip") return framesZip(own, animation, run);
+  const part = searchParams.get("part");
+  return own.get(`frames/${animation}/${named(of("script"), of("version"), Number(of("pixels")), part === null ? undefined : Number(part))}.png`);
 }
 
 /** Hears the state of a run, and each change of it, until the returned function is called. */

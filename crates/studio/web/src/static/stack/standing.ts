@@ -1,4 +1,4 @@
-// The state of a run for the page, from its manifest (docs/manifest.md) and the listing of its scripts. Contains values only; the
+// The state of a run for the page, from its manifest (docs/manifest.md) and the versions of its scripts. Contains values only; the
 // program computes the same in `runs/updates.rs`. Tests compare both on the cases in `runs/standing.json`.
 
 import type { FaultInfo, FrameUpdate, RunFile, Summary } from "../../protocol";
@@ -73,12 +73,11 @@ export function manifestOf(animation: string, text: string | null): Known {
 /** The endings of the files that are made of an animation. */
 export const outputsOf = (known: Known): readonly string[] => (typeof known !== "string" && known.settings.value?.outputs) || ["gif"];
 
-/** Whether the manifest is about other scripts or settings than those that are there, by name. Files that scripts name are not looked at. */
+/** Whether the manifest is about other versions of scripts and settings than those that are there, by their files' names. */
 export function isBehind({ frames, settings }: Manifest, there: ReadonlyMap<string, string>): boolean {
-  const seen = new Map(frames.map(({ script, version }) => [`${script}.txt`, version.split("+")[0]]));
+  const seen = new Map(frames.map(({ script, version }) => [`${script}.txt`, version]));
   if (settings.version !== undefined) seen.set("animation.json", settings.version);
-  const own = [...there].filter(([name]) => name.endsWith(".txt") || name === "animation.json");
-  return own.length !== seen.size || own.some(([name, version]) => seen.get(name) !== version);
+  return there.size !== seen.size || [...there].some(([name, version]) => seen.get(name) !== version);
 }
 
 /** The state of a run. */
@@ -132,13 +131,4 @@ export function faults(run: string, manifest: Manifest): { readonly faults: read
     ...(manifest.refusal ? faultsOf(`the GIF of ${run}`, manifest.refusal.reason) : []),
   ];
   return { faults: all.slice(0, FAULTS), moreFaults: Math.max(0, all.length - FAULTS) };
-}
-
-/** The key of a drawn frame, below the folder of frames of its animation. */
-export function frameFile(script: string, version: string, pixels: string, part: string | null): string {
-  const escaped = Array.from(new TextEncoder().encode(version), (byte) => {
-    const sign = String.fromCharCode(byte);
-    return /[\w-]/.test(sign) ? sign : `~${byte.toString(16).padStart(2, "0")}`;
-  });
-  return `${script}@${escaped.join("")}-p${pixels}${part === null ? "" : `/${part}`}.png`;
 }
