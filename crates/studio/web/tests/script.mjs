@@ -156,6 +156,8 @@ test("commands, clauses and names are completed from the parser's table", async 
   await page.keyboard.type("\n");
   await page.getByRole("listbox", { name: "Completions" }).waitFor({ state: "detached" });
   await until(() => readFileSync(path, "utf8").includes("\nSphere 1  0 0 0  gold\nMaterial blue mir\n\nSphere 1 0 1 0"));
+  await page.keyboard.type('Material blue image "a b.png" f');
+  await page.getByRole("listbox", { name: "Completions" }).getByRole("option", { name: /^flat/ }).waitFor();
   studio.check();
 });
 
