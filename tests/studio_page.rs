@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 11] = [
+const TESTS: [&str; 12] = [
     "tests/logic.mjs",
     "tests/site-standing.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
+    "tests/journeys.mjs",
     "tests/script.mjs",
     "tests/edit.mjs",
     "tests/arrange.mjs",
