@@ -7,7 +7,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, drag, goLine, open, over, program, clickRow, shot, until } from "./stage.mjs";
+import { audit, drag, open, over, program, clickRow, shot, until } from "./stage.mjs";
 
 const table = () => {
   const checked = spawnSync(program, ["check", "--format", "json", "-"], { input: "Screen 4 3\nLook 0 0 9 0 0 0 40\nTrace\n" });
@@ -146,26 +146,6 @@ test("every clause of a material is switched on and off, and a sphere shows it",
   // The last clause stays.
   await page.getByRole("group", { name: "Clauses" }).getByRole("button", { name: "colour", exact: true }).click();
   await page.getByText("needs one clause").waitFor();
-  studio.check();
-});
-
-test("cards of materials stay those of the script after a change that is taken back at once", async (t) => {
-  const text = SCENE.replace("Trace", "Material red diffuse 1 0 0\nSphere 1  0 0.5 0  red\nTrace");
-  const studio = await open(t, { text });
-  const { page } = studio;
-  const card = page.locator(".sphere", { hasText: "red" });
-  const isDrawn = () => card.locator("img").evaluate(({ complete, naturalWidth }) => complete && naturalWidth > 0);
-  await until(isDrawn);
-  await goLine(page, 1);
-  await page.keyboard.press("Enter");
-  await page.locator("#line-4.material").waitFor();
-  await page.keyboard.press("Backspace");
-  await page.locator("#line-3.material").waitFor();
-  // Longer than the page waits for further changes.
-  await page.waitForTimeout(600);
-  await until(isDrawn);
-  await card.click();
-  await page.locator("#line-3.material[aria-selected=true]").waitFor();
   studio.check();
 });
 
