@@ -14,6 +14,7 @@ const TESTS: [&str; 12] = [
     "tests/site-cost.mjs",
     "tests/page.mjs",
     "tests/language.mjs",
+    "tests/journeys.mjs",
     "tests/script.mjs",
     "tests/edit.mjs",
     "tests/arrange.mjs",

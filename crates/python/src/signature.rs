@@ -200,7 +200,7 @@ fn chosen(field: &Field) -> Option<&'static str> {
         Meaning::Thickness => "thickness",
         Meaning::ShineExponent => "exponent",
         Meaning::Roughness => "roughness",
-        Meaning::CellSize => "size",
+        Meaning::CellSize | Meaning::PictureWidth => "size",
         Meaning::GradientStart => "start",
         Meaning::GradientEnd => "end",
         Meaning::FirstFrame => "a",

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::command::Command;
 use crate::curve::{CYCLE, Mode};
-use crate::form::{Field, Form, Names, Presence, Quotes, Subject, Values};
+use crate::form::{Field, Form, Kind, Names, Presence, Quotes, Subject, Values};
 use crate::model::Clause;
 
 /// The version of the language.
@@ -150,7 +150,14 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
         usage: form.to_string(),
         about,
         subject,
-        parameters: (0..form.fields.len()).map(|i| parameter(form, i)).collect(),
+        parameters: form
+            .parameters()
+            .scan(0, |next, field| {
+                let first = *next;
+                *next += if field.kind == Kind::Word { 0 } else { field.names.len() };
+                Some(parameter(form, field, first))
+            })
+            .collect(),
         together: form.constraints.iter().map(|constraint| constraint.describe(form)).collect(),
         curves: form.curves && !form.fields.is_empty(),
         material_instead_from: form.surface().map(|i| form.number(i).0),
@@ -159,9 +166,8 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     }
 }
 
-fn parameter(form: &'static Form, place: usize) -> ParameterEntry {
-    let field: &'static Field = &form.fields[place];
-    let first = form.span(place).start;
+/// Returns the entry of a parameter, before which there are so many numbers.
+fn parameter(form: &Form, field: &Field, first: usize) -> ParameterEntry {
     let presence = match field.presence {
         // Ambient and diffuse stand or are omitted together.
         Presence::Required if form.is_of_optional_surface(first) => "optional",
@@ -196,6 +202,6 @@ fn parameter(form: &'static Form, place: usize) -> ParameterEntry {
         },
         presence,
         default: field.presence.default().or_else(|| form.surface_default(field)),
-        fixed: form.curves && !form.takes_curve(first),
+        fixed: form.curves && (field.kind == Kind::Word || !form.takes_curve(first)),
     }
 }

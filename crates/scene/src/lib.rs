@@ -39,7 +39,8 @@ pub use container::{Container, UnknownContainer};
 pub use curve::{Curve, Key, Mode};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use form::{
-    Constraint, Field, Form, Kind, Names, Presence, Quotes, Subject, Unit, Values, color_levels, quoted_word,
+    Constraint, Field, Form, Kind, Names, Presence, Quotes, Subject, Unit, Values, Words, color_levels,
+    quoted_word,
 };
 pub use language::{CommandEntry, Language, ModeEntry, ParameterEntry, SubjectEntry, language};
 pub use limits::Limits;

@@ -13,6 +13,7 @@
 
 mod arrange;
 pub mod browser;
+mod clauses;
 mod clock;
 #[cfg(feature = "server")]
 mod disk;

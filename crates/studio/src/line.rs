@@ -248,14 +248,21 @@ impl Line {
     /// Returns the line without the parameters from `from` on.
     #[must_use]
     pub fn cut(&self, from: usize) -> Option<Self> {
+        let count = self.words()?.parameters.len();
+        if from < count { self.without(from..count) } else { Some(self.clone()) }
+    }
+
+    /// Returns the line without some of its parameters, of which there is one at least.
+    #[must_use]
+    pub fn without(&self, which: Range<usize>) -> Option<Self> {
         let words = self.words()?;
-        let Some(first) = words.parameters.get(from) else { return Some(self.clone()) };
-        let before = match from.checked_sub(1) {
-            Some(before) => words.parameters[before].end,
+        let before = match which.start.checked_sub(1) {
+            Some(before) => words.parameters.get(before)?.end,
             None => words.subject.as_ref().unwrap_or(&words.command).end,
         };
-        debug_assert!(before <= first.start);
-        Some(self.with(&[(before..words.last().end, String::new())]))
+        let last = words.parameters.get(which.end.checked_sub(1)?)?.end;
+        debug_assert!(before <= last);
+        Some(self.with(&[(before..last, String::new())]))
     }
 
     /// Returns the line with other bytes for some spans, given in order.

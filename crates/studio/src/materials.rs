@@ -2,11 +2,11 @@
 //! drawn by the tracer.
 
 use std::collections::HashSet;
-use std::ops::Range;
 
 use rayfold_scene::assets::Library;
-use rayfold_scene::{Clause, Command, Limits, Parameter, Presence, parse_with_files, quoted_word};
+use rayfold_scene::{Clause, Command, Limits, Parameter, parse_with_files, quoted_word};
 
+use crate::clauses::{clauses, initial};
 use crate::document::Splice;
 use crate::edits::set;
 use crate::error::Error;
@@ -63,13 +63,6 @@ const PRESETS: &[Preset] = &[
 
 /// The reason why a material gets no picture.
 const NO_PICTURE: &str = "There is no picture (.png, .jpg, .webp) beside the script.";
-
-/// Returns whether a name is that of a picture of light, which no surface takes.
-fn is_light(name: &str) -> bool {
-    name.rsplit('.')
-        .next()
-        .is_some_and(|end| ["hdr", "exr"].iter().any(|light| light.eq_ignore_ascii_case(end)))
-}
 
 /// The width and height of a sphere's picture in pixels.
 pub(crate) const SIDE: u32 = 96;
@@ -158,16 +151,6 @@ fn blank(name: &str, diffuse: &str) -> Line {
     Line::new(&format!("{} {name}   diffuse {diffuse}", Command::Material.name()))
 }
 
-/// Returns the clauses of a material, each with its words, from its name on.
-pub(crate) fn clauses(line: &Line) -> Vec<(Clause, Range<usize>)> {
-    let Some(words) = line.words() else { return Vec::new() };
-    let found = words.parameters.iter().enumerate();
-    let found = found.filter_map(|(at, word)| Some((at, Clause::from_name(line.word(word))?)));
-    let starts: Vec<_> = found.collect();
-    let ends = starts.iter().skip(1).map(|(at, _)| *at).chain([words.parameters.len()]);
-    starts.iter().zip(ends).map(|(&(at, clause), end)| (clause, at..end)).collect()
-}
-
 /// Returns the materials before a line that a pattern can name: those of coefficients alone.
 pub(crate) fn plain_names(lines: &[Line], at: usize) -> Vec<String> {
     let is_plain = |line: &&Line| {
@@ -180,7 +163,7 @@ pub(crate) fn plain_names(lines: &[Line], at: usize) -> Vec<String> {
 }
 
 /// Adds a clause to a material, or removes it. A pattern replaces another one, and gets a second material if there is
-/// none that it could name. `pictures` are the pictures beside the script.
+/// none that it could name. `pictures` are those beside the script that a surface takes.
 ///
 /// # Errors
 /// Returns the reason why the last clause stays.
@@ -219,24 +202,9 @@ pub(crate) fn toggle(
         }
         texts.push(clause.name().to_owned());
         if clause == Clause::Image {
-            let picture = pictures.iter().find(|name| !is_light(name)).ok_or(NO_PICTURE)?;
-            texts.extend([quoted_word(picture), "flat".to_owned(), "1".to_owned()]);
+            texts.push(quoted_word(pictures.first().ok_or(NO_PICTURE)?));
         }
-        let fields = clause.form().fields.iter().filter(|field| field.presence == Presence::Required);
-        texts.extend(fields.flat_map(|field| {
-            let value = match field.parameter {
-                Parameter::ShineExponent => "60",
-                Parameter::Ior => "1.5",
-                Parameter::GradientStart => "0",
-                Parameter::GradientEnd => "1",
-                Parameter::Glass => "0.95",
-                Parameter::Ambient => "0.1",
-                Parameter::Glow => "1",
-                Parameter::Roughness => "0.2",
-                _ => "0.5",
-            };
-            vec![value.to_owned(); field.names.len()]
-        }));
+        texts.extend(initial(clause.form()));
         texts.extend(other.filter(|_| names_other(clause)));
     }
     let from =
@@ -390,7 +358,7 @@ mod tests {
         let (splices, at) = new(&lines, &[3]);
         let blank = after(text, splices);
         assert!(blank.contains("\nSphere 1  0 0 0  material-1   # ball\n"), "{blank}");
-        let pictures = ["a.hdr".to_owned(), "a b.png".to_owned()];
+        let pictures = ["a b.png".to_owned()];
         let files = MemoryFiles::from([("a b.png", include_bytes!("../../scene/tests/pixel.png").to_vec())]);
         let library = Library::new(files);
         let parse = |text: &str| parse_with_files("a", text.as_bytes(), &Limits::default(), &library);

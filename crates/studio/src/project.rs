@@ -416,9 +416,12 @@ impl Opened {
 
     /// Returns the names of the pictures in the script's folder, skies first, then in natural order.
     pub(crate) fn pictures(&self) -> Vec<String> {
-        let (mut skies, others) = (self.files_with(&PICTURES[..2]), self.files_with(&PICTURES[2..]));
-        skies.extend(others);
-        skies
+        [self.files_with(&PICTURES[..2]), self.surface_pictures()].concat()
+    }
+
+    /// Returns the names of the pictures in the script's folder that a surface takes, in natural order.
+    pub(crate) fn surface_pictures(&self) -> Vec<String> {
+        self.files_with(&PICTURES[2..])
     }
 
     fn files_with(&self, endings: &[&str]) -> Vec<String> {

@@ -4,6 +4,7 @@
 //! Knows no socket and no thread, so tests need neither.
 
 mod editing;
+mod fields;
 mod held_keys;
 mod hold;
 mod loading;
@@ -401,7 +402,7 @@ impl Session {
             ClientMessage::Clause { line, clause } => {
                 let lines = self.file_lines(project);
                 let file = project.files.get(self.place(project).file);
-                let pictures = file.map(|file| file.pictures()).unwrap_or_default();
+                let pictures = file.map(|file| file.surface_pictures()).unwrap_or_default();
                 let clause = Clause::from_name(&clause);
                 match clause.map(|clause| materials::toggle(lines, line, clause, &pictures)) {
                     Some(Ok(splices)) => self.edit(project, splices, None, tell),
@@ -411,10 +412,7 @@ impl Session {
                 Change::Still
             }
             ClientMessage::Word { line, number, word } => {
-                let to = self.line(project, line).filter(|_| names::is_name(&word));
-                let to = to.and_then(|line| line.with_words(&[(number, word)]));
-                let splices = to.map(|to| edits::set(line, to));
-                self.edit(project, splices.into_iter().collect(), None, tell);
+                self.set_word(project, line, number, &word, tell);
                 Change::Still
             }
             ClientMessage::Preset { lines, preset } => {

@@ -83,14 +83,19 @@ pub(crate) fn commands() -> Vec<CommandTable> {
         .map(|&command| CommandTable {
             name: title(command),
             role: role(command),
-            fields: fields(command)
-                .map(|(first, field)| FieldTable {
-                    fixed: command.form().curves && !command.form().takes_curve(first),
-                    ..FieldTable::new(first, field)
-                })
-                .collect(),
+            fields: command_fields(command),
         })
         .collect()
+}
+
+/// Returns the tables of a command's parameters.
+pub(crate) fn command_fields(command: Command) -> Vec<FieldTable> {
+    let form = command.form();
+    let table = |(first, field)| FieldTable {
+        fixed: form.curves && !form.takes_curve(first),
+        ..FieldTable::new(first, field)
+    };
+    fields(command).map(table).collect()
 }
 
 /// Returns the name of a command on the page: of the two named `Sky`, one with the word that it takes.
@@ -169,14 +174,14 @@ impl FieldTable {
         }
     }
 
-    /// Makes the table of the name of a material, which is one of these.
-    pub(crate) fn of_material(first: usize, names: Vec<String>) -> Self {
+    /// Makes the table of a name, which is one of these.
+    pub(crate) fn of_names(label: &str, first: usize, names: Vec<String>) -> Self {
         Self {
-            label: "other material".to_owned(),
+            label: label.to_owned(),
             names: &["name"],
             kind: "name".to_owned(),
             unit: String::new(),
-            values: "a material of coefficients alone".to_owned(),
+            values: String::new(),
             minimum: None,
             above_minimum: false,
             maximum: None,

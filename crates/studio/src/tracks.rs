@@ -6,9 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use rayfold_scene::{Clause, Command, Curve, Field, Key, Kind, Mode, parse_curve};
+use rayfold_scene::{Command, Curve, Field, Key, Kind, Mode, parse_curve};
 use serde::{Deserialize, Serialize};
 
+use crate::clauses;
 use crate::line::{Line, written};
 use crate::tables::{Role, fields, role};
 use crate::values::{curve, tidy};
@@ -97,27 +98,8 @@ pub(crate) fn slots(line: &Line) -> Vec<Slot> {
     if command != Command::Material {
         return fields(command).flat_map(|(first, field)| of(first, field)).collect();
     }
-    let mut slots = Vec::new();
-    let mut at = 0;
-    while let Some(word) = words.parameters.get(at) {
-        at += 1;
-        let Some(clause) = Clause::from_name(line.word(word)) else { continue };
-        if clause == Clause::Image {
-            // The width of a flat picture stands behind the file and the way.
-            let is_flat =
-                words.parameters.get(at + 1).is_some_and(|word| line.word(word).eq_ignore_ascii_case("flat"));
-            for field in clause.form().fields.iter().filter(|_| is_flat) {
-                slots.extend(of(at + 2, field));
-            }
-            at += 2;
-            continue;
-        }
-        for field in clause.form().fields {
-            slots.extend(of(at, field));
-            at += field.names.len();
-        }
-        at += usize::from(clause.form().ends_with.is_some());
-    }
+    let mut slots: Vec<_> =
+        clauses::numbers(line).into_iter().flat_map(|(first, field)| of(first, field)).collect();
     slots.retain(|slot| slot.number < words.parameters.len());
     slots
 }

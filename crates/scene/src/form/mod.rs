@@ -45,6 +45,8 @@ pub struct Form {
     surface: Option<usize>,
     /// Whether the numbers of the surface may be omitted together.
     may_be_bare: bool,
+    /// The words among the numbers of a clause.
+    pub words: Option<Words>,
     /// The words that may stand behind the numbers, each with what belongs to it.
     pub options: &'static [&'static str],
     /// The count of numbers at the start that are never curves.
@@ -80,6 +82,17 @@ pub enum Names {
     Materials,
     /// The names of groups.
     Groups,
+}
+
+/// The words among the numbers of a clause: one before them, and one behind them.
+#[derive(Debug)]
+pub struct Words {
+    /// The word before the numbers.
+    pub before: Field,
+    /// The only value of `before` behind which there are more words and numbers.
+    pub with_numbers: &'static str,
+    /// The word behind the numbers.
+    pub behind: Field,
 }
 
 /// A parameter of a command: a number or the components of a vector.
@@ -247,6 +260,7 @@ impl Form {
             most,
             surface,
             may_be_bare: false,
+            words: None,
             options: &[],
             fixed: 0,
             usage: None,
@@ -265,6 +279,11 @@ impl Form {
             None => 0,
         };
         Self { surface: Some(surface), may_be_bare: true, ..self }
+    }
+
+    /// Adds words before and behind the numbers.
+    pub(crate) const fn with_words(self, words: Words) -> Self {
+        Self { words: Some(words), ..self }
     }
 
     /// Adds words that may stand behind the numbers.
@@ -406,6 +425,19 @@ impl Form {
     pub(crate) fn number(&self, i: usize) -> (&'static str, &'static Field) {
         let number = self.numbers().nth(i);
         number.unwrap_or_else(|| unreachable!("`{}` has no number {i}", self.name))
+    }
+
+    /// Returns all parameters in the order of the line, those that are words among the numbers included.
+    pub fn parameters(&self) -> impl Iterator<Item = &Field> {
+        let (before, behind) = self.words.as_ref().map(|words| (&words.before, &words.behind)).unzip();
+        before.into_iter().chain(self.fields).chain(behind)
+    }
+
+    /// Returns the parameters of a line that begins with this word behind the name in quotes.
+    pub fn parameters_behind(&self, first: &str) -> impl Iterator<Item = &Field> {
+        let is_alone =
+            self.words.as_ref().is_some_and(|words| !words.with_numbers.eq_ignore_ascii_case(first));
+        self.parameters().take(if is_alone { 1 } else { usize::MAX })
     }
 
     /// Returns the range of field `i`'s numbers among all.

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::image::Image;
+use super::image::{AXES, Image, MAPS};
 use super::invalid::{Faults, InvalidValue, Parameter, finite, positive};
 use super::material::{Coefficients, Finish, Glass, Material, Pattern, Rough, Shine, Weight};
 use super::surface::{AMBIENT, DIFFUSE, MIRROR};
-use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Quotes, Subject, Values};
+use crate::form::{Constraint, Field, Form, Kind, Names, Numbers, Presence, Quotes, Subject, Values, Words};
 
 /// The command that defines a material.
 pub(crate) const MATERIAL: Form = Form::new("Material", &[]).with_subject(Subject::Defines(Names::Materials));
@@ -45,8 +45,18 @@ macro_rules! clauses {
 
 const SIZE: &[Field] = &[Field::new(Parameter::CellSize, &["s"], Kind::Length, Values::Positive)];
 
-const WIDTH: &[Field] = &[Field::new(Parameter::CellSize, &["s"], Kind::Length, Values::Positive)
+const WIDTH: &[Field] = &[Field::new(Parameter::PictureWidth, &["s"], Kind::Length, Values::Positive)
     .optional("stands behind `flat` alone")];
+
+const AXIS_WORDS: [&str; 3] = [AXES[0].0, AXES[1].0, AXES[2].0];
+
+/// Only a flat picture has a width and axes.
+const IMAGE_WORDS: Words = Words {
+    before: Field::new(Parameter::PictureMap, &["map"], Kind::Word, Values::OneOf(&MAPS)),
+    with_numbers: MAPS[1],
+    behind: Field::new(Parameter::PictureAxes, &["axes"], Kind::Word, Values::OneOf(&AXIS_WORDS))
+        .optional(AXIS_WORDS[0]),
+};
 
 const WHOLE_MIRROR: &[Field] = &[Field { presence: Presence::Required, ..MIRROR }];
 const SHINE: &[Field] = &[
@@ -74,7 +84,7 @@ clauses! {
     Stripes: Form::new("stripes", SIZE).ending_with(Names::Materials), "Another material in every other stripe along x.";
     Noise: Form::new("noise", SIZE).ending_with(Names::Materials), "Another material in a random pattern.";
     Gradient: Form::new("gradient", ENDS).with(&[Constraint::Differ(0, 1)]).ending_with(Names::Materials), "Another material from height a to height b.";
-    Image: Form::new("image", WIDTH).with_subject(Subject::Quotes(Quotes::File)).with_usage("image \"FILE\" uv or flat s [xy or xz or zy] or ball"), "A picture as a factor of ambient and diffuse.";
+    Image: Form::new("image", WIDTH).with_subject(Subject::Quotes(Quotes::File)).with_words(IMAGE_WORDS).with_usage("image \"FILE\" uv or flat s [xy or xz or zy] or ball"), "A picture as a factor of ambient and diffuse.";
     Own: Form::new("own", &[]), "The colours of a model's file as factors.";
     Glow: Form::new("glow", GLOW), "The light that the surface gives off.";
     Rough: Form::new("rough", ROUGH), "The roughness of mirror and glass.";
@@ -142,7 +152,7 @@ impl Clauses {
             // The picture is added on its own.
             Clause::Image => {
                 if let Some(width) = numbers.optional_number() {
-                    positive(Parameter::CellSize, width)?;
+                    positive(Parameter::PictureWidth, width)?;
                 }
             }
             Clause::Own => self.finish.own = true,

@@ -45,7 +45,7 @@ impl Image {
     /// Fails if its width is not positive or not finite.
     pub fn new(file: PictureFile, map: ImageMap) -> Result<Self, InvalidValue> {
         if let ImageMap::Flat(width, _) = map {
-            positive(Parameter::CellSize, width)?;
+            positive(Parameter::PictureWidth, width)?;
         }
         Ok(Self { file, map })
     }

@@ -232,6 +232,12 @@ pub enum Parameter {
     Roughness,
     /// The size of a pattern's cells.
     CellSize,
+    /// The way in which a picture lies on a surface.
+    PictureMap,
+    /// The width of a picture on a surface.
+    PictureWidth,
+    /// The axes of a picture on a surface.
+    PictureAxes,
     /// The start of a gradient.
     GradientStart,
     /// The end of a gradient.
@@ -311,6 +317,9 @@ impl fmt::Display for Parameter {
             Self::Glow => "the glow",
             Self::Roughness => "the roughness a",
             Self::CellSize => "the size s",
+            Self::PictureMap => "the mapping",
+            Self::PictureWidth => "the width s",
+            Self::PictureAxes => "the axes",
             Self::GradientStart => "the start a",
             Self::GradientEnd => "the end b",
             Self::Tone => "the tone",

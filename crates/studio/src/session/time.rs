@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use rayfold_scene::{Command, Mode, Quotes, Subject, unquoted_word};
+use rayfold_scene::{Mode, Quotes, Subject, unquoted_word};
 
+use super::fields::subject_word;
 use super::held_keys::HeldKeys;
 use super::hold::Held;
 use super::viewport::picture_of;
@@ -13,12 +14,11 @@ use crate::error::words;
 use crate::frame::Frame;
 use crate::handles::{Handle, HandleKind};
 use crate::line::Line;
-use crate::materials;
 use crate::project::Project;
 use crate::protocol::{Ghost, Inspected, ServerMessage, Switch, TimeState, TimelineEdit};
 use crate::silhouette::View;
 use crate::source_map::SourceMap;
-use crate::tables::{FieldTable, title};
+use crate::tables::title;
 use crate::tracks::{self, Copied, Tracks};
 use crate::values::{Keying, Values, curve};
 use crate::view::Projection;
@@ -218,17 +218,14 @@ impl Session {
                 .subject()
                 .filter(|_| form.subject == Some(Subject::Quotes(Quotes::Words)))
                 .and_then(unquoted_word),
-            fields: if values.command == Command::Material {
-                clause_fields(line, &materials::plain_names(self.file_lines(project), at))
-            } else {
-                Vec::new()
-            },
+            fields: self.own_fields(project, at),
             words: words
                 .parameters
                 .iter()
                 .enumerate()
                 .filter(|(number, _)| line.parameter(&words, *number).is_none() && !curves.contains(number))
                 .map(|(number, word)| (number, line.word(word).to_owned()))
+                .chain(subject_word(line))
                 .collect(),
             curves,
         })
@@ -322,20 +319,4 @@ impl Session {
         };
         (-GHOSTS..=GHOSTS).filter(|after| *after != 0).filter_map(one).collect()
     }
-}
-
-/// Returns the parameters of a material's clauses, in the order of its line.
-fn clause_fields(line: &Line, others: &[String]) -> Vec<FieldTable> {
-    let mut fields: Vec<FieldTable> = Vec::new();
-    for slot in tracks::slots(line) {
-        if fields.last().is_none_or(|last| last.first != slot.first) {
-            fields.push(FieldTable::new(slot.first, slot.field));
-        }
-    }
-    for (clause, span) in materials::clauses(line) {
-        if clause.form().ends_with.is_some() {
-            fields.push(FieldTable::of_material(span.end - 1, others.to_vec()));
-        }
-    }
-    fields
 }

@@ -114,6 +114,28 @@ test("what is typed while an object is dragged and a file changes is kept", asyn
   studio.check();
 });
 
+test("deleted text joins lines, and leaves no style that the page's policy refuses", async (t) => {
+  const studio = await open(t, { text: "Screen 320 180   # wide\n# ab\nSphere 1 2\nTrace\n", blank: true });
+  const { page, path } = studio;
+  const holds = (text) => until(async () => readFileSync(path, "utf8") === text && (await seenLines(page)).join("\n") === text);
+  await goLine(page, 2);
+  await page.keyboard.press("Backspace");
+  await holds("Screen 320 180   # wide# ab\nSphere 1 2\nTrace\n");
+  await page.keyboard.press("End");
+  for (let times = 0; times < 4; times += 1) await page.keyboard.press("Delete");
+  await holds("Screen 320 180   # wide# abere 1 2\nTrace\n");
+  await page.keyboard.press("Shift+ArrowDown");
+  await page.keyboard.press("Backspace");
+  // Several carets delete each their own character.
+  await page.keyboard.press("Control+Home");
+  await page.keyboard.insertText("\u{1F600}b\ncd\n");
+  await page.keyboard.press("ArrowUp");
+  await page.keyboard.press("Control+Alt+ArrowUp");
+  await page.keyboard.press("Delete");
+  await until(() => readFileSync(path, "utf8").startsWith("b\nd\nScreen"));
+  studio.check();
+});
+
 test("several carets, moved lines and line ends of both kinds change no other byte", async (t) => {
   const mixed = "\uFEFFScreen 320 180\r\n# a\n# b\r\n# c\nTrace";
   const studio = await open(t, { text: mixed, blank: true });
@@ -156,6 +178,8 @@ test("commands, clauses and names are completed from the parser's table", async 
   await page.keyboard.type("\n");
   await page.getByRole("listbox", { name: "Completions" }).waitFor({ state: "detached" });
   await until(() => readFileSync(path, "utf8").includes("\nSphere 1  0 0 0  gold\nMaterial blue mir\n\nSphere 1 0 1 0"));
+  await page.keyboard.type('Material blue image "a b.png" f');
+  await page.getByRole("listbox", { name: "Completions" }).getByRole("option", { name: /^flat/ }).waitFor();
   studio.check();
 });
 

@@ -40,7 +40,7 @@ export function Inspector(): JSX.Element {
   const line = inspected ? lines.value[inspected.line] : undefined;
   const all = inspected && inspected.fields.length > 0 ? inspected.fields : (table?.fields ?? []);
   // After the name of a material there are no numbers.
-  const fields = inspected?.material ? all.filter((field) => field.first < inspected.values.length - 1) : all;
+  const fields = inspected?.material ? all.filter((field) => field.words ?? field.first < inspected.values.length - 1) : all;
   const allLocked = selection.value.every((at) => state.value?.locked.includes(at));
   const faults = state.value?.faults.some((fault) => fault.needsSamples && (!inspected || fault.line === inspected.line || table?.role === "light"));
   return (
@@ -225,7 +225,7 @@ function SceneSettings(): JSX.Element | null {
                   <Icon of={Trash2} />
                 </button>
               </h3>
-              {fields.map((field) => (
+              {(inspected.fields[0] ? inspected.fields : fields).map((field) => (
                 <FieldRow key={field.first} field={field} inspected={inspected} />
               ))}
             </section>
@@ -321,12 +321,15 @@ function FieldRow({ field, inspected }: FieldProps): JSX.Element {
 
 /** A parameter that is a word: a name, or one of the language's words. */
 function WordRow({ field, inspected }: FieldProps): JSX.Element {
+  const now = inspected.words[field.first]?.toLowerCase();
+  // An omitted word is the first one.
+  const word = field.words?.find((word) => word.toLowerCase() === now) ?? (field.optional ? field.words?.[0] : "");
   return (
     <p class="field">
       <span class="label">{wordOf(field.label)}</span>
       <select
         aria-label={wordOf(field.label)}
-        value={inspected.words[field.first] ?? ""}
+        value={word}
         onChange={(event) => ask({ ask: "word", line: inspected.line, number: field.first, word: event.currentTarget.value })}
       >
         {field.words?.map((word) => (

@@ -46,8 +46,9 @@ let timer = 0;
 effect(() => {
   const now = found.value;
   const old = defined.peek();
-  if (now.length === old.length && now.every((of, at) => of.mark === old[at]?.mark && of.at === old[at].at && of.name === old[at].name)) return;
+  // A change that was taken back is not shown later.
   clearTimeout(timer);
+  if (now.length === old.length && now.every((of, at) => of.mark === old[at]?.mark && of.at === old[at].at && of.name === old[at].name)) return;
   timer = setTimeout(() => (defined.value = now), old.length === 0 ? 0 : REST);
 });
 

@@ -3,8 +3,8 @@
 
 import * as cm from "@codemirror/commands";
 import { gotoLine, search, searchKeymap } from "@codemirror/search";
-import { Compartment, EditorState, type Extension, Text, Transaction } from "@codemirror/state";
-import { crosshairCursor, drawSelection, dropCursor, EditorView, highlightSpecialChars, keymap, lineNumbers, rectangularSelection } from "@codemirror/view";
+import { Compartment, EditorSelection, EditorState, type Extension, Text, Transaction } from "@codemirror/state";
+import { drawSelection, dropCursor, EditorView, highlightSpecialChars, keymap, lineNumbers, rectangularSelection } from "@codemirror/view";
 import { effect } from "@preact/signals";
 
 import { actions } from "../actions";
@@ -76,13 +76,22 @@ const short = EditorState.changeFilter.of((transaction) => {
   return isShort;
 });
 
-/** Typing over a selection. A browser would keep the style of the removed text as a style attribute. */
+/** Typing over a selection, and deletions. A browser would keep the style of removed text as a style attribute. */
 const typeOver = EditorView.domEventHandlers({
   beforeinput: (event, view) => {
     const { data, inputType } = event as InputEvent;
-    if (inputType !== "insertText" || !data || view.composing || view.state.readOnly || view.state.selection.main.empty) return false;
+    const { selection: now, readOnly } = view.state;
+    const forward = inputType === "deleteContentForward";
+    const isTyped = inputType === "insertText" && data && !now.main.empty;
+    if (view.composing || readOnly || !(isTyped || forward || inputType === "deleteContentBackward")) return false;
     event.preventDefault();
-    view.dispatch(view.state.replaceSelection(data), { userEvent: "input.type", scrollIntoView: true });
+    const change = isTyped
+      ? view.state.replaceSelection(data)
+      : view.state.changeByRange((range) => {
+          const gone = EditorSelection.range(range.anchor, (range.empty ? view.moveByChar(range, forward) : range).head);
+          return { changes: gone, range: EditorSelection.cursor(gone.from) };
+        });
+    view.dispatch(change, { userEvent: isTyped ? "input.type" : "delete", scrollIntoView: true });
     return true;
   },
 });
@@ -113,7 +122,6 @@ function extensions(text: Sync): Extension {
     highlightSpecialChars(),
     dropCursor(),
     rectangularSelection(),
-    crosshairCursor(),
     search({ top: true }),
     keymap.of([...keys, ...searchKeymap]),
     follow,

@@ -135,15 +135,16 @@ export function read(text: string): { readonly words: readonly Word[]; readonly 
     const clause = isMaterial ? clauses.value.get(word.toLowerCase()) : undefined;
     if (clause) {
       add("word", { ...NOTHING, entry: clause });
-      given = 0;
-      next = { ...slot(clause, 0), clauses: true };
+      // A name in quotes comes before the first parameter.
+      given = clause.subject ? -1 : 0;
+      next = { ...slot(clause, given), clauses: true };
       continue;
     }
     const isNumber = /^[-+.\d]/.test(word) && !Number.isNaN(Number(word));
     add(word.startsWith("(") ? "curve" : isNumber ? "number" : "name", next);
     if (next.entry) {
       given += 1;
-      next = isNumber || word.startsWith("(") ? { ...slot(next.entry, given), clauses: isMaterial } : { ...NOTHING, clauses: isMaterial };
+      next = isNumber || given === 0 || next.parameter?.words || word.startsWith("(") ? { ...slot(next.entry, given), clauses: isMaterial } : { ...NOTHING, clauses: isMaterial };
     }
   }
   return { words, next };

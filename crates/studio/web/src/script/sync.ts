@@ -31,9 +31,9 @@ export interface Sync {
 export function sync(): Sync {
   let synced = Text.empty;
   let [file, version] = [0, 0];
-  /** Changes that are not shown yet, and when the last ones were shown. */
+  /** Changes that are not shown yet, and the timer that runs for a while after some were shown. */
   let waiting: Change[] = [];
-  let [shown, timer] = [-APART, 0];
+  let timer = 0;
 
   const send = (before: Text, changes: ChangeSet, after: Text): void => {
     ask({ ask: "edit", file, version, changes: lineChanges(before, changes, after) });
@@ -73,7 +73,7 @@ export function sync(): Sync {
       send(before, update.changes, after);
       before = after;
     }
-    shown = performance.now();
+    timer = window.setTimeout(() => show(view), APART);
   };
 
   const hear = (view: EditorView, tell: ServerMessage, reset: (text: Text) => void): void => {
@@ -96,9 +96,7 @@ export function sync(): Sync {
     waiting.push({ splices: tell.splices, text: tell.text, count: lines.value.length });
     // A drag changes numbers within lines.
     const isDrag = tell.splices.every((splice) => splice.removed === splice.lines.length);
-    const left = shown + APART - performance.now();
-    if (!isDrag || left <= 0) show(view);
-    else timer ||= window.setTimeout(() => show(view), left);
+    if (!isDrag || timer === 0) show(view);
   };
   return { extension, hear };
 }
