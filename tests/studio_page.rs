@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The files of tests, in the page's folder.
-const TESTS: [&str; 12] = [
+const TESTS: &[&str] = &[
     "tests/logic.mjs",
     "tests/site-standing.mjs",
     "tests/site-cost.mjs",
@@ -35,7 +35,7 @@ const FIREFOX: [&str; 2] = ["firefox-esr", "firefox"];
 const NODE: u32 = 20;
 
 /// The tests of the page without a server, alone and beside the bucket of `rayfold dev`.
-const OF_THE_SITE: [&str; 3] = ["tests/site.mjs", "tests/site-disk.mjs", "tests/site-runs.mjs"];
+const OF_THE_SITE: &[&str] = &["tests/site.mjs", "tests/site-disk.mjs", "tests/site-runs.mjs"];
 const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
 
 #[test]
