@@ -113,7 +113,7 @@ pub(crate) fn initial(form: &Form) -> Vec<String> {
     form.words.iter().map(|words| words.with_numbers.to_owned()).chain(numbers).collect()
 }
 
-fn word<'a>(line: &'a Line, at: usize) -> &'a str {
+fn word(line: &Line, at: usize) -> &str {
     let word = line.words().and_then(|words| words.parameters.get(at).cloned());
     word.map_or("", |word| line.word(&word))
 }
