@@ -48,7 +48,7 @@ fn the_page_does_in_a_browser_what_it_promises() {
     let program = Path::new(env!("CARGO_BIN_EXE_rayfold"));
     let mut node = Command::new("node");
     // One after the other, because each uses all cores.
-    node.args(["--test", "--test-reporter=spec", "--test-concurrency=2"]).args(TESTS);
+    node.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]).args(TESTS);
     let site = match site() {
         Ok(site) => Some(node.args(OF_THE_SITE).env("SITE", site)).is_some(),
         Err(missing) => {

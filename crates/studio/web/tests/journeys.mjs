@@ -36,6 +36,18 @@ const isChosen = (subject) => subject?.role === "refers" || subject?.of === "fil
 /** Whether lines of a command are in the list of the scene. */
 const isListed = ({ name, material_instead_from: surface }) => surface !== undefined || ["Look", "Camera", "Use", "Ilight", "Plight"].includes(name);
 
+/** The number of controls, once it stays the same: those of an earlier clause go when the program has answered. */
+async function settled(controls) {
+  let last = -1;
+  await until(async () => {
+    const before = last;
+    last = await controls.count();
+    if (last !== before) await new Promise((resolve) => setTimeout(resolve, 200));
+    return last === before;
+  });
+  return last;
+}
+
 /** A folder with a script, models and pictures, and the page of the script. */
 async function start(t, hand) {
   const studio = await open(t, { text: SCENE, size: [940, 700] });
@@ -51,11 +63,13 @@ async function start(t, hand) {
   /** The index of the last line of a command. Of two with one name, one has a name in quotes. */
   const find = async ({ name, subject }) =>
     (await lines()).findLastIndex((line) => words(line)[0] === name && (subject?.role === "quotes") === /^"/.test(words(line)[1]));
-  /** Waits until the script is another one, and returns it; `null` if it stays. */
+  /** Waits until the script is another one and stays so, as a drag has several steps, and returns it; `null` if there is none. */
   const changed = async (before) => {
-    for (const end = Date.now() + SOON; Date.now() < end; await new Promise((resolve) => setTimeout(resolve, 10))) {
+    let last = before;
+    for (const end = Date.now() + SOON; Date.now() < end; await new Promise((resolve) => setTimeout(resolve, 40))) {
       const now = await script();
-      if (now !== before) return now;
+      if (now !== before && now === last) return now;
+      last = now;
     }
     return null;
   };
@@ -175,7 +189,7 @@ function mouse(page, inspector) {
       const folded = within.locator(".field [aria-expanded=false]");
       while ((await folded.count()) > 0) await click(folded.first());
       const all = within.locator(CONTROL);
-      for (let at = (await all.count()) - 1; at >= 0; at -= 1) {
+      for (let at = (await settled(all)) - 1; at >= 0; at -= 1) {
         const control = all.nth(at);
         const isList = (await control.evaluate(({ tagName }) => tagName)) === "SELECT";
         yield (up) => (isList ? choose(control, up ? 1 : -1) : drag(control, up ? 12 : -12));
@@ -209,13 +223,16 @@ function keyboard(page, inspector) {
     const dialog = page.getByRole("dialog", { name: "Search" });
     await dialog.waitFor();
     await page.keyboard.type(note ?? text);
-    let meant = -1;
+    // What is found changes while the page follows the typing: each step looks anew.
     await until(async () => {
-      const rows = await dialog.getByRole("option").evaluateAll((rows) => rows.map((row) => [...row.children].map(({ textContent }) => textContent)));
-      meant = rows.findIndex(([name, of]) => name.startsWith(text) && (note === undefined || of === note));
-      return meant >= 0;
-    }, SOON).catch(() => assert.fail(`the search does not find ${text} ${note}`));
-    for (let down = 0; down < meant; down += 1) await press("ArrowDown");
+      const rows = await dialog.getByRole("option").evaluateAll((rows) =>
+        rows.map((row) => ({ texts: [...row.children].map(({ textContent }) => textContent), isChosen: row.ariaSelected === "true" })),
+      );
+      const meant = rows.findIndex(({ texts: [name, of] }) => name.startsWith(text) && (note === undefined || of === note));
+      const isChosen = meant >= 0 && rows[meant].isChosen;
+      if (meant >= 0 && !isChosen) await press(rows.findIndex((row) => row.isChosen) < meant ? "ArrowDown" : "ArrowUp");
+      return isChosen && (await dialog.getByRole("combobox").inputValue()) === (note ?? text);
+    }).catch(() => assert.fail(`the search does not find ${text} ${note}`));
     await press("Enter");
     await dialog.waitFor({ state: "detached" });
   };
@@ -245,8 +262,12 @@ function keyboard(page, inspector) {
       await press("Enter");
     },
     settings: async () => {
-      if (await page.locator(".item[aria-selected=true]").count()) await search("Clear the selection");
-      await until(async () => (await page.locator(".item[aria-selected=true]").count()) === 0);
+      const selected = page.locator(".item[aria-selected=true]");
+      // What was added is selected a moment later.
+      await until(async () => {
+        if ((await settled(selected)) > 0) await search("Clear the selection");
+        return (await settled(selected)) === 0;
+      });
     },
     reach: async (line) => {
       await go(page.getByRole("listbox"));
@@ -270,6 +291,7 @@ function keyboard(page, inspector) {
           const { tagName, value } = element;
           return { isIn: part.contains(element), isControl: element.matches(control), tagName, value };
         }, CONTROL);
+      await settled(within.locator(CONTROL));
       await go(within.locator(CONTROL).last());
       for (;;) {
         const now = await reached();

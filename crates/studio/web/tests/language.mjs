@@ -1,5 +1,4 @@
-// All of the language is on the page: each parameter of each command and clause is reached there, and what only the table
-// of the language says decides which those are. A new command or parameter that the page cannot reach fails here.
+// Clauses, materials, cameras and lights on the page. The journeys (`journeys.mjs`) change each parameter of the language.
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -24,95 +23,6 @@ const SCENE = "Screen 64 36\nLook 0 2 9  0 0.5 0  40\nIlight 1 1 1  1 -1 -1\nTra
 
 /** The words of a line before its comment, a curve being one. */
 const words = (line) => line.split("#")[0].match(/\([^)]*\)|[^\s,]+/g) ?? [];
-
-/** Changes every number that the inspector shows within a part of the page. */
-async function changeAll(studio, within) {
-  const { page } = studio;
-  const folded = within.locator("[aria-expanded=false]");
-  // The page may unfold or draw anew in between, so a click may find nothing.
-  await until(async () => {
-    await page.waitForTimeout(100);
-    if ((await folded.count()) === 0) return true;
-    await folded.first().click({ timeout: 2000 }).catch(() => {});
-    return false;
-  });
-  const count = await within.getByRole("spinbutton").count();
-  for (let at = 0; at < count; at += 1) {
-    const field = within.getByRole("spinbutton").nth(at);
-    const name = await field.getAttribute("aria-label");
-    if (/^sun (azimuth|height)$/.test(name)) continue;
-    const old = await field.inputValue();
-    const now = Number(old);
-    await field.fill(String(Number.isInteger(now) ? now + 1 : now / 2));
-    await field.press("Enter");
-    await page.waitForTimeout(60);
-  }
-}
-
-test("every parameter of every command is reached on the page", async (t) => {
-  const language = table();
-  assert.ok(language.commands.length > 20);
-  const studio = await open(t, { text: SCENE, size: [1440, 900] });
-  writeFileSync(join(studio.folder, "corner.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  addPicture(studio.folder);
-  const { page } = studio;
-  const inspector = page.locator(".panel.inspector");
-  const line = async (command) => (await studio.saved()).split("\n").findLast((line) => words(line)[0] === command);
-  for (const { name, parameters, subject } of language.commands) {
-    if (parameters.length === 0) continue;
-    await page.locator(".viewport").focus();
-    await page.keyboard.press("Escape");
-    let within = inspector;
-    const tile = page.locator(".tile", { has: page.getByText(name, { exact: true }) });
-    const isQuoted = subject?.role === "quotes";
-    if (subject && !isQuoted) {
-      // What refers to a name is made with it: here a group, from an object.
-      await page.locator(".tile", { hasText: "Sphere" }).click();
-      await page.locator(".item.object[aria-selected=true]").waitFor();
-      await page.locator(".viewport").focus();
-      await page.keyboard.press("Control+g");
-      await page.locator(".item.use[aria-selected=true]").waitFor();
-    } else if (name === "Camera" || name === "Look") {
-      await page.getByLabel("camera", { exact: true }).selectOption(name);
-      await until(async () => (await line(name)) !== undefined);
-      await page.getByRole("button", { name: "Edit", exact: true }).first().click();
-    } else if (await tile.count()) {
-      // A mesh is made of a model beside the script, a text of letters.
-      await tile.click();
-    } else if (!isQuoted && (await page.locator(`.tile[title^="${name}:"]`).count())) {
-      await page.locator(`.tile[title^="${name}:"]`).click();
-    } else {
-      // Of two settings with one name the page shows the word that one of them takes.
-      const title = isQuoted ? `${name} "FILE"` : name;
-      const chip = inspector.locator(`.chips button[title^='${title}:']`);
-      within = inspector.locator(`section[title='${title}']`);
-      await until(async () => (await within.count()) > 0 || (await chip.click({ timeout: 2000 }).catch(() => {}), false));
-    }
-    await until(async () => (await line(name)) !== undefined);
-    if (within === inspector) await inspector.locator(".subject .note", { hasText: name }).waitFor();
-    const before = words(await line(name)).slice(subject ? 2 : 1);
-    const numbers = parameters.filter(({ words }) => !words).flatMap(({ names }) => names).length;
-    if (numbers > 0) await within.getByRole("spinbutton").or(within.locator("[aria-expanded=false]")).first().waitFor();
-    await changeAll(studio, within);
-    // Angles of a sun are the direction in other words.
-    const shown = () => within.getByRole("spinbutton").evaluateAll((all) => all.filter(({ ariaLabel }) => !/^sun (azimuth|height)$/.test(ariaLabel)).length);
-    await until(async () => (await shown()) === numbers).catch(async () => assert.fail(`${name}: ${await shown()} numbers on the page, not ${numbers}`));
-    for (const { words: allowed } of parameters.filter(({ words }) => words)) {
-      const select = within.locator("select").first();
-      const now = await select.inputValue();
-      await select.selectOption(allowed.find((word) => word !== now));
-    }
-    await until(async () => {
-      const after = words(await line(name)).slice(subject ? 2 : 1);
-      const count = parameters.flatMap(({ names }) => names).length;
-      return after.length === count && after.every((word, at) => word !== before[at]);
-    }).catch(async () => assert.fail(`${name}: ${before} became ${await line(name)}`));
-    // What follows starts from a sound scene.
-    const undo = page.getByRole("button", { name: "Undo" });
-    while (await undo.isEnabled()) await undo.evaluate((button) => button.click());
-  }
-  studio.check();
-});
 
 test("every clause of a material is switched on and off, and a sphere shows it", async (t) => {
   const { clauses } = table();
