@@ -105,9 +105,13 @@ function mouse(page, inspector) {
   const sight = async (found) => {
     let place = null;
     await until(async () => {
-      place = await found.evaluate((element) => {
+      place = await found.evaluate(async (element) => {
         const { left, top, width, height } = element.getBoundingClientRect();
         const [x, y] = [left + width / 2, top + height / 2];
+        // What moves is not pressed: a press would meet what comes to its place.
+        await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+        const later = element.getBoundingClientRect();
+        if (later.left !== left || later.top !== top) return null;
         const seen = document.elementFromPoint(x, y);
         if (seen && (element.contains(seen) || seen.closest("button, label") === element)) return { x, y };
         let list = element.parentElement;
@@ -400,6 +404,7 @@ for (const hand of [mouse, keyboard]) {
       if (isBlank) continue;
       await by.press(chips.nth(chip));
       await until(async () => !(await has()));
+      await chips.nth(chip).and(page.locator("[aria-pressed=false]")).waitFor();
     }
     assert.equal(await studio.saved(), (await lines()).join("\n"));
     studio.check();

@@ -67,6 +67,8 @@ export function Inspector(): JSX.Element {
           <Button action={{ ...actions.none, icon: Settings2 }} label="Scene settings" />
         </div>
       )}
+      {table?.role === "camera" && <Button action={actions.script} label="Look through" wide />}
+      {inspected && table?.role === "material" && <Clauses inspected={inspected} />}
       {faults && (
         <p class="note soft">
           Soft shadows and blur need several samples per pixel; there is one.{" "}
@@ -75,8 +77,6 @@ export function Inspector(): JSX.Element {
           </button>
         </p>
       )}
-      {table?.role === "camera" && <Button action={actions.script} label="Look through" wide />}
-      {inspected && table?.role === "material" && <Clauses inspected={inspected} />}
       {count > 1 && (
         <p class="field">
           <span class="note">{count} lines are selected.</span>
@@ -138,13 +138,12 @@ function MaterialRow({ name, line }: { readonly name: string; readonly line: num
   );
 }
 
-/** The clauses of a material as switches, and its sphere. */
+/** The clauses of a material as switches, and its sphere. The switches stay where they are when the sphere comes. */
 function Clauses({ inspected }: { readonly inspected: Inspected }): JSX.Element {
   const has = new Set(Object.values(inspected.words).map((word) => word?.toLowerCase()));
-  const sphere = sphereOf(inspected.line);
   return (
     <div class="card">
-      {sphere && <Drawn src={sphere} width={72} height={72} />}
+      <Drawn src={sphereOf(inspected.line)} width={72} height={72} />
       <div class="chips" role="group" aria-label="Clauses">
         {language.value?.clauses.map(({ name, about }) => (
           <button
