@@ -55,8 +55,8 @@ test(`${EDITS} random edits, undone and redone, are byte-exact`, async (t) => {
     },
     number: async () => {
       const found = await one(fields);
-      if (!(await found?.isVisible())) return;
-      await found.focus();
+      const isFocused = (await found?.isVisible()) && (await found.focus().then(() => true, () => false));
+      if (!isFocused) return;
       await page.keyboard.type(String(below(300) / 100));
       await page.keyboard.press("Enter");
     },
