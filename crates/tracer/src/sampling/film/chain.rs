@@ -3,6 +3,7 @@
 
 use rayfold_scene::{Samples, Tone};
 
+use super::curve::SlopeBounds;
 use super::pixel::Pixel;
 
 /// Samples a pixel that are looked at before any decision, and where variances begin to say something.
@@ -62,6 +63,8 @@ pub(super) struct SampleSchedule {
     even: f64,
     /// The largest variance of the [`SECOND`] samples of a pixel that does not vary.
     still: f64,
+    /// With the sRGB curve, whose powers take long.
+    slopes: Option<Box<SlopeBounds>>,
 }
 
 /// The conclusion from the samples of a pixel.
@@ -94,7 +97,10 @@ impl SampleSchedule {
         let calm = calm.take_while(|&calm| calm < MAX_DEVIATION && !is_unclamped);
         let calm = calm.map(|calm| calm * calm).collect();
         let even = limit(EVEN, 1);
-        Self { samples, step, tone, is_unclamped, limits, calm, even, still: limit(VARYING, SECOND) }
+        let still = limit(VARYING, SECOND);
+        let slopes = (tone == Tone::Srgb && !is_unclamped && samples.error() > 0.0)
+            .then(|| Box::new(SlopeBounds::new()));
+        Self { samples, step, tone, is_unclamped, limits, calm, even, still, slopes }
     }
 
     /// Whether samples are not clamped.
@@ -157,10 +163,10 @@ impl SampleSchedule {
     pub(super) fn verdict(&self, pixel: &Pixel, density: usize) -> Verdict {
         let count = pixel.count();
         let is_number = count == self.most() || count.is_power_of_two();
-        let variance = if is_number { self.variance(pixel) } else { 0.0 };
-        let is_asked = is_number && count < self.most();
         // No number that is asked about is above the largest power of two.
         let limit = self.limits[density][count.trailing_zeros() as usize % self.limits[density].len()];
+        let variance = if is_number { self.variance(pixel, limit) } else { 0.0 };
+        let is_asked = is_number && count < self.most();
         let reach = if self.is_unclamped {
             usize::from(is_asked && variance > LOUD * LOUD * limit)
         } else {
@@ -179,8 +185,18 @@ impl SampleSchedule {
         self.calm.len() + usize::from(self.is_unclamped)
     }
 
+    /// The variance of the samples of a pixel, or another number that is above and below the same of all with which a verdict
+    /// compares it.
     #[inline(always)]
-    fn variance(&self, pixel: &Pixel) -> f64 {
-        if self.is_unclamped { pixel.unclamped_variance(self.tone) } else { pixel.variance(self.tone) }
+    fn variance(&self, pixel: &Pixel, limit: f64) -> f64 {
+        if self.is_unclamped {
+            return pixel.unclamped_variance(self.tone);
+        }
+        let bounds = self.slopes.as_ref().and_then(|slopes| pixel.variance_bounds(slopes));
+        let compared = || self.calm.iter().chain([&limit, &self.even, &self.still]);
+        match bounds {
+            Some((least, most)) if !compared().any(|with| (least..=most).contains(with)) => least,
+            _ => pixel.variance(self.tone),
+        }
     }
 }

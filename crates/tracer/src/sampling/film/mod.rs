@@ -9,6 +9,7 @@
 mod bits;
 mod chain;
 mod cover;
+mod curve;
 mod density;
 mod first;
 mod floors;

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayfold_scene::Tone;
 
+use super::curve::{BENT, LINEAR, SlopeBounds, slope};
 use crate::parallel::CHANNELS;
 use crate::reference::encoded;
 
@@ -20,9 +21,8 @@ pub(crate) struct Pixel {
     count: u32,
 }
 
-/// The sRGB curve is a line up to here, and a power beyond it; by so much the power differs from 1.
-const LINEAR: f64 = 0.003_130_8;
-const BENT: f64 = 1.0 - 1.0 / 2.4;
+/// More than the rounding errors of a variance and of its bounds, as parts of them.
+const ROUNDED: f64 = 1e-5;
 
 /// The brightest sample that is not clamped, in parts of [`ONE`].
 const BRIGHTEST: f64 = (1u64 << 46) as f64;
@@ -135,6 +135,23 @@ impl Pixel {
         255.0 * 255.0 * sum / CHANNELS as f64
     }
 
+    /// Returns numbers between which the variance is with the sRGB curve, or `None` if it has to be computed.
+    pub(super) fn variance_bounds(&self, bounds: &SlopeBounds) -> Option<(f64, f64)> {
+        let of_count = 1.0 / f64::from(self.count);
+        let (mut least, mut most) = (0.0, 0.0);
+        for channel in 0..CHANNELS {
+            let mean = self.sum[channel] as f64 * of_count;
+            let spread = self.spread(channel);
+            if spread > 0.0 {
+                let (flat, steep) = bounds.of(mean / ONE, spread.sqrt() / ONE)?;
+                least += spread * flat * flat;
+                most += spread * steep * steep;
+            }
+        }
+        let scale = (255.0 * 255.0) / (ONE * ONE * CHANNELS as f64);
+        Some((scale * (1.0 - ROUNDED) * least, scale * (1.0 + ROUNDED) * most))
+    }
+
     /// The variance of its samples in squares of levels: the mean over the channels.
     pub(super) fn variance(&self, tone: Tone) -> f64 {
         let of_count = 1.0 / f64::from(self.count);
@@ -150,10 +167,4 @@ impl Pixel {
         }
         (255.0 * 255.0) / (ONE * ONE) * sum / CHANNELS as f64
     }
-}
-
-/// By how much the sRGB curve stretches differences of about `apart` there.
-fn slope(light: f64, apart: f64) -> f64 {
-    let (low, high) = ((light - 0.5 * apart).max(0.0), (light + 0.5 * apart).min(1.0));
-    if high - low < 1e-9 { 12.92 } else { (encoded(high) - encoded(low)) / (high - low) }
 }
