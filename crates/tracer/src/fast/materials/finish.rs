@@ -29,7 +29,7 @@ pub(crate) struct Finishes {
     /// The glow of each object; empty if none glows.
     glows: Vec<DVec3>,
     /// The square of the cosine from which the highlights of each object can be seen: [`NEVER`] without, and negative if they
-    /// can be seen from anywhere; empty if no object has any.
+    /// can be seen from anywhere.
     least_cosines: Vec<f32>,
     /// The mirror coefficients of each object, and whether its coefficients depend on the place of a hit; empty if they are not
     /// asked for: without patterns and rough mirrors.
@@ -68,8 +68,9 @@ impl Finishes {
             vec![]
         };
         let (center, scale) = (geometry.center, geometry.scale);
-        let has_rough = finishes().any(|finish| finish.rough.is_some());
-        let least_cosines = if has_highlights || has_rough {
+        // Looked up only where there is glass.
+        let is_glass = |finish: &Finish| finish.glass.is_some();
+        let least_cosines = if finishes().any(is_glass) {
             let light: f64 = scene.lights.iter().map(|light| light.color().abs().max_element()).sum();
             let of = |finish: &Finish| least_cosine(finish, light);
             map(&scene.objects, |object| object.material().finish().map_or(NEVER, of))
@@ -79,7 +80,7 @@ impl Finishes {
         let shine = |object: &Object| object.material().finish().and_then(|finish| finish.shine);
         let shines = if has_highlights { map(&scene.objects, shine) } else { vec![] };
         let is_painted = |object: &Object| object.material().finish().is_some_and(is_painted);
-        let mirrors = if has_patterns || has_rough {
+        let mirrors = if has_patterns || finishes().any(|finish| finish.rough.is_some()) {
             map(&scene.objects, |object| (object.material().mirror(), is_painted(object)))
         } else {
             vec![]

@@ -194,9 +194,11 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                     let towards = light.sun.towards(simd);
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
-                    let shines = glossy_lanes(simd, glossy, orders, (normal, towards, seen.direction));
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= scatters(simd, hits, at) | shines;
+                        let scatters;
+                        (scatters, shines) = shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if GLASS && !is_apart {
@@ -244,9 +246,11 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
                         }
                     };
                     let mut facing = cosine.simd_gt(zero);
-                    let shines = glossy_lanes(simd, glossy, orders, (normal, towards, seen.direction));
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= scatters(simd, hits, at) | shines;
+                        let scatters;
+                        (scatters, shines) = shows(simd, hits, at, glossy, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies
@@ -283,18 +287,24 @@ pub(crate) fn add_all_lights<S: Simd, E: Real, F: Features<E>, const EYE: bool, 
     );
 }
 
-/// Returns the hits of a packet that may show a highlight of what reaches them from a direction.
+/// Returns the hits of a packet that scatter light, and those that may show a highlight of what reaches them from a direction. Most
+/// glass does neither and needs no shadow rays.
 #[inline(always)]
-pub(crate) fn glossy_lanes<S: Simd, E: Real>(
+pub(crate) fn shows<S: Simd, E: Real>(
     simd: S,
+    hits: &Hits<E>,
+    at: usize,
     glossy: Option<&Finishes>,
-    orders: &[E],
     (normal, towards, direction): (Vec3<S, E>, Vec3<S, E>, Vec3<S, E>),
-) -> Mask<S, E> {
-    match glossy {
-        Some(finishes) => finishes.shines(simd, orders, normal, (towards, direction)),
+) -> (Mask<S, E>, Mask<S, E>) {
+    let shines = match glossy {
+        Some(finishes) => {
+            let orders = &hits.order.0[at..at + Lanes::<S, E>::LEN];
+            finishes.shines(simd, orders, normal, (towards, direction))
+        }
         None => no_lane::<S, E>(simd),
-    }
+    };
+    (scatters(simd, hits, at), shines)
 }
 
 /// Returns whether any hit scatters light.
@@ -313,9 +323,9 @@ pub(crate) fn show_light<S: Simd, E: Real>(simd: S, hits: &Hits<E>) -> bool {
     )
 }
 
-/// Returns the hits of a packet that scatter light. Most glass does not, and needs shadow rays only where it may show a highlight.
+/// Returns the hits of a packet that scatter light.
 #[inline(always)]
-pub(crate) fn scatters<S: Simd, E: Real>(simd: S, hits: &Hits<E>, at: usize) -> Mask<S, E> {
+fn scatters<S: Simd, E: Real>(simd: S, hits: &Hits<E>, at: usize) -> Mask<S, E> {
     let zero = constant::<S, E>(simd, 0.0);
     let diffuse = Vec3::<S, E>::load(simd, &hits.diffuse, at);
     diffuse.x.simd_ne(zero) | diffuse.y.simd_ne(zero) | diffuse.z.simd_ne(zero)

@@ -17,7 +17,7 @@ use crate::fast::rays::bounce::{Column, Columns, Hits, RayBatch, columns};
 use crate::fast::rays::packet::Ray;
 use crate::fast::shapes::Shape;
 use crate::fast::transport::hulls::{Cone, Hulls, Region};
-use crate::fast::transport::light::{Occluders, add_light, glossy_lanes, region, scatters, widened};
+use crate::fast::transport::light::{Occluders, add_light, region, shows, widened};
 use crate::fast::transport::search::{nearest, unoccluded};
 use crate::fast::transport::transmittance::{IncidentLight, Panes, Shadow};
 use crate::sampling::places::{in_ball, in_cone};
@@ -265,9 +265,12 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                     let ray = Ray { origin: start, direction: towards };
                     let cosine = normal.dot(towards);
                     let mut facing = cosine.simd_gt(zero);
-                    let shines = glossy_lanes(simd, finishes, orders, (normal, towards, seen.direction));
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= scatters(simd, hits, at) | shines;
+                        let scatters;
+                        (scatters, shines) =
+                            shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if lit.any_true() {
@@ -320,9 +323,12 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
                         }
                     };
                     let mut facing = cosine.simd_gt(zero);
-                    let shines = glossy_lanes(simd, finishes, orders, (normal, towards, seen.direction));
+                    let mut shines = facing;
                     if glass.is_some() {
-                        facing &= scatters(simd, hits, at) | shines;
+                        let scatters;
+                        (scatters, shines) =
+                            shows(simd, hits, at, finishes, (normal, towards, seen.direction));
+                        facing &= scatters | shines;
                     }
                     let mut lit = facing;
                     if let Some(bodies) = bodies
