@@ -144,6 +144,11 @@ impl Font {
             return Err(Fault::new(WOFF));
         }
         let is_font = harfrust::font::Format::new(&bytes).is_some_and(|format| format.is_sfnt());
+        if let Some(table) = is_font.then(|| cut_table(&bytes)).flatten() {
+            return Err(Fault::new(format!(
+                "its table `{table}` ends behind the end of the file: the file is cut off"
+            )));
+        }
         let font = is_font.then(|| harfrust::Font::new(bytes, 0)).flatten();
         let font = font.ok_or_else(|| Fault::new("it is no font: a font is TrueType or OpenType"))?;
         Self::of(font)
@@ -163,6 +168,22 @@ impl Font {
         }
         Ok(Self { font, em: units * unit, unit })
     }
+}
+
+/// Returns the name of a table of the first face that is not whole.
+fn cut_table(bytes: &[u8]) -> Option<String> {
+    let number = |at: usize| {
+        let four = bytes.get(at..at.checked_add(4)?)?;
+        Some(u32::from_be_bytes([four[0], four[1], four[2], four[3]]) as usize)
+    };
+    let face = if bytes.starts_with(b"ttcf") { number(12)? } else { 0 };
+    let count = number(face.checked_add(4)?)? >> 16;
+    let entries = (0..count).filter_map(|k| {
+        let at = face.checked_add(12 + 16 * k)?;
+        Some((bytes.get(at..at.checked_add(4)?)?, number(at + 8)?.checked_add(number(at + 12)?)?))
+    });
+    let (name, _) = entries.into_iter().find(|(_, end)| *end > bytes.len())?;
+    Some(String::from_utf8_lossy(name).trim_end().into())
 }
 
 /// The most pairs of glyphs that are looked at for those that touch.
