@@ -68,9 +68,7 @@ pub enum AssetError {
         name: String,
     },
     /// The model has no triangle that can be seen.
-    #[error(
-        "`{name}` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff"
-    )]
+    #[error("`{name}` has no triangle with an area: a model is drawn by its faces")]
     NoTriangle {
         /// The name of the file.
         name: String,
@@ -122,6 +120,22 @@ fn at(line: Option<usize>) -> String {
     line.map(|line| format!(", line {line}")).unwrap_or_default()
 }
 
+/// The most characters of a file that a message quotes, and those of a message.
+const QUOTED: usize = 60;
+const MESSAGE: usize = 400;
+
+fn shortened_to(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.into(),
+    }
+}
+
+/// Returns a text of a file as a message quotes it.
+pub(crate) fn shortened(text: &str) -> String {
+    shortened_to(text, QUOTED)
+}
+
 /// The description of a fault, with the line in a text. The caller adds the name of the file.
 #[derive(Debug)]
 pub(crate) struct Fault {
@@ -131,11 +145,11 @@ pub(crate) struct Fault {
 
 impl Fault {
     pub(crate) fn new(what: impl Into<String>) -> Self {
-        Self { line: None, what: what.into() }
+        Self { line: None, what: shortened_to(&what.into(), MESSAGE) }
     }
 
     pub(crate) fn at(line: usize, what: impl Into<String>) -> Self {
-        Self { line: Some(line), what: what.into() }
+        Self { line: Some(line), ..Self::new(what) }
     }
 
     pub(crate) fn of_font(self, name: &str) -> AssetError {

@@ -24,5 +24,5 @@ pub const CODE_POINTS: usize = 10_000;
 /// The bytes of decoded models, and those of pictures, that a [`Library`](crate::Library) keeps although no script uses them.
 pub(crate) const KEPT_BYTES: usize = 512 << 20;
 
-/// The nodes that the scene of a glTF file may draw.
+/// The nodes of a glTF file, its materials, and the items of an accessor that has no data.
 pub(crate) const NODES: usize = 1 << 20;

@@ -175,26 +175,22 @@ impl Model {
             return Err(Fault::new("a texture coordinate or a colour is not a finite number"));
         }
         let within = |all: &[[u32; 3]], count: usize, optional: bool| {
-            all.iter().flatten().all(|i| (*i as usize) < count || optional && *i == NONE)
+            let is_beyond = |i: &&u32| (**i as usize) >= count && !(optional && **i == NONE);
+            match all.as_flattened().iter().find(is_beyond) {
+                Some(beyond) => {
+                    Err(Fault::new(format!("an index is out of range: {beyond} of {count}, from 0")))
+                }
+                None => Ok(()),
+            }
         };
+        within(triangles, positions.len(), false)?;
+        within(normal_of, normals.len(), true)?;
+        within(uv_of, uvs.len(), true)?;
         let are_own = parts.own_uvs.iter().all(|uvs| uvs.is_empty() || uvs.len() == positions.len());
-        let is_good = are_own
-            && within(triangles, positions.len(), false)
-            && within(normal_of, normals.len(), true)
-            && within(uv_of, uvs.len(), true)
-            && look_of.iter().all(|look| (*look as usize) < looks.len().max(1));
-        if !is_good {
+        if !are_own || look_of.iter().any(|look| (*look as usize) >= looks.len().max(1)) {
             return Err(Fault::new("an index is out of range"));
         }
-        let is_shown = |k: usize| {
-            let look = look_of.get(k).and_then(|look| looks.get(*look as usize)).unwrap_or(&Look::PLAIN);
-            !(look.has_one_alpha(&parts.alphas) && look.cutoff.is_some_and(|cutoff| look.alpha < cutoff))
-        };
-        let kept: Vec<bool> = triangles
-            .iter()
-            .enumerate()
-            .map(|(k, triangle)| is_shown(k) && has_area(positions, *triangle))
-            .collect();
+        let kept: Vec<bool> = triangles.iter().map(|triangle| has_area(positions, *triangle)).collect();
         if kept.iter().any(|kept| !kept) {
             retain(&mut parts.triangles, &kept);
             retain(&mut parts.normal_of, &kept);
@@ -220,9 +216,10 @@ impl Model {
             looks = vec![looks.swap_remove(only as usize)];
             look_of = Vec::new();
         }
-        // Where nothing varies there are no holes.
-        for look in looks.iter_mut().filter(|look| look.cutoff.is_some()) {
-            look.cutoff = look.cutoff.filter(|_| !look.has_one_alpha(&parts.alphas));
+        // Where nothing varies there are no holes, or the whole face is one.
+        for look in &mut looks {
+            let is_full = look.has_one_alpha(&parts.alphas);
+            look.cutoff = look.cutoff.filter(|cutoff| !is_full || look.alpha < *cutoff);
         }
         let normals = normals.into_iter().map(unit).collect();
         let (closure, bounds, derived) = (OnceLock::new(), OnceLock::new(), Derived::default());

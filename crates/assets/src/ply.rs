@@ -155,6 +155,13 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Parts, Fault> {
             }
         }
     }
+    // A vertex has one normal and one place on the texture.
+    if !parts.normals.is_empty() {
+        parts.normal_of = parts.triangles.clone();
+    }
+    if !parts.uvs.is_empty() {
+        parts.uv_of = parts.triangles.clone();
+    }
     if has_other {
         parts.warnings.push("lines are left out".into());
     }
@@ -376,13 +383,6 @@ fn faces(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Resul
                 }
             }
         }
-    }
-    // A vertex has one normal and one place on the texture.
-    if !parts.normals.is_empty() {
-        parts.normal_of = parts.triangles.clone();
-    }
-    if !parts.uvs.is_empty() {
-        parts.uv_of = parts.triangles.clone();
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::error::{AssetError, Fault};
+use crate::error::{AssetError, Fault, shortened};
 use crate::files::{FileInfo, Files, file_name, same_but_for_case};
 use crate::limits;
 use crate::picture::{self, Picture};
@@ -56,6 +56,14 @@ impl<'a> Referred<'a> {
             return Ok(false);
         }
         Ok(self.files.look(name).map_err(Fault::new)?.is_some())
+    }
+
+    /// Counts a file for a path among those that were referred to, if a file can have its name.
+    pub(crate) fn note(&mut self, path: &str) -> Result<(), Fault> {
+        if file_name(last_part(path)).is_ok() {
+            self.refer(path)?;
+        }
+        Ok(())
     }
 
     /// Returns the content of the file for a path, or `None` if there is none.
@@ -137,7 +145,7 @@ impl<'a> Referred<'a> {
     pub(crate) fn absence(&self, path: &str, effect: &str) -> String {
         let similar = similar(self.files, last_part(path));
         let similar = similar.map(|other| format!(" (there is `{other}`: names are compared byte for byte)"));
-        format!("there is no file `{path}`{}: {effect}", similar.unwrap_or_default())
+        format!("there is no file `{}`{}: {effect}", shortened(path), similar.unwrap_or_default())
     }
 
     /// Returns the error for a file that a model cannot do without.
@@ -154,7 +162,7 @@ impl<'a> Referred<'a> {
     }
 
     pub(crate) fn extension(&mut self, name: &str, extension: &str) -> Fault {
-        self.give_up(AssetError::Extension { name: name.into(), extension: extension.into() })
+        self.give_up(AssetError::Extension { name: name.into(), extension: shortened(extension) })
     }
 }
 
@@ -191,6 +199,10 @@ pub(crate) fn content(files: &dyn Files, name: &str) -> Result<Vec<u8>, AssetErr
     let bytes = files.read(name).map_err(|why| unreadable(name, why))?;
     if bytes.len() as u64 > limits::FILE_BYTES {
         return Err(AssetError::TooLarge { name: name.into(), bytes: bytes.len() as u64 });
+    }
+    if bytes.starts_with(b"version https://git-lfs.github.com/spec/") {
+        let why = "Git LFS has left a pointer in its place: `git lfs pull` fetches the file".into();
+        return Err(unreadable(name, why));
     }
     Ok(bytes)
 }

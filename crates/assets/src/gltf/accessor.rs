@@ -2,7 +2,7 @@
 //! read.
 
 use super::document::{Accessor, Document};
-use crate::error::Fault;
+use crate::error::{Fault, shortened};
 use crate::limits;
 
 /// The buffers of a document.
@@ -134,10 +134,17 @@ impl Buffers {
             .ok_or_else(|| Fault::new(format!("there is no accessor {number}")))?;
         let components = kinds.iter().find(|(kind, _)| *kind == accessor.kind).map(|(_, count)| *count);
         let Some(components) = components else {
-            return Err(Fault::new(format!("accessor {number} has the type `{}`", accessor.kind)));
+            return Err(Fault::new(format!(
+                "accessor {number} has the type `{}`",
+                shortened(&accessor.kind)
+            )));
         };
-        if accessor.count > limits::VERTICES as u64 {
-            return Err(Fault::new(format!("accessor {number} has {} items", accessor.count)));
+        let most = if accessor.buffer_view.is_some() { limits::VERTICES } else { limits::NODES };
+        if accessor.count > most as u64 {
+            return Err(Fault::new(format!(
+                "accessor {number} has {} items, more than {most}",
+                accessor.count
+            )));
         }
         let of = Component::of(accessor.component_type)?;
         let size = components * of.bytes();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde::de::IgnoredAny;
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
@@ -22,9 +22,9 @@ pub(super) struct Document {
     pub(super) buffers: Vec<Buffer>,
     pub(super) extensions_required: Vec<String>,
     pub(super) extensions_used: Vec<String>,
-    pub(super) skins: Vec<Value>,
-    pub(super) animations: Vec<Value>,
-    pub(super) cameras: Vec<Value>,
+    pub(super) skins: Vec<IgnoredAny>,
+    pub(super) animations: Vec<IgnoredAny>,
+    pub(super) cameras: Vec<IgnoredAny>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -63,21 +63,18 @@ pub(super) struct Primitive {
     pub(super) indices: Option<usize>,
     pub(super) material: Option<usize>,
     pub(super) mode: Option<u32>,
-    pub(super) targets: Vec<Value>,
+    pub(super) targets: Vec<IgnoredAny>,
 }
 
+/// The accessors of vertices, by the name of what they hold.
 #[derive(Debug, Default, Deserialize)]
-#[serde(default, rename_all = "UPPERCASE")]
-pub(super) struct Attributes {
-    pub(super) position: Option<usize>,
-    pub(super) normal: Option<usize>,
-    #[serde(rename = "TEXCOORD_0")]
-    pub(super) uv: Option<usize>,
-    #[serde(rename = "COLOR_0")]
-    pub(super) color: Option<usize>,
-    /// Further texture coordinates, among others.
-    #[serde(flatten)]
-    pub(super) others: BTreeMap<String, Value>,
+#[serde(transparent)]
+pub(super) struct Attributes(BTreeMap<String, Option<usize>>);
+
+impl Attributes {
+    pub(super) fn get(&self, name: &str) -> Option<usize> {
+        self.0.get(name).copied().flatten()
+    }
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -85,9 +82,9 @@ pub(super) struct Attributes {
 pub(super) struct Material {
     pub(super) pbr_metallic_roughness: Pbr,
     pub(super) emissive_factor: Option<[f64; 3]>,
-    pub(super) emissive_texture: Option<TextureInfo>,
-    pub(super) normal_texture: Option<Value>,
-    pub(super) occlusion_texture: Option<Value>,
+    pub(super) emissive_texture: Option<Box<TextureInfo>>,
+    pub(super) normal_texture: Option<IgnoredAny>,
+    pub(super) occlusion_texture: Option<IgnoredAny>,
     pub(super) alpha_mode: Option<String>,
     pub(super) alpha_cutoff: Option<f64>,
     pub(super) extensions: MaterialExtensions,
@@ -97,10 +94,10 @@ pub(super) struct Material {
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Pbr {
     pub(super) base_color_factor: Option<[f64; 4]>,
-    pub(super) base_color_texture: Option<TextureInfo>,
+    pub(super) base_color_texture: Option<Box<TextureInfo>>,
     pub(super) metallic_factor: Option<f64>,
     pub(super) roughness_factor: Option<f64>,
-    pub(super) metallic_roughness_texture: Option<Value>,
+    pub(super) metallic_roughness_texture: Option<IgnoredAny>,
 }
 
 /// The use of a texture by a material.
@@ -169,7 +166,7 @@ pub(super) struct MaterialExtensions {
     #[serde(rename = "KHR_materials_emissive_strength")]
     pub(super) strength: Option<Strength>,
     #[serde(rename = "KHR_materials_unlit")]
-    pub(super) unlit: Option<Value>,
+    pub(super) unlit: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Default, Deserialize)]

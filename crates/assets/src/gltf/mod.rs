@@ -61,6 +61,7 @@ pub(crate) fn read_text(name: &str, text: &[u8], referred: &mut Referred<'_>) ->
 }
 
 fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<'_>) -> Result<Parts, Fault> {
+    bounded(json)?;
     let document: Document = serde_json::from_slice(json)
         .map_err(|error| Fault::at(error.line(), format!("its JSON: {error}")))?;
     if !document.asset.version.starts_with("2.") {
@@ -68,6 +69,11 @@ fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<
     }
     if let Some(unknown) = document.extensions_required.iter().find(|e| !KNOWN.contains(&e.as_str())) {
         return Err(referred.extension(name, unknown));
+    }
+    for (count, what) in [(document.nodes.len(), "nodes"), (document.materials.len(), "materials")] {
+        if count > limits::NODES {
+            return Err(Fault::new(format!("it has more than {} {what}", limits::NODES)));
+        }
     }
     let buffers = buffers(&document, binary, referred)?;
     let mut parts = Parts { space: Colors::Linear, ..Parts::default() };
@@ -101,6 +107,20 @@ fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<
     Ok(parts)
 }
 
+/// The most objects and values of a JSON. What is read of them takes up to some hundred bytes each.
+const OBJECTS: usize = 1 << 21;
+const VALUES: usize = 1 << 25;
+
+/// Refuses a JSON that would fill the memory: a brace begins an object, and a comma separates values.
+fn bounded(json: &[u8]) -> Result<(), Fault> {
+    for (byte, most, what) in [(b'{', OBJECTS, "objects"), (b',', VALUES, "values")] {
+        if memchr::memchr_iter(byte, json).nth(most).is_some() {
+            return Err(Fault::new(format!("its JSON has more than {most} {what}")));
+        }
+    }
+    Ok(())
+}
+
 /// Returns the contents of the buffers.
 fn buffers(
     document: &Document,
@@ -113,14 +133,13 @@ fn buffers(
         let mut content = match (&buffer.uri, binary) {
             (None, Some(binary)) if number == 0 => binary.to_vec(),
             (None, _) => return Err(Fault::new(format!("buffer {number} has neither a file nor data"))),
-            (Some(uri), _) if uri.starts_with("data:") => data(uri)?,
-            (Some(uri), _) => {
-                let path = decoded_path(uri)?;
-                match referred.read(&path)? {
-                    Some(content) => content,
-                    None => return Err(referred.absent(&path)),
+            (Some(uri), _) => match data(uri)? {
+                Some(content) => content,
+                None => {
+                    let path = decoded_path(uri)?;
+                    referred.read(&path)?.ok_or_else(|| referred.absent(&path))?
                 }
-            }
+            },
         };
         if (content.len() as u64) < buffer.byte_length {
             return Err(Fault::new(format!(
@@ -160,8 +179,8 @@ fn look(material: &Material) -> Look {
 /// Returns the texture of a material for a use, if it counts.
 fn texture(material: &Material, slot: Slot) -> Option<&TextureInfo> {
     match slot {
-        Slot::Color => material.pbr_metallic_roughness.base_color_texture.as_ref(),
-        Slot::Glow => material.emissive_texture.as_ref().filter(|_| look(material).glow != DVec3::ZERO),
+        Slot::Color => material.pbr_metallic_roughness.base_color_texture.as_deref(),
+        Slot::Glow => material.emissive_texture.as_deref().filter(|_| look(material).glow != DVec3::ZERO),
     }
 }
 
@@ -236,9 +255,6 @@ impl Maker<'_> {
     /// Adds the default scene; without one the first, without any all root nodes.
     fn scene(&mut self) -> Result<(), Fault> {
         let document = self.document;
-        if document.nodes.len() > limits::NODES {
-            return Err(Fault::new(format!("it has more than {} nodes", limits::NODES)));
-        }
         let roots = match document.scene {
             Some(number) => {
                 let scene = document.scenes.get(number);
@@ -285,23 +301,25 @@ impl Maker<'_> {
             self.left_out = true;
             return Ok(());
         }
-        let Some(position) = primitive.attributes.position else { return Ok(()) };
+        let Some(position) = primitive.attributes.get("POSITION") else { return Ok(()) };
         let first = parts.positions.len();
+        let most = (limits::VERTICES - first) as u64;
+        if document.accessors.get(position).is_some_and(|accessor| accessor.count > most) {
+            return Err(Fault::new(format!("it has more than {} vertices", limits::VERTICES)));
+        }
         let linear = DMat3::from_mat4(place);
         let mirrors = linear.determinant() < 0.0;
         let side = if mirrors { -1.0 } else { 1.0 };
         let count = buffers.each(document, position, &[("VEC3", 3)], |p: [f64; 3]| {
             parts.positions.push(place.transform_point3(p.into()));
         })?;
-        if parts.positions.len() > limits::VERTICES {
-            return Err(Fault::new(format!("it has more than {} vertices", limits::VERTICES)));
-        }
         let same = |what: &str, other: usize| match other == count {
             true => Ok(()),
             false => Err(Fault::new(format!("{other} {what} of {count} vertices"))),
         };
         let first_normal = parts.normals.len();
-        if let Some(normal) = primitive.attributes.normal {
+        let normal = primitive.attributes.get("NORMAL");
+        if let Some(normal) = normal {
             let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
             let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * side;
             let normals = buffers.each(document, normal, &[("VEC3", 3)], |n: [f64; 3]| {
@@ -316,7 +334,8 @@ impl Maker<'_> {
             Some(material) => return Err(Fault::new(format!("there is no material {material}"))),
         };
         let first_uv = parts.uvs.len();
-        if let Some(uv) = primitive.attributes.uv {
+        let uv = primitive.attributes.get("TEXCOORD_0");
+        if let Some(uv) = uv {
             let uvs = buffers.each(document, uv, &[("VEC2", 2)], |[u, v]: [f64; 2]| {
                 parts.uvs.push(Vec2::new(u as f32, v as f32));
             })?;
@@ -326,14 +345,7 @@ impl Maker<'_> {
             for slot in [Slot::Color, Slot::Glow] {
                 let Some(info) = texture(material, slot) else { continue };
                 let set = coordinates(info);
-                let accessor = match set {
-                    0 => primitive.attributes.uv,
-                    _ => primitive
-                        .attributes
-                        .others
-                        .get(&format!("TEXCOORD_{set}"))
-                        .and_then(|n| n.as_u64().and_then(|n| usize::try_from(n).ok())),
-                };
+                let accessor = primitive.attributes.get(&format!("TEXCOORD_{set}"));
                 if accessor.is_none() {
                     let warning = format!("what has no TEXCOORD_{set} shows its picture at (0, 0)");
                     if !parts.warnings.contains(&warning) {
@@ -354,7 +366,7 @@ impl Maker<'_> {
                 own.resize(first + count, Vec2::ZERO);
             }
         }
-        if let Some(color) = primitive.attributes.color {
+        if let Some(color) = primitive.attributes.get("COLOR_0") {
             parts.colors.resize(first, glam::Vec3::ONE);
             let kinds = [("VEC3", 3), ("VEC4", 4)];
             let has_alpha = document.accessors.get(color).is_some_and(|accessor| accessor.kind == "VEC4");
@@ -390,8 +402,8 @@ impl Maker<'_> {
         let mut add = |[a, b, c]: [u32; 3]| {
             let of = if mirrors { [b, a, c] } else { [a, b, c] };
             parts.triangles.push(of.map(|i| first as u32 + i));
-            parts.normal_of.push(has(primitive.attributes.normal.is_some(), first_normal, of));
-            parts.uv_of.push(has(primitive.attributes.uv.is_some(), first_uv, of));
+            parts.normal_of.push(has(normal.is_some(), first_normal, of));
+            parts.uv_of.push(has(uv.is_some(), first_uv, of));
             parts.look_of.push(look as u32);
             if parts.triangles.len() > limits::TRIANGLES { Err(too_many_triangles()) } else { Ok(()) }
         };

@@ -72,18 +72,18 @@ impl<'a, 'b> Pictures<'a, 'b> {
             return Err(Fault::new(format!("it has more than {} pictures", limits::FILES)));
         }
         let picture = match image {
-            Image { uri: Some(uri), .. } if uri.starts_with("data:") => {
-                Some(self.referred.embedded(self.name, &what, &data(uri)?)?)
-            }
-            Image { uri: Some(uri), .. } => {
-                let path = decoded_path(uri)?;
-                let picture = self.referred.picture(&path)?;
-                if picture.is_none() {
-                    let warning = self.referred.absence(&path, effect);
-                    self.warn(warning);
+            Image { uri: Some(uri), .. } => match data(uri)? {
+                Some(bytes) => Some(self.referred.embedded(self.name, &what, &bytes)?),
+                None => {
+                    let path = decoded_path(uri)?;
+                    let picture = self.referred.picture(&path)?;
+                    if picture.is_none() {
+                        let warning = self.referred.absence(&path, effect);
+                        self.warn(warning);
+                    }
+                    picture
                 }
-                picture
-            }
+            },
             Image { buffer_view: Some(view), .. } => {
                 let bytes = self.buffers.view(self.document, *view)?;
                 Some(self.referred.embedded(self.name, &what, bytes)?)

@@ -6,7 +6,7 @@ use image::metadata::Orientation;
 
 use super::size::check_size;
 use super::{Levels, Picture, unit};
-use crate::error::Fault;
+use crate::error::{Fault, shortened};
 
 /// The bytes of the longest header.
 const HEAD: usize = 1 << 16;
@@ -31,7 +31,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Picture, Fault> {
         if let Some(format) = text.strip_prefix(b"FORMAT=").map(<[u8]>::trim_ascii)
             && format != b"32-bit_rle_rgbe"
         {
-            let format = String::from_utf8_lossy(format).into_owned();
+            let format = shortened(&String::from_utf8_lossy(format));
             return Err(Fault::new(format!("its format is `{format}`: 32-bit_rle_rgbe is read")));
         }
     }

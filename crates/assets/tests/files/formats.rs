@@ -234,13 +234,10 @@ fn what_is_wrong_is_said() {
         (b"v 0 0 0\nv 1 0 0\nf 1 2\n", "`x`, line 3: a face of 2 corners"),
         (
             b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
-            "`x` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff",
+            "`x` has no triangle with an area: a model is drawn by its faces",
         ),
-        (
-            b"hello\n",
-            "`x` has no triangle that can be seen: expected one with an area, and with an alpha of at least its cutoff",
-        ),
-        (b"\x7fELF\0\0", "`x`: it is no model"),
+        (b"hello\n", "`x`: it is no model: expected OBJ, PLY, STL or glTF"),
+        (b"\x7fELF\0\0", "`x`: it is no model: expected OBJ, PLY, STL or glTF"),
         (b"ply\nformat ascii 2.0\n", "`x`, line 2: `format ascii 2.0` is no line of a header"),
         (b"{}", "`x`: it is not glTF of version 2"),
         (
@@ -300,7 +297,7 @@ fn triangles_of_a_binary_ply_may_be_among_other_faces() {
     let negative = of(&[a.clone(), vec![0, 1, u32::MAX]]);
     assert_eq!(fault(ply_with_faces(true, "int", &negative)), "`x`: a face has the corner -1");
     let outside = of(&[a.clone(), vec![0, 1, 4]]);
-    assert_eq!(fault(ply_with_faces(true, "int", &outside)), "`x`: an index is out of range");
+    assert_eq!(fault(ply_with_faces(true, "int", &outside)), "`x`: an index is out of range: 4 of 4, from 0");
     let mut cut = ply_with_faces(true, "int", &of(&[a.clone(), a.clone()]));
     cut.truncate(cut.len() - 1);
     assert_eq!(fault(cut), "`x`: it ends before the numbers that its header promises");
@@ -324,4 +321,58 @@ fn what_only_some_lines_of_an_obj_have_is_that_of_these_lines() {
         "white of its own, not what has no colour"
     );
     assert_eq!([0, 2].map(|k| model.uvs(k).unwrap()[0].y), [0.0, 1.0]);
+}
+
+#[test]
+fn a_comment_of_an_obj_neither_goes_on_nor_counts() {
+    let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt .5\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
+    let commented = "# from C:\\models\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 \\  \n 0 #1\n\
+                     vt .5 # u\nvn 0 0 1 #\nf 1/1/1 2/1/1 3/1/1 # 4/4/4\n";
+    let [plain, commented] = [plain, commented].map(|text| model("a.obj", text.into()));
+    assert_eq!(triangles(&plain), triangles(&commented));
+    assert_eq!(plain.normals(0), commented.normals(0));
+}
+
+#[test]
+fn elements_of_a_ply_come_in_any_order() {
+    let vertex = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\nproperty \
+                  float ny\nproperty float nz\nproperty float s\nproperty float t\n";
+    let face = "element face 1\nproperty list uchar int vertex_indices\n";
+    let (vertices, faces) = ("0 0 0 0 .6 .8 0 0\n1 0 0 0 0 1 1 0\n0 1 0 0 0 1 0 1\n", "3 0 1 2\n");
+    let whole = |head: [&str; 2], body: [&str; 2]| {
+        let text = format!("ply\nformat ascii 1.0\n{}end_header\n{}", head.concat(), body.concat());
+        model("a.ply", text.into())
+    };
+    let [usual, other] = [whole([vertex, face], [vertices, faces]), whole([face, vertex], [faces, vertices])];
+    assert!(usual.normals(0).is_some());
+    assert_eq!(usual.normals(0), other.normals(0));
+    assert_eq!(usual.uvs(0), other.uvs(0));
+}
+
+#[test]
+fn a_line_names_one_library_or_several() {
+    let faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 2 3\n";
+    let read = |line: &str, names: &[&str]| {
+        let mut files = MemoryFiles::from([("x.obj", format!("{line}\n{faces}").into_bytes())]);
+        let libraries = ["newmtl red\nKd 1 0 0\n", "newmtl blue\nKd 0 0 1\n"];
+        names.iter().zip(libraries).for_each(|(name, text)| files.insert(name, text.into()));
+        let library = Library::new(files);
+        let model = library.model("x.obj", Smoothing::OfFile).unwrap();
+        let colors = [0, 1].map(|k| model.look_color(model.look(k), false));
+        let sources: Vec<_> = library.sources("x.obj").into_iter().map(|(name, _)| name).collect();
+        (colors, model.warnings().to_vec(), sources[1..].join(" | "))
+    };
+    let [red, blue, grey] = [DVec3::X, DVec3::Z, DVec3::splat(0.8)];
+    let both = |sources: &str| ([red, blue], vec![], sources.to_string());
+    assert_eq!(read("mtllib lib/a.mtl lib/b.mtl", &["a.mtl", "b.mtl"]), both("a.mtl | b.mtl"));
+    assert_eq!(read("mtllib a.mtl b.mtl", &["a.mtl", "b.mtl"]), both("a.mtl | a.mtl b.mtl | b.mtl"));
+    assert_eq!(read("mtllib a.mtl\nmtllib a.mtl\nmtllib b.mtl", &["a.mtl", "b.mtl"]), both("a.mtl | b.mtl"));
+    let (colors, warnings, sources) = read("mtllib my lib/a.mtl", &["a.mtl"]);
+    assert_eq!((colors[0], warnings.len(), sources.as_str()), (red, 1, "a.mtl"));
+    assert_eq!(warnings[0], "no library has the material `blue`: what has it is grey");
+    // Any of these may come later.
+    let (colors, warnings, sources) = read("mtllib a.mtl b.mtl\nmtllib a.mtl b.mtl", &[]);
+    assert_eq!((colors, warnings.len(), sources.as_str()), ([grey; 2], 1, "a.mtl | a.mtl b.mtl | b.mtl"));
+    let (_, warnings, sources) = read("mtllib", &[]);
+    assert_eq!((warnings.len(), sources.as_str()), (0, ""));
 }

@@ -96,7 +96,7 @@ fn headers_promise_no_more_than_there_is() {
     assert!(error(stl).contains("no model"));
     let text = String::from_utf8_lossy(GLTF).into_owned();
     assert!(error(text.replace("\"count\":3", "\"count\":4")).contains("outside of its buffer"));
-    assert!(error(text.replace("\"count\":3", "\"count\":30000001")).contains("30000001 items"));
+    assert!(error(text.replace("\"count\":3", "\"count\":30000001")).contains("more than 30000000 vertices"));
     assert!(error(text.replace("\"count\":1", "\"count\":2")).contains("outside of its buffer"));
     assert!(error(text.replace("\"byteLength\":36}]", "\"byteLength\":37}]")).contains("cut off"));
     assert!(
@@ -117,7 +117,34 @@ fn circles_and_missing_nodes_are_errors() {
     assert!(error(text.replace("\"children\":[0]", "\"children\":[0,0]")).contains("two parents"));
     assert!(error(text.replace("\"mesh\":0", "\"mesh\":3")).contains("no mesh 3"));
     let deep = "[".repeat(100_000);
-    assert!(error(format!("{{\"skins\":{deep}")).contains("recursion limit"));
+    assert!(error(format!("{{\"skins\":{deep}")).contains("its JSON"));
+}
+
+#[test]
+fn what_would_fill_the_memory_is_refused_before() {
+    let many = |item: &str, count: usize| {
+        format!("{{\"asset\":{{\"version\":\"2.0\"}},\"materials\":[{}]}}", vec![item; count].join(","))
+    };
+    assert!(error(many("{}", 1 << 21)).contains("more than 2097152 objects"));
+    assert!(error(many("{}", (1 << 20) + 1)).contains("more than 1048576 materials"));
+    let text = String::from_utf8_lossy(GLTF).into_owned();
+    let zeros = text.replace("\"bufferView\":0,", "").replace("\"count\":3", "\"count\":1048577");
+    assert!(error(zeros).contains("1048577 items, more than 1048576"));
+}
+
+#[test]
+fn a_message_quotes_little_of_a_file() {
+    let long = "x".repeat(5_000_000);
+    for text in [format!("v {long} 0 0\n"), format!("v 0 0 0\nf {long} 1 1\n")] {
+        assert!(error(text).len() < 500);
+    }
+    let faces = (0..3000).map(|k| format!("usemtl {k}{long:.100}\nf 1 2 3\n")).collect::<String>();
+    let text = format!("mtllib m\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}");
+    let files = MemoryFiles::from([("x", text.into_bytes()), ("m", b"newmtl a\n".to_vec())]);
+    let model = Library::new(files).model("x", Smoothing::OfFile).unwrap();
+    assert_eq!(model.warnings().len(), 1);
+    assert!(model.warnings()[0].ends_with("and 2995 more: what has them is grey"));
+    assert!(model.warnings()[0].len() < 500);
 }
 
 #[test]
@@ -279,6 +306,19 @@ fn letters(font: &[u8]) -> Option<LetterError> {
         assert!((0..model.triangle_count()).all(|k| model.corners(k).iter().all(|p| p.is_finite())));
     }
     model.err()
+}
+
+/// A font without some of its tables is drawn otherwise.
+#[test]
+fn a_font_that_is_cut_off_is_an_error() {
+    let font = dejavu::sans::regular();
+    assert_eq!(letters(font), None);
+    for part in 0..200 {
+        let end = font.len() * part / 200;
+        assert!(letters(&font[..end]).is_some(), "{end} of {} bytes", font.len());
+    }
+    let error = letters(&font[..font.len() - 4]).unwrap().to_string();
+    assert!(error.contains("the file is cut off"), "{error}");
 }
 
 #[test]

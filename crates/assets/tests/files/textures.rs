@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec2};
-use rayfold_assets::{AssetError, Library, MemoryFiles, Model, Slot, Smoothing, Wrap};
+use rayfold_assets::{AssetError, Closure, Library, MemoryFiles, Model, Slot, Smoothing, Wrap};
 
 fn picture(width: u32, height: u32, format: image::ImageFormat) -> Vec<u8> {
     let picture = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 77]));
@@ -357,5 +357,64 @@ fn what_is_wrong_with_a_picture_of_gltf_is_said() {
         let error = read(&gltf(COLOR, parts)).unwrap_err();
         assert_eq!(error.to_string(), message);
         assert!(error.help().is_some(), "{message}");
+    }
+}
+
+/// A tetrahedron, one face of which has another material, whose alpha is its factor.
+fn masked(mode: &str, alphas: [f64; 2]) -> Arc<Model> {
+    let corners = [[0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let positions =
+        faces.iter().flatten().flat_map(|i| corners[*i]).flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+    let [a, b] = alphas.map(|alpha| {
+        format!(r#"{{"alphaMode":"{mode}","pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}}}"#)
+    });
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"materials":[{a},{b}],"meshes":[{{"primitives":[
+        {{"attributes":{{"POSITION":0}},"material":0}},{{"attributes":{{"POSITION":1}},"material":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":9,"type":"VEC3"}},
+        {{"bufferView":0,"byteOffset":108,"componentType":5126,"count":3,"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":144}}],"buffers":[{{"byteLength":144,"uri":"a%20b.bin"}}]}}"#
+    );
+    let files = MemoryFiles::from([("a.gltf", json.into_bytes()), ("a b.bin", positions)]);
+    Library::new(files).model("a.gltf", Smoothing::OfFile).unwrap()
+}
+
+#[test]
+fn a_face_that_is_a_hole_is_part_of_the_body() {
+    for mode in ["MASK", "BLEND"] {
+        let holes = |alphas| {
+            let model = masked(mode, alphas);
+            assert_eq!((model.triangle_count(), model.closure()), (4, &Closure::Closed));
+            [0, 3].map(|k| model.looks()[model.look(k)].cutoff)
+        };
+        assert_eq!(holes([1.0, 0.2]), [None, Some(0.5)], "{mode}");
+        assert_eq!(holes([0.3, 0.3]), [Some(0.5); 2], "nothing of it is seen");
+        assert_eq!(holes([1.0, 0.9]), [None; 2]);
+    }
+    assert_eq!(masked("OPAQUE", [0.1, 0.1]).looks()[0].cutoff, None);
+}
+
+#[test]
+fn addresses_of_data_may_be_percent_encoded() {
+    let base64 = base64_simd::STANDARD.encode_to_string(png());
+    for address in [
+        format!("data:image/png;base64,{base64}"),
+        format!(
+            "DATA:image/png;BASE64,{}",
+            base64.replace('=', "%3D").replace('+', "%2B").replace('/', "%2F")
+        ),
+    ] {
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"images":[{{"uri":"{address}"}}],"textures":[{{"source":0}}],
+            "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],
+            "buffers":[{{"uri":"data:;base64,AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/","byteLength":36}}]}}"#
+        );
+        let model = Library::new(MemoryFiles::from([("a.gltf", json.into_bytes())]));
+        let model =
+            model.model("a.gltf", Smoothing::OfFile).unwrap_or_else(|error| panic!("{address}: {error}"));
+        assert!(model.looks()[model.look(0)].texture(Slot::Color).is_some());
     }
 }

@@ -4,123 +4,21 @@
 //! indices and the lines of faults are the same for any number of chunks. What a line about materials means depends on
 //! all such lines before it: these are kept, and read in order after the chunks.
 
+mod lines;
+mod materials;
+
 use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use self::lines::{Lines, before_comment, field, index, numbers, words};
+use self::materials::Map;
+use crate::decode::no_model;
 use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
 use crate::referred::Referred;
-use crate::texture::Texture;
-
-/// A line of the text, with those that a backslash joins to it: its number and its words.
-struct Lines<'a> {
-    rest: &'a [u8],
-    number: usize,
-}
-
-impl<'a> Iterator for Lines<'a> {
-    type Item = (usize, std::borrow::Cow<'a, [u8]>);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.rest.is_empty() {
-            return None;
-        }
-        let first = self.number + 1;
-        let mut whole: Option<Vec<u8>> = None;
-        loop {
-            self.number += 1;
-            let (line, rest) = match memchr::memchr(b'\n', self.rest) {
-                Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
-                None => (self.rest, &[][..]),
-            };
-            self.rest = rest;
-            let line = line.strip_suffix(b"\r").unwrap_or(line);
-            let (line, goes_on) = match line.strip_suffix(b"\\") {
-                Some(line) => (line, !rest.is_empty()),
-                None => (line, false),
-            };
-            match &mut whole {
-                None if !goes_on => return Some((first, line.into())),
-                None => whole = Some([line, b" "].concat()),
-                Some(whole) => {
-                    whole.extend_from_slice(line);
-                    whole.push(b' ');
-                }
-            }
-            if !goes_on {
-                return whole.map(|whole| (first, whole.into()));
-            }
-        }
-    }
-}
-
-fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
-    line.split(|b| matches!(b, b' ' | b'\t')).filter(|word| !word.is_empty())
-}
-
-/// Returns the text of a line after its first word, without blanks around it.
-fn rest_of(line: &[u8], word: &[u8]) -> String {
-    let is_word = |window: &[u8]| window.eq_ignore_ascii_case(word);
-    let at = line.windows(word.len()).position(is_word).unwrap_or_default() + word.len();
-    String::from_utf8_lossy(&line[at..]).trim().to_string()
-}
-
-fn number(word: &[u8]) -> Option<f64> {
-    if let Some(number) = short_number(word) {
-        return Some(number);
-    }
-    let text = std::str::from_utf8(word).ok()?;
-    text.parse().ok().filter(|x: &f64| x.is_finite())
-}
-
-/// Returns the number of a word of a sign, digits and a point, if they are few. The digits and the power of ten are then exact,
-/// so that the quotient is rounded once, to the number that the word is nearest to (Clinger, 1990).
-fn short_number(word: &[u8]) -> Option<f64> {
-    const POWERS: [f64; 16] =
-        [1., 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
-    let (is_negative, digits) = match word {
-        [b'-', digits @ ..] => (true, digits),
-        digits => (false, digits),
-    };
-    let (mut whole, mut point) = (0u64, None);
-    if !(1..=16).contains(&digits.len()) {
-        return None;
-    }
-    for (at, byte) in digits.iter().enumerate() {
-        match byte.wrapping_sub(b'0') {
-            digit @ 0..=9 => whole = 10 * whole + u64::from(digit),
-            _ if *byte == b'.' && point.is_none() && digits.len() > 1 => point = Some(at),
-            _ => return None,
-        }
-    }
-    let places = point.map_or(0, |at| digits.len() - 1 - at);
-    // Sixteen digits may be more than a number holds.
-    let number = (whole < 1 << 53).then(|| whole as f64 / POWERS[places])?;
-    Some(if is_negative { -number } else { number })
-}
-
-/// Reads numbers, at most `N`. Returns how many there are.
-fn numbers<'a, const N: usize>(
-    line: usize,
-    words: impl Iterator<Item = &'a [u8]>,
-    least: usize,
-) -> Result<([f64; N], usize), Fault> {
-    let (mut all, mut count) = ([0.0; N], 0);
-    for word in words {
-        let Some(place) = all.get_mut(count) else { break };
-        *place = number(word).ok_or_else(|| {
-            Fault::at(line, format!("`{}` is not a finite number", String::from_utf8_lossy(word)))
-        })?;
-        count += 1;
-    }
-    if count < least {
-        return Err(Fault::at(line, format!("{count} of {least} numbers")));
-    }
-    Ok((all, count))
-}
 
 /// Returns the place of an index among `count` items. Indices count from 1, negative ones from the last item back.
 fn place(line: usize, index: i64, count: usize, what: &str) -> Result<u32, Fault> {
@@ -130,55 +28,6 @@ fn place(line: usize, index: i64, count: usize, what: &str) -> Result<u32, Fault
         _ => Err(Fault::at(line, format!("{what} {index} of {count}"))),
     }
 }
-
-fn index(line: usize, text: &[u8]) -> Result<i64, Fault> {
-    let (digits, sign) = match text {
-        [b'-', digits @ ..] => (digits, -1),
-        digits => (digits, 1),
-    };
-    let (mut number, mut is_number) = (0u32, (1..=9).contains(&digits.len()));
-    for byte in digits.iter().take(9) {
-        let digit = byte.wrapping_sub(b'0');
-        is_number &= digit < 10;
-        number = number.wrapping_mul(10).wrapping_add(u32::from(digit));
-    }
-    if !is_number {
-        return Err(Fault::at(line, format!("`{}` is no index", String::from_utf8_lossy(text))));
-    }
-    Ok(sign * i64::from(number))
-}
-
-/// Returns a word up to a slash, and what is behind it.
-fn field(word: &[u8]) -> (&[u8], &[u8]) {
-    match word.iter().position(|b| *b == b'/') {
-        Some(end) => (&word[..end], &word[end + 1..]),
-        None => (word, &[]),
-    }
-}
-
-/// A picture that a material names: the library of materials, the line in it, and the path.
-struct Map {
-    library: String,
-    line: usize,
-    path: String,
-}
-
-/// The options of a map.
-const OPTIONS: [&[u8]; 13] = [
-    b"-blendu",
-    b"-blendv",
-    b"-boost",
-    b"-bm",
-    b"-cc",
-    b"-clamp",
-    b"-colorspace",
-    b"-imfchan",
-    b"-mm",
-    b"-o",
-    b"-s",
-    b"-t",
-    b"-texres",
-];
 
 /// The counts of what stands before a place in the text.
 #[derive(Clone, Copy, Default)]
@@ -249,8 +98,9 @@ struct Reader {
     names: HashMap<Vec<u8>, u32>,
     /// The pictures of looks.
     pictures: HashMap<u32, Map>,
-    /// The looks that a library of materials defines, and whether a library is missing.
+    /// The looks that a library of materials defines, the libraries that were read, and whether one is missing.
     defined: HashSet<u32>,
+    libraries: HashSet<String>,
     lacks_library: bool,
     /// The look of the latest line, and the number of triangles that have one.
     look: u32,
@@ -298,7 +148,11 @@ fn read_in(bytes: &[u8], chunks: usize, refer: &mut Referred<'_>) -> Result<Part
     let lacks_uvs = read.iter().any(|chunk| chunk.lacks_uvs);
     let mut left_out: Vec<&str> = Vec::new();
     read.iter().flat_map(|chunk| &chunk.left_out).for_each(|what| add_once(&mut left_out, what));
+    let is_empty = read.iter().all(|chunk| chunk.positions.is_empty() && chunk.fault.is_none());
     reader.join(read, refer)?;
+    if is_empty {
+        return Err(no_model());
+    }
     reader.paint(refer)?;
     let mut parts = reader.parts;
     if parts.uv_of.is_empty() {
@@ -324,7 +178,7 @@ fn cut(text: &[u8], count: usize) -> Vec<&[u8]> {
             let line = &text[from..at + end];
             at += end + 1;
             // A backslash joins the next line.
-            if !line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\") {
+            if !line.trim_ascii_end().ends_with(b"\\") {
                 pieces.push(&text[from..at]);
                 from = at;
                 break;
@@ -400,7 +254,7 @@ impl Chunk {
         let uvs = self.before.uvs + self.uvs.len();
         let normals = self.before.normals + self.normals.len();
         let (mut first, mut last, mut count) = (None, None, 0);
-        for word in words {
+        for word in before_comment(words) {
             let (of_position, rest) = field(word);
             let (of_uv, rest) = field(rest);
             let position = place(line, index(line, of_position)?, positions, "position")?;
@@ -479,141 +333,6 @@ impl Reader {
         self.triangles = count;
         Ok(())
     }
-
-    fn material_line(&mut self, line: usize, text: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
-        if words(text).next() == Some(b"mtllib") {
-            return self.materials(line, text, refer);
-        }
-        let name = rest_of(text, b"usemtl").into_bytes();
-        let next = self.parts.looks.len() as u32;
-        self.look = *self.names.entry(name).or_insert(next);
-        if self.look == next {
-            // Without its file it has no colour; a file that comes later gives it one.
-            self.parts.looks.push(Look::PLAIN);
-            bounded_looks(line, self.parts.looks.len())?;
-        }
-        Ok(())
-    }
-
-    /// Reads a library of materials. The rest of the line is one name, unless there is no such file: then its words are.
-    fn materials(&mut self, line: usize, text: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
-        let rest = rest_of(text, b"mtllib");
-        let names: Vec<String> = match refer.exists(&rest)? {
-            true => vec![rest],
-            false => {
-                let words: Vec<String> = rest.split_whitespace().map(Into::into).collect();
-                if words.len() > 1 && words.iter().any(|word| refer.exists(word).unwrap_or(false)) {
-                    words
-                } else {
-                    vec![rest]
-                }
-            }
-        };
-        if names.len() > limits::FILES {
-            return Err(Fault::at(line, format!("{} libraries of materials", names.len())));
-        }
-        for name in names {
-            match refer.read(&name)? {
-                Some(bytes) => self.read_materials(&name, &bytes, refer)?,
-                None => {
-                    self.lacks_library = true;
-                    let warning = refer.absence(&name, "what has its materials is grey");
-                    self.parts.warnings.push(warning);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Gives the looks that faces have their pictures, and the colour of what has none to those whose file is missing.
-    fn paint(&mut self, refer: &mut Referred<'_>) -> Result<(), Fault> {
-        let mut is_used = vec![false; self.parts.looks.len()];
-        self.parts.look_of.iter().for_each(|look| is_used[*look as usize] = true);
-        for number in (0..self.parts.looks.len() as u32).filter(|look| is_used[*look as usize]) {
-            let Some(Map { library, line, path }) = self.pictures.get(&number) else {
-                let is_named = number > 0 && !self.defined.contains(&number);
-                self.parts.looks[number as usize].is_missing = self.lacks_library && is_named;
-                if is_named && !self.lacks_library && !self.defined.is_empty() {
-                    let name = self.names.iter().find(|(_, of)| **of == number).map(|(name, _)| name);
-                    let name = String::from_utf8_lossy(name.map_or(b"", Vec::as_slice));
-                    let warning = format!("no library has the material `{name}`: what has it is grey");
-                    self.parts.warnings.push(warning);
-                }
-                continue;
-            };
-            let look = &mut self.parts.looks[number as usize];
-            match refer
-                .picture(path)
-                .map_err(|fault| within(library, Fault { line: Some(*line), ..fault }))?
-            {
-                Some(picture) => look.texture = Some(Texture::new(picture)),
-                None => {
-                    look.is_missing = true;
-                    let warning = refer.absence(path, "what has this picture is grey");
-                    if !self.parts.warnings.contains(&warning) {
-                        self.parts.warnings.push(warning);
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn read_materials(&mut self, file: &str, bytes: &[u8], refer: &Referred<'_>) -> Result<(), Fault> {
-        let within = |fault: Fault| within(file, fault);
-        let mut look: Option<u32> = None;
-        let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        for (line, text) in (Lines { rest, number: 0 }) {
-            let mut words = words(&text);
-            match words.next() {
-                Some(b"newmtl") => {
-                    let name = rest_of(&text, b"newmtl").into_bytes();
-                    let next = self.parts.looks.len() as u32;
-                    let place = *self.names.entry(name).or_insert(next);
-                    if place == next {
-                        self.parts.looks.push(Look::PLAIN);
-                        bounded_looks(line, self.parts.looks.len()).map_err(within)?;
-                    }
-                    self.defined.insert(place);
-                    look = Some(place);
-                }
-                Some(b"Kd") => {
-                    if words.clone().next().is_some_and(|word| matches!(word, b"spectral" | b"xyz")) {
-                        return Err(within(Fault::at(line, "`Kd` is not red, green and blue")));
-                    }
-                    // One number alone is that of all channels.
-                    let ([r, g, b], count) = numbers::<3>(line, words, 1).map_err(within)?;
-                    let color = if count == 1 { DVec3::splat(r) } else { DVec3::new(r, g, b) };
-                    if let Some(look) = look {
-                        self.parts.looks[look as usize].factor = Some(color);
-                    }
-                }
-                // Some programs write it in small letters.
-                Some(word) if word.eq_ignore_ascii_case(b"map_Kd") => {
-                    let path = rest_of(&text, b"map_Kd");
-                    if path.is_empty() {
-                        self.parts
-                            .warnings
-                            .push(format!("line {line} of `{file}`: `map_Kd` names no picture"));
-                        continue;
-                    }
-                    let begins = words.clone().next().is_some_and(|word| word.len() > 1 && word[0] == b'-');
-                    let has_option = words.any(|word| OPTIONS.contains(&word));
-                    if begins || has_option && !refer.exists(&path).map_err(within)? {
-                        return Err(within(Fault::at(
-                            line,
-                            "an option of `map_Kd`: expected a file name alone",
-                        )));
-                    }
-                    if let Some(look) = look {
-                        self.pictures.insert(look, Map { library: file.into(), line, path });
-                    }
-                }
-                _ => {}
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Adds the last of `count` values. As long as all are missing there are none; later a missing one is the `usual` one.
@@ -646,27 +365,9 @@ fn joined_late<T: Copy, U>(mut lists: Vec<Vec<T>>, others: &[Vec<U>], usual: T) 
     joined(lists)
 }
 
-/// Returns a fault of a library of materials.
-fn within(library: &str, fault: Fault) -> Fault {
-    Fault::new(match fault.line {
-        Some(line) => format!("in `{library}`, line {line}: {}", fault.what),
-        None => format!("in `{library}`: {}", fault.what),
-    })
-}
-
 fn bounded(line: usize, count: usize, what: &str) -> Result<(), Fault> {
     if count > limits::VERTICES {
         return Err(Fault::at(line, format!("more than {} {what}", limits::VERTICES)));
-    }
-    Ok(())
-}
-
-/// The largest number of materials of a model.
-const LOOKS: usize = 1 << 20;
-
-fn bounded_looks(line: usize, count: usize) -> Result<(), Fault> {
-    if count > LOOKS {
-        return Err(Fault::at(line, format!("more than {LOOKS} materials")));
     }
     Ok(())
 }
@@ -675,47 +376,6 @@ fn bounded_looks(line: usize, count: usize) -> Result<(), Fault> {
 mod tests {
     use super::*;
     use crate::files::MemoryFiles;
-
-    #[test]
-    fn short_numbers_are_those_of_the_standard_library() {
-        let words = [
-            "0",
-            "-0",
-            "1.",
-            ".5",
-            "-.25",
-            "0.1",
-            "-3.141593",
-            "123456789012345",
-            "9007199254740991",
-            "9007199254740993",
-            "0.30000000000001",
-            "00012.5000",
-            "1e5",
-            "-1.5E-3",
-            "inf",
-            "nan",
-            "",
-            "-",
-            ".",
-            "-.",
-            "1.2.3",
-            "+1",
-            "1x",
-            "--1",
-        ];
-        for word in words {
-            let expected = word.parse().ok().filter(|x: &f64| x.is_finite()).map(f64::to_bits);
-            assert_eq!(number(word.as_bytes()).map(f64::to_bits), expected, "{word}");
-        }
-        let mut state = 1u64;
-        for _ in 0..20_000 {
-            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-            let (digits, places) = (state >> (11 + state % 50), (state >> 7) as usize % 8);
-            let word = format!("{:.places$}", digits as f64 / 1e3);
-            assert_eq!(number(word.as_bytes()), word.parse().ok(), "{word}");
-        }
-    }
 
     /// Returns what is read in so many chunks, or the fault.
     fn outcome(text: &str, chunks: usize) -> String {
@@ -786,14 +446,5 @@ mod tests {
             }
         }
         assert!(cut(text, 3).len() > 1);
-    }
-
-    #[test]
-    fn indices_have_nine_digits_at_most() {
-        assert_eq!(index(1, b"-123456789").unwrap(), -123_456_789);
-        assert_eq!(index(1, b"000000007").unwrap(), 7);
-        for word in ["", "-", "1234567890", "1.5", "+1", "4294967297", "--1", "1 "] {
-            assert!(index(1, word.as_bytes()).is_err(), "{word}");
-        }
     }
 }
