@@ -156,13 +156,25 @@ fn a_file_size_limit_leaves_nothing_and_is_named() {
 #[cfg(target_os = "linux")]
 #[test]
 fn standard_output_on_a_full_disk_is_an_error() {
-    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let output = Command::new(RAYFOLD).args(["completions", "bash"]).stdout(full).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert_eq!(
-        String::from_utf8_lossy(&output.stderr),
-        "error: cannot write to standard output: No space left on device\n"
-    );
+    for args in [&["completions", "bash"][..], &["--help"], &["render", "--help"], &["--version"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = Command::new(RAYFOLD).args(args).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{args:?}");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            said.starts_with("error: cannot write to standard output: No space left on device"),
+            "{said}"
+        );
+    }
+}
+
+/// Returns whether a program has worked for a tenth of a second of processor time.
+#[cfg(target_os = "linux")]
+fn is_at_work(rayfold: &Running) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", rayfold.0.id())).unwrap();
+    // Hundredths of a second.
+    let time = stat.rsplit(')').next().unwrap().split_whitespace().nth(11).unwrap();
+    time.parse::<u64>().unwrap() >= 10
 }
 
 /// A run that reads a large script ends at a signal. Regression test: it went on.
@@ -172,16 +184,27 @@ fn a_run_that_looks_at_no_signal_is_ended() {
     let folder = Folder::with("a.txt", "Sphere\n".repeat(200_000));
     for (name, code) in [("-INT", 130), ("-TERM", 143)] {
         let mut rayfold = Running::start(&folder, &["check", "a.txt", "--threads", "1"]);
-        let id = rayfold.0.id();
-        wait_until("it works", || {
-            let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
-            // Hundredths of a second of processor time.
-            let time = stat.rsplit(')').next().unwrap().split_whitespace().nth(11).unwrap();
-            time.parse::<u64>().unwrap() >= 10
-        });
+        wait_until("it works", || is_at_work(&rayfold));
         rayfold.signal(name);
         assert_eq!(rayfold.end().code(), Some(code));
     }
+}
+
+/// Glass that mirrors, too, sends on two rays at each hit, so that no picture of great depth ends. Regression test: the
+/// look for light that the depth cuts off did not end, and a signal had `check` say that there are no errors.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_check_ends_whatever_a_great_depth_would_cost() {
+    let folder = Folder::with(
+        "a.txt",
+        "Screen 64 48\nLook 0 1 5 0 0 0 40\nMaterial m mirror .5 .5 .5 glass 1 1 1 1.5\nSphere 1 -.9 0 0 m\n\
+         Sphere 1 .9 0 0 m\nBox -3 -1.2 -3 3 -1 3 .1 .1 .1 .5 .5 .5 .3 .3 .3\nTrace\n",
+    );
+    assert_eq!(Running::start(&folder, &["check", "a.txt"]).end().code(), Some(0));
+    let mut rayfold = Running::start(&folder, &["check", "a.txt"]);
+    wait_until("it works", || is_at_work(&rayfold));
+    rayfold.signal("-INT");
+    assert_eq!(rayfold.end().code(), Some(130));
 }
 
 /// The commands wait for input, from a terminal or from another program. Regression test: a second Ctrl-C was needed,

@@ -1,7 +1,6 @@
 //! The command line: its flags, and which module answers which subcommand.
 
 use std::ffi::OsString;
-#[cfg(not(feature = "network"))]
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -111,10 +110,16 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
                 let _ = writeln!(std::io::stderr(), "{message}");
                 return ExitCode::from(2);
             }
-            // Help and version go to standard output and are no failure; if that is closed, there is no
-            // way to report it.
-            let _ = e.print();
-            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
+            // Help and version go to standard output and are no failure.
+            let printed = e.print().and_then(|()| std::io::stdout().flush());
+            return ExitCode::from(match printed {
+                _ if e.use_stderr() => 2,
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                    let _ = writeln!(std::io::stderr(), "error: cannot write to standard output: {error}");
+                    1
+                }
+                _ => 0,
+            });
         }
     };
     let console = Console::resolve(app.global.quiet, app.global.color);

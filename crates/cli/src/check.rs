@@ -94,7 +94,9 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
                 for file in unused_files(path) {
                     faults.conflict(&file, Severity::Warning, &"no script names this file");
                 }
-                if let Some(warning) = plan.light_cut_off()? {
+                // Nobody would see the warning.
+                let is_seen = !console.quiet || args.format == Format::Json;
+                if is_seen && let Some(warning) = plan.light_cut_off()? {
                     faults.conflict(path, Severity::Warning, &warning);
                 }
                 if let Err(error) = plan.one_size() {

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::console::Console;
 
@@ -164,9 +164,34 @@ pub(crate) fn wait_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'sta
     }
 }
 
+/// Does work that polls a flag, which is set at a signal and when the time is over.
+pub(crate) fn within<T>(time: Duration, work: impl FnOnce(&AtomicBool) -> T) -> T {
+    let is_over = AtomicBool::new(false);
+    let (done, watched) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        let is_over = &is_over;
+        scope.spawn(move || {
+            let end = Instant::now() + time;
+            while watched.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                is_over.store(stopping() || Instant::now() >= end, Ordering::SeqCst);
+            }
+        });
+        let result = work(is_over);
+        drop(done);
+        result
+    })
+}
+
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn work_ends_when_its_time_is_over() {
+        let wait = |flag: &AtomicBool| while !flag.load(Ordering::SeqCst) {};
+        within(Duration::ZERO, wait);
+        assert_eq!(within(Duration::from_secs(3600), |_| 7), 7);
+    }
 
     #[test]
     fn ignored_signals_are_those_of_the_mask() {

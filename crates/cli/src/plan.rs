@@ -6,8 +6,9 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
 
 use rayfold_scene::{
     AnimationSettings, Depth, Limits, Origin, SETTINGS_FILE, Samples, Scene, Screen, Script, Severity,
@@ -25,6 +26,9 @@ const KEPT_TEXT: usize = 64 << 20;
 
 /// Memory that frames ahead of the encoder may take, in bytes: two images of 1920 x 1080 while they are drawn.
 const AHEAD: u64 = 192 << 20;
+
+/// The longest time for a look at the light that a depth cuts off.
+const LOOKING: Duration = Duration::from_secs(3);
 
 /// Bytes of a pixel while it is drawn: its samples, its levels, and its share of the encoded file.
 const OF_PIXEL: u64 = 48;
@@ -356,15 +360,21 @@ impl Plan {
     }
 
     /// Looks at the first, the middle and the last frame for light that their depth cuts off, and says which
-    /// depth would show it.
+    /// depth would show it. Gives up after some seconds: glass that mirrors, too, takes for ever at great depths.
     ///
     /// # Errors
-    /// The errors of [`Self::scene`].
+    /// The errors of [`Self::scene`], or a signal came.
     pub(crate) fn light_cut_off(&self) -> anyhow::Result<Option<String>> {
+        let warning = interrupt::within(LOOKING, |flag| self.light_cut_off_until(flag))?;
+        anyhow::ensure!(!interrupt::signalled(), "interrupted");
+        Ok(warning)
+    }
+
+    fn light_cut_off_until(&self, flag: &AtomicBool) -> anyhow::Result<Option<String>> {
         let last = self.len() - 1;
         let mut looked_at = vec![0, last / 2, last];
         looked_at.dedup();
-        let options = RenderOptions { cancel: Some(interrupt::flag()), ..Default::default() };
+        let options = RenderOptions { cancel: Some(flag), ..Default::default() };
         for nth in looked_at {
             let Some(job) = self.jobs().nth(nth as usize) else { continue };
             let scene = self.scene(&job)?;

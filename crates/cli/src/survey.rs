@@ -41,15 +41,16 @@ pub(crate) struct Conflict {
 impl Faults {
     /// Returns the number of errors in all files.
     pub(crate) fn errors(&self) -> usize {
-        self.unreadable.len()
-            + self.diagnostics.iter().filter(|d| d.is_error()).count()
-            + self.conflicts_of(Severity::Error)
+        self.unreadable.len() + self.described(Severity::Error) + self.conflicts_of(Severity::Error)
     }
 
     /// Returns the number of warnings in all files.
     pub(crate) fn warnings(&self) -> usize {
-        self.diagnostics.iter().filter(|d| d.severity == Severity::Warning).count()
-            + self.conflicts_of(Severity::Warning)
+        self.described(Severity::Warning) + self.conflicts_of(Severity::Warning)
+    }
+
+    fn described(&self, severity: Severity) -> usize {
+        self.diagnostics.iter().filter(|d| d.severity == severity).map(|d| d.count).sum()
     }
 
     fn conflicts_of(&self, severity: Severity) -> usize {

@@ -152,6 +152,18 @@ pub struct Diagnostic {
     pub help: Option<String>,
     /// The text around the fault.
     pub excerpt: Excerpt,
+    /// The number of faults that it stands for: more than one for those that are only counted.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub count: usize,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 /// The line of a fault, or its part around the fault if the line is long.

@@ -130,6 +130,7 @@ impl<'a> Report<'a> {
             message,
             expected,
             help,
+            count: 1,
         };
         if tally.count > self.max_described {
             tally.first_left_out = Some(diagnostic);
@@ -160,14 +161,15 @@ impl<'a> Report<'a> {
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
         for (tally, name) in [(self.errors, "error"), (self.warnings, "warning")] {
             if let Some(first) = tally.first_left_out {
-                let left_out = tally.count - self.max_described;
-                let s = if left_out == 1 { "" } else { "s" };
-                let left_out = grouped(left_out as u64);
+                let count = tally.count - self.max_described;
+                let s = if count == 1 { "" } else { "s" };
+                let left_out = grouped(count as u64);
                 self.kept.push(Diagnostic {
                     code: Code::TooManyFaults,
                     message: format!("{left_out} more {name}{s} from here on"),
                     expected: None,
                     help: None,
+                    count,
                     ..first
                 });
             }
@@ -204,7 +206,9 @@ mod tests {
         }
         report.error(line, 0..3, || unreachable!("never put into words"));
         assert!(report.has_errors());
-        let lines: Vec<_> = report.finish().into_iter().map(|d| (d.message, d.column)).collect();
+        let all = report.finish();
+        assert_eq!(all.iter().map(|d| d.count).sum::<usize>(), 7);
+        let lines: Vec<_> = all.into_iter().map(|d| (d.message, d.column)).collect();
         let lines: Vec<_> = lines.iter().map(|(message, column)| (message.as_str(), *column)).collect();
         assert_eq!(
             lines,
