@@ -223,6 +223,26 @@ fn a_face_seen_edge_on_is_met_by_the_middle_column_and_a_level_one_by_no_row() {
     }
 }
 
+/// Regression test: letters on a floor of a million units took minutes, because each shadow was decided exactly.
+#[test]
+fn many_small_triangles_in_a_large_scene_are_drawn_in_double() {
+    let chosen = |count: u32, floor: f64, light: &str| {
+        let triangles: String =
+            (0..count).map(|k| format!("Triangle {k} 0 0 {k}.5 0 0 {k} .5 0 1 0 0 0 1 0\n")).collect();
+        let script = format!(
+            "Screen 32 24\nLook 0 1 5 0 0 0 40\n{light}\n{triangles}Box -{floor} -2 -{floor} {floor} -1 {floor} 1 0 0 0 1 0\n\
+             Trace\n"
+        );
+        let script = parse("small.txt", script.as_bytes(), &Limits::default()).script.unwrap();
+        rayfold_tracer::precision(&script.frame(0).unwrap())
+    };
+    let sun = "Ilight 1 1 1 -1 -2 -1";
+    assert_eq!(chosen(100, 1e6, sun), Precision::F64);
+    assert_eq!(chosen(100, 1e3, sun), Precision::F32, "the scene is not so large");
+    assert_eq!(chosen(20, 1e6, sun), Precision::F32, "they are few");
+    assert_eq!(chosen(100, 1e6, ""), Precision::F32, "there is no shadow");
+}
+
 #[test]
 fn surfaces_that_single_precision_cannot_tell_apart_are_drawn_in_double() {
     const NOTE: &str = "-1 -1 {z} 1 -1 {z} 0 1 {z}";

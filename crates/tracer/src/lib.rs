@@ -59,7 +59,7 @@ pub use sampling::Sampler;
 
 /// The version of the pixels. It is raised whenever any scene's pixels change, so that outdated pictures can be
 /// detected.
-pub const PIXEL_VERSION: u32 = 8;
+pub const PIXEL_VERSION: u32 = 9;
 
 /// The number of reflections after which the mirror term is dropped, unless a script sets it.
 pub const MAX_BOUNCES: u32 = 5;

@@ -14,7 +14,7 @@ use rayfold_scene::{Object, Scene};
 
 use crate::camera::Axis;
 use crate::fast::arithmetic::real::Real;
-use crate::fast::arithmetic::rounding::OFFSET;
+use crate::fast::arithmetic::rounding::{OFFSET, side_of_going_on};
 use crate::fast::bodies;
 use crate::fast::build::extensions::needs_double;
 use crate::fast::materials::glass::SURFACES_OF_ONE;
@@ -54,6 +54,9 @@ const MIXED: f64 = 16.0;
 
 /// The number of pairs of an occluder and a possible receiver that are compared before the search is given up.
 const PAIRS: usize = 1 << 22;
+
+/// The number of triangles in whose shadows rays may always be in doubt, and the largest share of all triangles.
+const IN_DOUBT: (usize, f64) = (64, 0.125);
 
 /// The largest invisible error of a position, in pixels.
 const INVISIBLE: f64 = 0.05;
@@ -262,8 +265,27 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
     };
     all(&geometry.solids, |solid| solid.shape.is_fine(&sight))
         && are_normals_fine(geometry, &sight)
+        && !are_shadows_in_doubt(geometry, roundoff)
         && are_shadows_fine(geometry, &sight)
         && !surfaces_z_fight(geometry, scene, pixel)
+}
+
+/// Returns whether many triangles are so small beside the scene that each ray towards a sun that passes near one is in doubt,
+/// and is decided exactly. That takes hundreds of times as long as a ray in `f64`, which is not in doubt.
+fn are_shadows_in_doubt(geometry: &Geometry, roundoff: f64) -> bool {
+    // The width of the doubt at an edge, for points of coordinates up to 1 (`Prism`).
+    let width = 2.0 * side_of_going_on::<f32>() * roundoff;
+    let is_triangle = |solid: &Solid| matches!(solid.shape, Shape::Triangle(_));
+    let is_small = |solid: &Solid| {
+        let (min, max) = solid.shape.bounds();
+        is_triangle(solid) && (max - min).max_element() < width
+    };
+    if geometry.suns.is_empty() || all(&geometry.solids, |solid| !is_small(solid)) {
+        return false;
+    }
+    let count = |is: &dyn Fn(&Solid) -> bool| geometry.solids.iter().filter(|solid| is(solid)).count();
+    let small = count(&is_small);
+    small > IN_DOUBT.0 && small as f64 > IN_DOUBT.1 * count(&is_triangle) as f64
 }
 
 /// Returns whether the errors of shadows are invisible where they fall. That is no nearer to the eye than the nearest
