@@ -33,6 +33,33 @@ test("copied lines bring the materials and groups that they name, in the order o
   assert.equal(scriptOf(lines, [8, 7, 99]), texts(1, 2, 3, 4, 5, 6, 7, 8));
 });
 
+test("a caret goes over what looks like one character, as CodeMirror's own table has it", async () => {
+  const { findClusterBreak } = await load("script/clusters.ts");
+  const { findClusterBreak: table } = await import("@marijn/find-cluster-break");
+  const family = "\u{1F469}\u200D\u{1F469}\u200D\u{1F467}";
+  for (const text of ["", "a", "abc", "a\u0301b", "x\u{1F600}y", `${family}!`, "\u{1F1E9}\u{1F1EA}\u{1F1EB}\u{1F1F7}", "# \u00E4\u00F6 e\u0308\u0301 \u20AC", "\u{1F600}\u{1F3FD}."]) {
+    for (const forward of [true, false]) {
+      const stops = (next) => {
+        const all = [];
+        for (let at = forward ? 0 : text.length; at !== (forward ? text.length : 0); ) all.push((at = next(text, at, forward)));
+        return all;
+      };
+      assert.deepEqual(stops(findClusterBreak), stops(table), text);
+    }
+  }
+});
+
+test("keys of other alphabets are named by their places", async () => {
+  const { base, shift, keyName } = await load("script/keynames.ts");
+  const names = await import("w3c-keyname");
+  for (const code of [48, 57, 65, 90, 97, 106, 107, 109, 110, 111, 59, 61, 173, 186, 187, 188, 189, 190, 191, 192, 219, 220, 221, 222]) {
+    assert.equal(base[code], names.base[code], `base ${code}`);
+    assert.equal(shift[code], names.shift[code], `shift ${code}`);
+  }
+  assert.equal(keyName({ key: "ArrowLeft", keyCode: 37 }), "ArrowLeft");
+  assert.equal(keyName({ key: "Unidentified", keyCode: 90, shiftKey: true }), "Z");
+});
+
 test("a sun's direction and its angles are the same", async () => {
   const { sunAngles, sunDirection } = await load("inspector/sun.ts");
   assert.deepEqual(sunAngles(0, -1, 0), { azimuth: 0, height: 90 });
