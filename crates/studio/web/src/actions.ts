@@ -5,7 +5,7 @@ import {
   Redo2, Search, Spline, StepBack, StepForward, Trash2, Undo2, Ungroup, Video, Zap, type IconNode,
 } from "lucide";
 
-import { ask, connected, help, lines, playing, searching, selection, state } from "./store";
+import { ask, connected, help, lines, playing, searching, selection, state, step } from "./store";
 import { animate, chosenKeys, copyKeys, hasKeys, pasteKeys, removeKeys, wish } from "./timeline/keys";
 
 export interface Action {
@@ -23,17 +23,17 @@ const reorder = (down: boolean) => (): void => ask({ ask: "reorder", line: selec
 const nudge = (x: number, y: number, z: number) => (): void =>
   ask({ ask: "nudge", lines: selection.value, by: [x, y, z] });
 
-export function step(by: number): void {
+export function goBy(by: number): void {
   const now = state.value;
   if (now) ask({ ask: "frame", frame: (now.frame + by + now.frames) % now.frames, moving: false });
 }
 
 export const actions = {
-  undo: { title: "Undo", keys: ["Ctrl+z"], icon: Undo2, run: () => ask({ ask: "undo" }), enabled: () => state.value?.canUndo ?? false },
+  undo: { title: "Undo", keys: ["Ctrl+z"], icon: Undo2, run: () => step("undo"), enabled: () => state.value?.canUndo ?? false },
   redo: {
     title: "Redo",
     keys: ["Ctrl+Shift+Z", "Ctrl+y"], icon: Redo2,
-    run: () => ask({ ask: "redo" }),
+    run: () => step("redo"),
     enabled: () => state.value?.canRedo ?? false,
   },
   duplicate: {
@@ -98,8 +98,8 @@ export const actions = {
     keys: ["o"], icon: Layers,
     run: () => wish({ do: "switch", what: "onion", on: !state.value?.time.onion }),
   },
-  previous: { title: "Previous frame", keys: [","], icon: StepBack, run: () => step(-1) },
-  next: { title: "Next frame", keys: ["."], icon: StepForward, run: () => step(1) },
+  previous: { title: "Previous frame", keys: [","], icon: StepBack, run: () => goBy(-1) },
+  next: { title: "Next frame", keys: ["."], icon: StepForward, run: () => goBy(1) },
   script: { title: "Look through the script's camera", keys: ["0"], icon: Video, run: () => ask({ ask: "look", at: "script" }) },
   lookFront: { title: "Look from the front", keys: ["1"], run: () => ask({ ask: "look", at: "front" }) },
   lookSide: { title: "Look from the side", keys: ["3"], run: () => ask({ ask: "look", at: "side" }) },

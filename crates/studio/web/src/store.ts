@@ -68,9 +68,17 @@ export function onPicture(take: Show): void {
   show = take;
 }
 
-/** Receives each message after it has changed the state. */
-export function onText(take: (tell: ServerMessage) => void): void {
+export type Step = "undo" | "redo";
+
+const stepAtOnce = (what: Step): void => ask({ ask: what });
+
+/** Undoes or redoes a step. The editor does it after what was typed before. */
+export let step: (what: Step) => void = stepAtOnce;
+
+/** Receives each message after it has changed the state. The editor also says how a step is taken. */
+export function onText(take: (tell: ServerMessage) => void, steps = stepAtOnce): void {
   hearText = take;
+  step = steps;
   early.splice(0).forEach(take);
 }
 
@@ -80,8 +88,13 @@ export function gesture(): number {
   return gestures;
 }
 
+/** Sends a message. Returns its number, or 0 without a connection. */
+export function post(wish: ClientMessage): number {
+  return send?.(JSON.stringify(wish)) ? (sent += 1) : 0;
+}
+
 export function ask(wish: ClientMessage): void {
-  if (send?.(JSON.stringify(wish))) sent += 1;
+  post(wish);
 }
 
 /** Drags what is held. While a reply is awaited, only the newest place is kept. */

@@ -60,6 +60,25 @@ test("keys of other alphabets are named by their places", async () => {
   assert.equal(keyName({ key: "Unidentified", keyCode: 90, shiftKey: true }), "Z");
 });
 
+test("a step of the server is as small as it can be, and at the caret", async () => {
+  const { serverChanges } = await load("script/sync.ts");
+  const { Text } = await import("@codemirror/state");
+  const spans = (text, at, removed, texts, caret) => {
+    const doc = Text.of(text.split("\n"));
+    const count = doc.lines - removed + texts.length;
+    const changes = serverChanges(doc, [{ at, removed, lines: texts.map((text) => ({ text })) }], false, count, caret);
+    const found = [];
+    changes.iterChanges((from, to, _from, _to, inserted) => found.push([from, to, String(inserted)]));
+    return found;
+  };
+  assert.deepEqual(spans("ab\ncd\nx", 0, 2, ["abcd"]), [[2, 3, ""]], "a line end that is taken back");
+  assert.deepEqual(spans("abcd\nx", 0, 1, ["ab", "cd"]), [[2, 2, "\n"]]);
+  assert.deepEqual(spans("aaaa", 0, 1, ["aaa"], 1), [[0, 1, ""]], "typed at the start");
+  assert.deepEqual(spans("aaaa", 0, 1, ["aaa"], 4), [[3, 4, ""]]);
+  assert.deepEqual(spans("aaa", 0, 1, ["aaaa"], 1), [[1, 1, "a"]]);
+  assert.deepEqual(spans("xaay", 0, 1, ["xbby"], 0), [[1, 3, "bb"]]);
+});
+
 test("a sun's direction and its angles are the same", async () => {
   const { sunAngles, sunDirection } = await load("inspector/sun.ts");
   assert.deepEqual(sunAngles(0, -1, 0), { azimuth: 0, height: 90 });

@@ -226,3 +226,76 @@ test("a search finds, and replaces as one step", async (t) => {
   await until(() => readFileSync(path, "utf8") === before);
   studio.check();
 });
+
+test("what is typed around undo and redo is kept in its order, and so is the caret, also if the replies are late", async (t) => {
+  const steps = ["Home", "# ab", "undo", "# c", "undo", "redo", "d", "undo", "undo", "redo", "Enter", "# e", "undo", "f", "Backspace", "undo", "redo", "# g", "undo", "undo", "h"];
+  const keys = { undo: "Control+z", redo: "Control+Shift+Z" };
+  const run = async (late, pause) => {
+    const studio = await open(t, { text });
+    const { page, path } = studio;
+    if (late > 0) {
+      await page.routeWebSocket(/socket/, (socket) => {
+        const server = socket.connectToServer();
+        socket.onMessage((message) => server.send(message));
+        server.onMessage((message) => setTimeout(() => socket.send(message), late));
+      });
+      await page.reload();
+      await until(async () => (await page.locator("canvas").getAttribute("data-picture")) !== null);
+    }
+    await goLine(page, 4);
+    for (const what of steps) {
+      if (/^[#a-z]/.test(what) && !(what in keys)) await page.keyboard.type(what);
+      else await page.keyboard.press(keys[what] ?? what);
+      await page.waitForTimeout(pause);
+    }
+    await page.waitForTimeout(1000 + 10 * late);
+    await studio.saved();
+    const last = readFileSync(path, "utf8");
+    assert.equal((await seenLines(page)).join("\n"), last, "the editor shows the file");
+    studio.check();
+    return { last, caret: await caret(page) };
+  };
+  const slow = await run(0, 400);
+  for (const late of [0, 150]) {
+    const fast = await run(late, 0);
+    assert.deepEqual(fast, slow, `replies after ${late} ms`);
+  }
+});
+
+test("undo and redo leave the caret where it is, and put it behind what they bring back", async (t) => {
+  const studio = await open(t, { text });
+  const { page, path } = studio;
+  const is = (file, column, line) =>
+    until(async () => {
+      const now = await caret(page);
+      return readFileSync(path, "utf8") === file && now.column === column && now.text === line;
+    }, 10_000);
+  const line = (at, by) => text.split("\n").with(at, by).join("\n");
+  await goLine(page, 1);
+  await page.keyboard.press("End");
+  await page.keyboard.type(" # abc");
+  await is(line(0, "Screen 320 180 # abc"), 20, "Screen 320 180 # abc");
+  await page.keyboard.press("Control+z");
+  await is(text, 14, "Screen 320 180");
+  await page.keyboard.press("Control+y");
+  await is(line(0, "Screen 320 180 # abc"), 20, "Screen 320 180 # abc");
+  await page.keyboard.type("d");
+  await is(line(0, "Screen 320 180 # abcd"), 21, "Screen 320 180 # abcd");
+  // A line end within a line, taken back and done again.
+  await goLine(page, 4);
+  for (let times = 0; times < 6; times += 1) await page.keyboard.press("ArrowRight");
+  await page.keyboard.press("Enter");
+  const split = line(0, "Screen 320 180 # abcd").replace("Sphere ", "Sphere\n ");
+  await is(split, 0, " 1 0 1 0 .1 .1 .1 .8 .2 .2");
+  await page.keyboard.press("Control+z");
+  await is(line(0, "Screen 320 180 # abcd"), 6, "Sphere 1 0 1 0 .1 .1 .1 .8 .2 .2");
+  await page.keyboard.press("Control+y");
+  await is(split, 0, " 1 0 1 0 .1 .1 .1 .8 .2 .2");
+  // A step elsewhere leaves the caret alone.
+  await page.keyboard.press("Control+z");
+  await is(line(0, "Screen 320 180 # abcd"), 6, "Sphere 1 0 1 0 .1 .1 .1 .8 .2 .2");
+  await page.keyboard.press("Control+z");
+  await page.keyboard.press("Control+z");
+  await is(text, 6, "Sphere 1 0 1 0 .1 .1 .1 .8 .2 .2");
+  studio.check();
+});

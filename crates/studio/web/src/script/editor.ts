@@ -140,7 +140,10 @@ export function open(host: HTMLElement): () => void {
   const create = (doc: Text): EditorState => EditorState.create({ doc, extensions: extensions(text) });
   const editor = new EditorView({ state: create(Text.empty), parent: root, root });
   view = editor;
-  onText((tell) => text.hear(editor, tell, (doc) => editor.setState(create(doc))));
+  onText(
+    (tell) => text.hear(editor, tell, (doc) => editor.setState(create(doc))),
+    (what) => text.step(editor, what),
+  );
   const ends = [
     effect(() => {
       void connected.value;
@@ -158,7 +161,8 @@ export function open(host: HTMLElement): () => void {
     effect(() => {
       void lines.value;
       const line = selection.value.at(-1);
-      if (line !== undefined && !place) reveal(line);
+      // Who types is not led elsewhere: the selection follows the caret.
+      if (line !== undefined && !place && root.activeElement !== editor.contentDOM) reveal(line);
       if (place && place.file === state.value?.file) {
         const { line, column } = place;
         place = null;

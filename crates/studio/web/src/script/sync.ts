@@ -6,7 +6,7 @@ import { ChangeSet, type ChangeSpec, type Extension, Text, Transaction } from "@
 import { EditorView } from "@codemirror/view";
 
 import type { LineState, ServerMessage, TextChange, TextState } from "../protocol";
-import { ask, lines, playing } from "../store";
+import { ask, lines, playing, post, type Step } from "../store";
 
 const PAGE = "page";
 const STUDIO = "studio";
@@ -21,11 +21,19 @@ interface Change {
   readonly count: number;
 }
 
+/** A step of undo or redo that waits, and the number of changes before it that the server has not accepted yet. */
+interface Waiting {
+  readonly what: Step;
+  before: number;
+}
+
 export interface Sync {
   /** The extension that sends changes; made anew with each state. */
   readonly extension: () => Extension;
   /** Takes a message of the server about the text. */
   readonly hear: (view: EditorView, tell: ServerMessage, reset: (text: Text) => void) => void;
+  /** Undoes or redoes a step, in the order in which it was typed: after the changes before it, before those after it. */
+  readonly step: (view: EditorView, what: Step) => void;
 }
 
 export function sync(): Sync {
@@ -34,9 +42,31 @@ export function sync(): Sync {
   /** Changes that are not shown yet, and the timer that runs for a while after some were shown. */
   let waiting: Change[] = [];
   let timer = 0;
+  /** The steps that are not sent yet, and the number of the message with the one that has no answer yet, else 0. */
+  let steps: Waiting[] = [];
+  let awaited = 0;
+  /** The number of changes that are sent and have no answer yet. */
+  let flying = 0;
 
   const send = (before: Text, changes: ChangeSet, after: Text): void => {
     ask({ ask: "edit", file, version, changes: lineChanges(before, changes, after) });
+    flying += 1;
+  };
+
+  /** Sends the changes that have not been sent, up to the next step, and the step as soon as none is before it. */
+  const proceed = (view: EditorView): void => {
+    if (awaited) return;
+    const pending = sendableUpdates(view.state);
+    const most = steps[0]?.before ?? pending.length;
+    let before = synced;
+    for (const [at, { changes }] of pending.slice(0, most).entries()) {
+      const after = changes.apply(before);
+      if (at >= flying) send(before, changes, after);
+      before = after;
+    }
+    if (most > 0) return;
+    const next = steps.shift();
+    if (next) awaited = post({ ask: next.what });
   };
 
   const extension = (): Extension => [
@@ -45,14 +75,17 @@ export function sync(): Sync {
       for (const transaction of update.transactions) {
         if (!transaction.docChanged || transaction.annotation(Transaction.remote)) continue;
         playing.value = false;
-        send(transaction.startState.doc, transaction.changes, transaction.newDoc);
+        if (!awaited && steps.length === 0) send(transaction.startState.doc, transaction.changes, transaction.newDoc);
       }
     }),
   ];
 
   const take = (view: EditorView, changes: ChangeSet, clientID: string): void => {
     const transaction = receiveUpdates(view.state, [{ changes, clientID }]);
+    const after = view.state.selection.map(transaction.changes, 1);
     view.dispatch(transaction);
+    // What a step brings back is before the caret, as if it were typed again.
+    if (awaited && clientID === STUDIO && !after.eq(view.state.selection)) view.dispatch({ selection: after });
   };
 
   const show = (view: EditorView): void => {
@@ -60,25 +93,25 @@ export function sync(): Sync {
     timer = 0;
     if (waiting.length === 0) return;
     let all = ChangeSet.empty(synced.length);
+    const caret = sendableUpdates(view.state).length === 0 ? view.state.selection.main.head : undefined;
     for (const { splices, text, count } of waiting.splice(0)) {
       version = text.version;
-      const changes = serverChanges(synced, splices, text.ends, count);
+      const changes = serverChanges(synced, splices, text.ends, count, caret);
       synced = changes.apply(synced);
       all = all.compose(changes);
     }
     take(view, all, STUDIO);
-    let before = synced;
-    for (const update of sendableUpdates(view.state)) {
-      const after = update.changes.apply(before);
-      send(before, update.changes, after);
-      before = after;
-    }
+    // What was sent for an older version was refused.
+    flying = 0;
+    proceed(view);
     timer = window.setTimeout(() => show(view), APART);
   };
 
-  const hear = (view: EditorView, tell: ServerMessage, reset: (text: Text) => void): void => {
+  const hearText = (view: EditorView, tell: ServerMessage, reset: (text: Text) => void): void => {
     if (tell.lines && tell.text) {
       waiting = [];
+      steps = [];
+      flying = 0;
       ({ file, version } = tell.text);
       synced = Text.of(textLines(tell.lines, tell.text.ends));
       reset(synced);
@@ -89,16 +122,32 @@ export function sync(): Sync {
       const [first] = sendableUpdates(view.state);
       if (!first) return;
       synced = first.changes.apply(synced);
+      flying -= 1;
+      for (const step of steps) step.before -= 1;
       take(view, first.changes, PAGE);
+      proceed(view);
       return;
     }
     if (!tell.splices || !tell.text) return;
     waiting.push({ splices: tell.splices, text: tell.text, count: lines.value.length });
     // A drag changes numbers within lines.
     const isDrag = tell.splices.every((splice) => splice.removed === splice.lines.length);
-    if (!isDrag || timer === 0) show(view);
+    if (!isDrag || awaited || timer === 0) show(view);
   };
-  return { extension, hear };
+
+  const hear: Sync["hear"] = (view, tell, reset) => {
+    hearText(view, tell, reset);
+    if (!awaited || (tell.state?.asked ?? 0) < awaited) return;
+    show(view);
+    awaited = 0;
+    proceed(view);
+  };
+
+  const step: Sync["step"] = (view, what) => {
+    steps.push({ what, before: sendableUpdates(view.state).length });
+    proceed(view);
+  };
+  return { extension, hear, step };
 }
 
 /** The lines that an editor shows of a script: after a line end at its end there is an empty one. */
@@ -128,8 +177,8 @@ export function lineChanges(before: Text, changes: ChangeSet, after: Text): read
   }));
 }
 
-/** The changes of a text by the server's splices, as small as they can be, so that the caret stays. */
-export function serverChanges(text: Text, splices: NonNullable<ServerMessage["splices"]>, ends: boolean, count: number): ChangeSet {
+/** The changes of a text by the server's splices, as small as they can be, at the caret where they can be, so that it stays. */
+export function serverChanges(text: Text, splices: NonNullable<ServerMessage["splices"]>, ends: boolean, count: number, caret?: number): ChangeSet {
   let doc = text;
   let all = ChangeSet.empty(doc.length);
   const change = (spec: ChangeSpec): void => {
@@ -137,37 +186,43 @@ export function serverChanges(text: Text, splices: NonNullable<ServerMessage["sp
     doc = changes.apply(doc);
     all = all.compose(changes);
   };
-  for (const { at, removed, lines: inserted } of splices) change(spliceChange(doc, at, removed, inserted.map((line) => line.text)));
+  for (const { at, removed, lines: inserted } of splices) {
+    const here = caret === undefined ? undefined : all.mapPos(caret);
+    change(spliceChange(doc, at, removed, inserted.map((line) => line.text), here));
+  }
   const wanted = ends || count === 0 ? count + 1 : count;
   if (doc.lines > wanted) change({ from: doc.line(wanted).to, to: doc.length });
   if (doc.lines < wanted) change({ from: doc.length, insert: Text.of(["", ""]) });
   return all;
 }
 
-function spliceChange(doc: Text, at: number, removed: number, inserted: readonly string[]): ChangeSpec {
+function spliceChange(doc: Text, at: number, removed: number, inserted: readonly string[], caret: number | undefined): ChangeSpec {
   if (removed === inserted.length) {
-    return inserted.map((text, row) => {
+    return inserted.flatMap((text, row) => {
       const line = doc.line(at + row + 1);
-      return { from: line.from, to: line.to, insert: text };
-    }).flatMap((whole) => smallest(doc, whole));
+      return smallest(doc, line.from, line.to, text, caret);
+    });
   }
   if (removed === 0) {
     if (at < doc.lines) return { from: doc.line(at + 1).from, insert: Text.of([...inserted, ""]) };
     return { from: doc.length, insert: Text.of(["", ...inserted]) };
   }
   const from = doc.line(at + 1).from;
-  if (inserted.length > 0) return { from, to: doc.line(at + removed).to, insert: Text.of(inserted) };
+  if (inserted.length > 0) return smallest(doc, from, doc.line(at + removed).to, inserted.join("\n"), caret);
   if (at + removed < doc.lines) return { from, to: doc.line(at + removed + 1).from };
   return { from: Math.max(0, from - 1), to: doc.length };
 }
 
-/** A change of one line without the characters that stay. */
-function smallest(doc: Text, { from, to, insert }: { from: number; to: number; insert: string }): readonly ChangeSpec[] {
+/** A change of some lines without the characters that stay. Of equal ones, those at the caret have changed. */
+function smallest(doc: Text, from: number, to: number, insert: string, caret: number | undefined): readonly ChangeSpec[] {
   const old = doc.sliceString(from, to);
   if (old === insert) return [];
   const most = Math.min(old.length, insert.length);
   let [same, rest] = [0, 0];
   while (same < most && old[same] === insert[same]) same += 1;
-  while (rest < most - same && old[old.length - 1 - rest] === insert[insert.length - 1 - rest]) rest += 1;
-  return [{ from: from + same, to: to - rest, insert: Text.of([insert.slice(same, insert.length - rest)]) }];
+  while (rest < most && old[old.length - 1 - rest] === insert[insert.length - 1 - rest]) rest += 1;
+  const end = caret === undefined ? same : caret - from - Math.max(0, old.length - insert.length);
+  same = Math.min(same, Math.max(most - rest, end));
+  rest = Math.min(rest, most - same);
+  return [{ from: from + same, to: to - rest, insert: Text.of(insert.slice(same, insert.length - rest).split("\n")) }];
 }
