@@ -132,3 +132,38 @@ test("the sun turns by its angles", async (t) => {
   await until(async () => /Ilight 1 1 1 (-?0) -1 (-?0)/.test(await studio.saved()));
   studio.check();
 });
+
+test("a number and a colour are set in all that are selected, as one step", async (t) => {
+  const text =
+    "Screen 320 180\nLook 0 3 9  0 0.5 0  40\nIlight 1 1 1 1 -1 -1\nMaterial gold diffuse .5 .4 .1\n" +
+    "Sphere 1  -2 1 0  .1 .1 .1  .8 .2 .2   # one\nSphere 2  0 1 0  #202020  .2 .8 .2   # two\nSphere .5  2 1 0  gold   # three, not gold\n" +
+    "Box 0 0 -3  1 1 -2  .1 .1 .1  .2 .2 .8   # box\nTrace\n";
+  const studio = await open(t, { text });
+  const { page } = studio;
+  const line = async (name) => (await studio.saved()).split("\n").find((line) => line.includes(`# ${name}`));
+  await page.locator(".item", { hasText: "box" }).click();
+  for (const name of ["one", "two", "three"]) await page.locator(".item", { hasText: name }).click({ modifiers: ["Control"] });
+  await page.locator(".item", { hasText: "one" }).click({ modifiers: ["Control"] });
+  await page.locator(".item", { hasText: "one" }).click({ modifiers: ["Control"] });
+  const radius = page.getByRole("spinbutton", { name: "radius" });
+  await radius.fill("1.5");
+  await radius.press("Enter");
+  await until(async () => /^Sphere 1\.5 /.test(await line("three")));
+  assert.equal(await line("one"), "Sphere 1.5  -2 1 0  .1 .1 .1  .8 .2 .2   # one");
+  assert.equal(await line("two"), "Sphere 1.5  0 1 0  #202020  .2 .8 .2   # two");
+  assert.equal(await line("three"), "Sphere 1.5  2 1 0  gold   # three, not gold");
+  assert.match(await line("box"), /^Box 0 0 -3 {2}1 1 -2 /);
+  await page.getByLabel("colour, as a colour", { exact: true }).fill("#0000ff");
+  await until(async () => /0 0 1 /.test(await line("box")));
+  assert.equal(await line("one"), "Sphere 1.5  -2 1 0  .1 .1 .1  0 0 1   # one");
+  assert.equal(await line("two"), "Sphere 1.5  0 1 0  #202020  0 0 1   # two");
+  assert.equal(await line("three"), "Sphere 1.5  2 1 0  gold   # three, not gold", "a material stays");
+  assert.equal(await line("box"), "Box 0 0 -3  1 1 -2  .1 .1 .1  0 0 1   # box");
+  await page.locator(".viewport").focus();
+  await page.keyboard.press("Control+z");
+  await until(async () => (await line("box")).includes(".2 .2 .8"));
+  assert.match(await line("one"), /\.8 \.2 \.2/);
+  await page.keyboard.press("Control+z");
+  await until(async () => (await studio.saved()) === text);
+  studio.check();
+});

@@ -29,8 +29,36 @@ const unfolded = signal<ReadonlySet<string>>(new Set());
 /** Three decimals are finer than a level of a picture. Small numbers have three digits. */
 const round = (value: number): number => (Math.abs(value) < 0.1 ? Number(value.toPrecision(3)) : Math.round(value * 1000) / 1000);
 
-function set(line: number, first: number, values: readonly number[], under: number | null): void {
-  if (values.every(Number.isFinite)) ask({ ask: "set", line, first, values, gesture: under });
+/** Sets numbers of a field, from its `at`th on, in the shown line and in all selected lines that have this field. */
+function set({ field, inspected }: FieldProps, at: number, values: readonly number[], under: number | null): void {
+  if (!values.every(Number.isFinite)) return;
+  const { line } = inspected;
+  const others = values.length > 0 ? sameFields(field, inspected) : [];
+  // Several lines are one step, whose end is told.
+  const step = under ?? (others.length > 0 ? gesture() : null);
+  for (const [other, first] of others) ask({ ask: "set", line: other, first: first + at, values, gesture: step });
+  ask({ ask: "set", line, first: field.first + at, values, gesture: step });
+  if (step !== under) ask({ ask: "set", line, first: field.first, values: [], gesture: null });
+}
+
+/** The other selected lines that have a field, each with the position of its first number. */
+function sameFields(of: FieldTable, { line }: Inspected): readonly (readonly [number, number])[] {
+  const own = lines.value[line];
+  return selection.value.flatMap((at) => {
+    const { command = "", role, text = "" } = lines.value[at] ?? {};
+    // The clauses of a material decide what its numbers are.
+    if (at === line || role === "material" || own?.role === "material") return [];
+    const field = commands.value.get(command)?.fields.find(({ label, kind, names }) => label === of.label && kind === of.kind && names.length === of.names.length);
+    return !field || (isSurface(field) && materialOf(at, text)) ? [] : [[at, field.first] as const];
+  });
+}
+
+const isSurface = ({ kind }: FieldTable): boolean => kind === "coefficients";
+
+/** The material that a line names in place of colours. */
+function materialOf(line: number, text: string): string | undefined {
+  const names = new Set(lines.value.slice(0, line).flatMap(({ role, subject }) => (role === "material" ? [subject] : [])));
+  return text.split(/\s#(?![0-9a-f]{6}\b)/i)[0]?.split(/[\s,]+/).find((word) => names.has(word));
 }
 
 export function Inspector(): JSX.Element {
@@ -79,7 +107,7 @@ export function Inspector(): JSX.Element {
       )}
       {count > 1 && (
         <p class="field">
-          <span class="note">{count} lines are selected.</span>
+          <span class="note">{count} are selected. A change is made in all that have the number.</span>
           <select aria-label="Align" value="" onChange={(event) => align(event.currentTarget)}>
             <option value="">Align…</option>
             {["x", "y", "z"].flatMap((name, axis) =>
@@ -122,10 +150,11 @@ function TextRow({ text, line }: { readonly text: string; readonly line: number 
 function MaterialRow({ name, line }: { readonly name: string; readonly line: number }): JSX.Element {
   const names = lines.value.slice(0, line).flatMap(({ role, subject }) => (role === "material" && subject ? [subject] : []));
   const at = lines.value.findIndex((line) => line.role === "material" && line.subject === name);
+  const objects = selection.value.filter((at) => lines.value[at]?.role === "object");
   return (
     <p class="field">
       <span class="label">material</span>
-      <select aria-label="material" value={name} onChange={(event) => ask({ ask: "surface", lines: [line], material: event.currentTarget.value })}>
+      <select aria-label="material" value={name} onChange={(event) => ask({ ask: "surface", lines: objects.includes(line) ? objects : [line], material: event.currentTarget.value })}>
         {names.map((name) => (
           <option key={name}>{name}</option>
         ))}
@@ -178,7 +207,7 @@ function align(menu: HTMLSelectElement): void {
 /** Several samples per pixel, as soft light needs. */
 function smooth(): void {
   const now = state.value?.settings.find(({ command }) => command === "Samples");
-  if (now) set(now.line, 0, [16], null);
+  if (now) ask({ ask: "set", line: now.line, first: 0, values: [16], gesture: null });
   else ask({ ask: "add", command: "Samples", at: null });
 }
 
@@ -353,7 +382,7 @@ function Swatch({ field, inspected, values }: SwatchProps): JSX.Element | null {
       .padStart(2, "0");
   const pick = (text: string, under: number | null): void => {
     const channels = [1, 3, 5].map((at) => round((most * Number.parseInt(text.slice(at, at + 2), 16)) / 255));
-    set(inspected.line, field.first, channels, under);
+    set({ field, inspected }, 0, channels, under);
   };
   return (
     <input
@@ -364,7 +393,7 @@ function Swatch({ field, inspected, values }: SwatchProps): JSX.Element | null {
       onInput={(event) => pick(event.currentTarget.value, sliding)}
       onChange={(event) => {
         pick(event.currentTarget.value, sliding);
-        set(inspected.line, field.first, [], null);
+        set({ field, inspected }, 0, [], null);
         sliding = gesture();
       }}
     />
@@ -405,7 +434,7 @@ function SunRows({ field, inspected, values }: SwatchProps): JSX.Element | null 
   const [x, y, z] = values;
   if (x == null || y == null || z == null) return null;
   const now = sunAngles(x, y, z);
-  const slide = (name: keyof typeof now): Slide => (to, under) => set(inspected.line, field.first, to === null ? [] : sunDirection({ ...now, [name]: to }), under);
+  const slide = (name: keyof typeof now): Slide => (to, under) => set({ field, inspected }, 0, to === null ? [] : sunDirection({ ...now, [name]: to }), under);
   return (
     <>
       {(["azimuth", "height"] as const).map((name) => (
@@ -457,7 +486,7 @@ function NumberRow({ field, inspected, name, index, value, slider }: NumberProps
   const [least, most] = ends(field, value ?? 1);
   const step = field.whole ? 1 : (most - least) / 1000;
   const isOpen = most - least <= 1e6;
-  const slide: Slide = (to, under) => set(inspected.line, at, to === null ? [] : [to], under);
+  const slide: Slide = (to, under) => set({ field, inspected }, index, to === null ? [] : [to], under);
   return (
     <p class="number">
       {field.names.length > 1 && <span aria-hidden="true">{short}</span>}
