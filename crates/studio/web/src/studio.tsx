@@ -6,6 +6,7 @@ import { listen } from "./actions";
 import { listenClipboard } from "./clipboard";
 import "./base.css";
 import { Inspector } from "./inspector/inspector";
+import { keepFocus } from "./parts/focus";
 import { Split } from "./parts/split";
 import { Viewport } from "./picture/viewport";
 import { Materials } from "./scene/materials";
@@ -73,7 +74,7 @@ function paceRendering(): void {
   const flush = (): void => {
     const update = waiting;
     waiting = undefined;
-    update?.();
+    if (update) keepFocus(update);
   };
   options.debounceRendering = (update) => {
     waiting = update;

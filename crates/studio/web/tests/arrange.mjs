@@ -167,3 +167,33 @@ test("a number and a colour are set in all that are selected, as one step", asyn
   await until(async () => (await studio.saved()) === text);
   studio.check();
 });
+
+test("the focus stays in its panel when what has it is gone or drawn anew", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page } = studio;
+  const focused = () => page.evaluate(() => [document.activeElement.tagName, document.activeElement.ariaLabel, document.activeElement.closest(".panel")?.className]);
+  // A list whose row was renamed goes on by its keys.
+  await page.locator(".item", { hasText: "left" }).click();
+  await page.getByRole("listbox").focus();
+  await page.keyboard.press("F2");
+  await page.keyboard.type("first");
+  await page.keyboard.press("Enter");
+  await page.locator(".item", { hasText: "first" }).waitFor();
+  await page.keyboard.press("ArrowDown");
+  await page.locator(".item[aria-selected=true]", { hasText: "right" }).waitFor();
+  // A field is the same field of the next object that is selected, and of the line that was moved.
+  const radius = page.getByRole("spinbutton", { name: "radius" });
+  await radius.focus();
+  await page.locator(".item", { hasText: "first" }).evaluate((row) => row.click());
+  await until(async () => (await radius.inputValue()) === "0.4");
+  assert.equal((await focused())[1], "radius");
+  await radius.press("Tab");
+  const before = await focused();
+  assert.notEqual(before[0], "BODY");
+  // The button of what is removed is gone with it.
+  await page.getByRole("button", { name: "Delete", exact: true }).focus();
+  await page.keyboard.press("Enter");
+  await page.getByText("Scene settings").waitFor();
+  assert.match((await focused())[2], /inspector/);
+  studio.check();
+});
