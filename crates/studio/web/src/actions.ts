@@ -15,6 +15,8 @@ export interface Action {
   readonly icon?: IconNode;
   readonly run: () => void;
   readonly enabled?: () => boolean;
+  /** Whether its keys are for keys of the timeline, and those of objects come first elsewhere. */
+  readonly ofKeys?: boolean;
 }
 
 const any = (): boolean => selection.value.length > 0;
@@ -42,7 +44,7 @@ export const actions = {
     run: () => ask({ ask: "duplicate", lines: selection.value }),
     enabled: any,
   },
-  removeKeys: { title: "Delete the selected keys of the timeline", keys: ["Delete", "Backspace"], icon: Trash2, run: removeKeys, enabled: hasKeys },
+  removeKeys: { title: "Delete the selected keys, in the timeline", keys: ["Delete", "Backspace"], icon: Trash2, run: removeKeys, enabled: hasKeys, ofKeys: true },
   remove: { title: "Delete", keys: ["Delete", "Backspace"], icon: Trash2, run: () => ask({ ask: "remove", lines: selection.value }), enabled: any },
   hide: { title: "Hide or show", keys: ["h"], icon: EyeOff, run: () => ask({ ask: "hide", lines: selection.value }), enabled: any },
   group: { title: "Make a group", keys: ["Ctrl+g"], icon: Group, run: () => ask({ ask: "group", lines: selection.value }), enabled: any },
@@ -85,7 +87,7 @@ export const actions = {
     run: () => wish({ do: "switch", what: "auto-key", on: !state.value?.time.autoKey }),
   },
   animate: { title: "Make an animation of 50 frames", keys: ["Shift+F"], icon: Film, run: animate, enabled: () => (state.value?.frames ?? 1) < 2 },
-  copyKeys: { title: "Copy the selected keys", keys: ["Ctrl+c"], icon: Copy, run: copyKeys, enabled: hasKeys },
+  copyKeys: { title: "Copy the selected keys, in the timeline", keys: ["Ctrl+c"], icon: Copy, run: copyKeys, enabled: hasKeys, ofKeys: true },
   // Ctrl+V is an event of the clipboard, whose text says if it is keys.
   pasteKeys: { title: "Paste keys at this frame", keys: [], icon: ClipboardPaste, run: pasteKeys, enabled: () => (state.value?.time.copied ?? 0) > 0 },
   path: {
@@ -142,7 +144,8 @@ export function listen(): void {
     if (event.key === " " && target.closest("button, a, summary")) return;
     if (event.key === "Escape" && document.querySelector("[popover]:popover-open")) return;
     const name = `${control}${event.shiftKey && event.key !== "?" ? "Shift+" : ""}${event.key}`;
-    const found = Object.values<Action>(actions).find((action) => action.keys.includes(name) && (action.enabled?.() ?? true));
+    const isObject = any() && !target.closest(".timeline");
+    const found = Object.values<Action>(actions).find((action) => action.keys.includes(name) && !(action.ofKeys && isObject) && (action.enabled?.() ?? true));
     if (found) {
       event.preventDefault();
       found.run();

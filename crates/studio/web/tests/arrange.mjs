@@ -197,3 +197,50 @@ test("the focus stays in its panel when what has it is gone or drawn anew", asyn
   assert.match((await focused())[2], /inspector/);
   studio.check();
 });
+
+test("the list of keys has all keys, in columns where there is room", async (t) => {
+  const studio = await open(t, { text: SCENE });
+  const { page } = studio;
+  await page.locator(".viewport").focus();
+  await page.keyboard.press("?");
+  const dialog = page.getByRole("dialog", { name: "Keys" });
+  const keys = await dialog.locator("kbd").allTextContents();
+  const own = readFileSync(join(import.meta.dirname, "../src/script/editor.ts"), "utf8");
+  const named = [...own.matchAll(/key: "((?:Mod|Alt|Shift)-[^"]+)", run: (?!cm.deleteGroup|cm.selectAll)/g)].map(([, key]) => key);
+  assert.ok(named.length > 10, "keys of the script");
+  const people = (key) =>
+    key.replace("Shift-Alt", "Alt-Shift").replace("Mod", "Ctrl").replace("ArrowUp", "↑").replace("ArrowDown", "↓").replaceAll("-", "+").replace(/\+([a-z])$/, (_, letter) => `+${letter.toUpperCase()}`);
+  for (const key of [...named.map(people), "F8", "F3", "Ctrl+F", "Ctrl+Space", "F2", "Alt+←", "Alt+↑", "Ctrl+Enter", "Shift+↑", "Home", "+", "-", "?"]) {
+    assert.ok(keys.includes(key), `${key} in the list`);
+  }
+  assert.equal(await dialog.locator("td:empty").count(), 0, "each row has a key");
+  const lefts = () => dialog.locator("caption").evaluateAll((all) => new Set(all.map((one) => Math.round(one.getBoundingClientRect().left))).size);
+  assert.ok((await lefts()) > 1, "columns");
+  await page.setViewportSize({ width: 390, height: 844 });
+  assert.equal(await lefts(), 1);
+  assert.ok(await dialog.evaluate((of) => of.scrollWidth <= of.clientWidth), "nothing is beside it");
+  await page.setViewportSize({ width: 1400, height: 900 });
+  await shot(page, "keys");
+  assert.deepEqual(await audit(page), []);
+  studio.check();
+});
+
+test("Delete and Ctrl+C are for the object in the picture, and for the keys in the timeline", async (t) => {
+  const studio = await open(t, { text: ANIMATED });
+  const { page, context } = studio;
+  await context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  const has = async (part) => (await studio.saved()).includes(part);
+  await page.locator(".tracks .label").first().click();
+  assert.equal(await page.locator(".item[aria-selected=true]", { hasText: "runner" }).count(), 1, "its object is selected, too");
+  await page.locator(".viewport").focus();
+  await page.keyboard.press("Control+c");
+  await until(async () => (await page.evaluate(() => navigator.clipboard.readText())).startsWith("Sphere 0.3"));
+  await page.keyboard.press("Delete");
+  await until(async () => !(await has("# runner")));
+  await page.keyboard.press("Control+z");
+  await until(() => has("(smooth 1:-1 10:1)"));
+  await page.locator(".tracks .label").first().click();
+  await page.keyboard.press("Delete");
+  await until(async () => (await has("# runner")) && !(await has("smooth")));
+  studio.check();
+});
