@@ -16,11 +16,6 @@ pub fn decode(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<M
     model.ok_or_else(|| AssetError::NoTriangle { name: name.into() })
 }
 
-/// Returns the fault of what is no model.
-pub(crate) fn no_model() -> Fault {
-    Fault::new("it is no model: expected OBJ, PLY, STL or glTF")
-}
-
 fn read(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Parts, Fault> {
     if bytes.starts_with(b"glTF") {
         return gltf::read_binary(name, bytes, referred);
@@ -40,7 +35,7 @@ fn read(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Parts, 
     }
     // Foreign bytes would be lines that say nothing.
     if text[..text.len().min(4096)].contains(&0) {
-        return Err(stl::cut_off(name, bytes).unwrap_or_else(no_model));
+        return Err(stl::cut_off(name, bytes).unwrap_or_else(Fault::no_model));
     }
     obj::read(text, referred)
 }

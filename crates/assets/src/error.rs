@@ -152,6 +152,11 @@ impl Fault {
         Self { line: Some(line), ..Self::new(what) }
     }
 
+    /// The content is that of no model.
+    pub(crate) fn no_model() -> Self {
+        Self::new("it is no model: expected OBJ, PLY, STL or glTF")
+    }
+
     pub(crate) fn of_font(self, name: &str) -> AssetError {
         AssetError::NoFont { name: name.into(), what: self.what }
     }

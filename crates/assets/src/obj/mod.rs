@@ -14,7 +14,6 @@ use rayon::prelude::*;
 
 use self::lines::{Lines, before_comment, field, index, numbers, words};
 use self::materials::Map;
-use crate::decode::no_model;
 use crate::error::Fault;
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
@@ -151,7 +150,7 @@ fn read_in(bytes: &[u8], chunks: usize, refer: &mut Referred<'_>) -> Result<Part
     let is_empty = read.iter().all(|chunk| chunk.positions.is_empty() && chunk.fault.is_none());
     reader.join(read, refer)?;
     if is_empty {
-        return Err(no_model());
+        return Err(Fault::no_model());
     }
     reader.paint(refer)?;
     let mut parts = reader.parts;
