@@ -1,7 +1,8 @@
 // The start page and the tour, and what editors have: copies as text, alignment, boxes, search, curves, motion paths.
 
 import assert from "node:assert/strict";
-import { existsSync, readFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
@@ -242,5 +243,38 @@ test("Delete and Ctrl+C are for the object in the picture, and for the keys in t
   await page.locator(".tracks .label").first().click();
   await page.keyboard.press("Delete");
   await until(async () => (await has("# runner")) && !(await has("smooth")));
+  studio.check();
+});
+
+test("the search finds outputs, scripts, starter materials, objects without a name, and the dialogs", async (t) => {
+  const folder = join(mkdtempSync(join(tmpdir(), "rayfold-search-")), "film");
+  mkdirSync(folder);
+  t.after(() => rmSync(join(folder, ".."), { recursive: true, force: true }));
+  writeFileSync(join(folder, "one.txt"), SCENE.replace("   # left", ""));
+  writeFileSync(join(folder, "two.txt"), SCENE);
+  const studio = await open(t, { from: folder, name: "film" });
+  const { page } = studio;
+  const search = async (text) => {
+    await page.locator(".viewport").focus();
+    await page.keyboard.press("Control+k");
+    await page.getByRole("combobox", { name: "Search" }).fill(text);
+  };
+  await search("sphere line 5");
+  await page.keyboard.press("Enter");
+  await page.locator(".item[aria-selected=true]", { hasText: "Sphere in line 5" }).waitFor();
+  await search("starter chalk");
+  await page.keyboard.press("Enter");
+  await until(() => readFileSync(join(studio.path, "one.txt"), "utf8").includes("Material chalk"));
+  await search("two.txt");
+  await page.keyboard.press("Enter");
+  await page.locator(".scene.shown", { hasText: "two.txt" }).waitFor();
+  await search("render webp");
+  await page.keyboard.press("Enter");
+  await page.getByRole("link", { name: /Download WebP/ }).waitFor();
+  for (const [text, name] of [["apng output", "Render APNG"], ["frames output", "Frames"], ["scripts output", "Scripts"], ["save under another", "File"], ["dark", "Light or dark"]]) {
+    await search(text);
+    await page.locator(".search .item").filter({ has: page.getByText(name, { exact: true }) }).waitFor();
+    await page.keyboard.press("Escape");
+  }
   studio.check();
 });

@@ -102,7 +102,7 @@ test("curves go through their keys, with the slopes of smooth ones", async () =>
 });
 
 test("the search finds what has all words, also in another order", async () => {
-  const { matching } = await load("top/search.tsx");
+  const { matching } = await load("top/matching.ts");
   const all = [{ text: "Add Sphere", note: "Sphere" }, { text: "Duplicate", note: "Ctrl+D" }, { text: "small sphere", note: "Sphere" }];
   assert.deepEqual(matching(all, "sphere small").map(({ text }) => text), ["small sphere"]);
   assert.equal(matching(all, "").length, 3);

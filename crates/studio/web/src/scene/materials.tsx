@@ -53,7 +53,7 @@ effect(() => {
 });
 
 /** The selected lines that can have a material. */
-const wearers = computed(() => selection.value.filter((at) => lines.value[at]?.role === "object"));
+export const wearers = computed(() => selection.value.filter((at) => lines.value[at]?.role === "object"));
 
 /** The address of the picture of a material's sphere. */
 export function sphereOf(at: number): string | undefined {

@@ -113,6 +113,12 @@ interface RowProps {
 /** Whether a line is named by a word that other lines refer to, not by its comment. */
 const isNamed = (line: LineState): boolean => (line.role === "material" || line.role === "group") && line.subject !== undefined;
 
+/** The name of a line, or its command and number. */
+export function titleOf(line: LineState, at: number): string {
+  const named = isNamed(line) ? line.subject : (line.name ?? line.subject);
+  return named ? visible(named) : `${line.role === "camera" ? "Camera" : nameOf(line.command ?? "")} in line ${at + 1}`;
+}
+
 function Row({ at, row, line, rows }: RowProps): JSX.Element {
   const isSelected = selected.value.has(at);
   const click = (event: MouseEvent): void => {
@@ -150,8 +156,7 @@ function Row({ at, row, line, rows }: RowProps): JSX.Element {
     );
   }
   const named = isNamed(line) ? line.subject : (line.name ?? line.subject);
-  const people = line.role === "camera" ? "Camera" : nameOf(line.command ?? "");
-  const shown = named ? visible(named) : `${people} in line ${at + 1}`;
+  const shown = titleOf(line, at);
   const isLocked = state.value?.locked.includes(at) ?? false;
   const states = [line.hidden && ", hidden", isLocked && ", locked"].filter(Boolean).join("");
   return (

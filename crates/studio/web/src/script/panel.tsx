@@ -11,11 +11,16 @@ import { open, openAt } from "./editor";
 /** The largest number of listed problems. */
 const LISTED = 20;
 
+/** Shows the first frame of a file, from 0. */
+export function showFile(file: number): void {
+  const frame = files.value.slice(0, file).reduce((frames, { frames: own }) => frames + own, 0);
+  ask({ ask: "frame", frame, moving: false });
+}
+
 /** Opens a line of a file and puts the caret to a column, all from 0. */
 export function openPlace(file: number, line: number, column: number): void {
-  const before = files.value.slice(0, file).reduce((frames, { frames: own }) => frames + own, 0);
   openAt(file, line, column);
-  if (state.value?.file !== file) ask({ ask: "frame", frame: before, moving: false });
+  if (state.value?.file !== file) showFile(file);
   ask({ ask: "select", lines: [line] });
 }
 

@@ -1,4 +1,5 @@
-// Search over everything: actions with their keys, what can be added, and the lines of the script.
+// Search over everything: actions with their keys, outputs, what can be added, the lines of the script, starter materials
+// and scripts.
 
 import { computed, signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -7,10 +8,11 @@ import { type Action, actions } from "../actions";
 import { nameOf } from "../inspector/words";
 import { keyName } from "../parts/button";
 import { visible } from "../parts/visible";
-import { ask, examples, lines, searching, select, tables } from "../store";
-
-/** The number of results. */
-const SHOWN = 12;
+import { wearers } from "../scene/materials";
+import { titleOf } from "../scene/outliner";
+import { showFile } from "../script/panel";
+import { ask, examples, files, lines, notice, presets, searching, select, tables } from "../store";
+import { matching } from "./matching";
 
 interface Found {
   readonly text: string;
@@ -28,9 +30,15 @@ const all = computed((): readonly Found[] => [
   ...tables.value
     .filter(({ role, fields, name }) => ["object", "light"].includes(role) || name === "Material" || (role === "setting" && fields.length > 0))
     .map(({ name }) => ({ text: `Add ${nameOf(name)}`, note: name, run: () => ask({ ask: "add", command: name, at: null }) })),
-  ...lines.value.flatMap(({ name, subject, command, role }, at) =>
-    role && (name || subject) ? [{ text: visible(name ?? subject ?? ""), note: command ?? "", run: () => select([at]) }] : [],
+  ...lines.value.flatMap((line, at) =>
+    line.role && line.role !== "setting" ? [{ text: titleOf(line, at), note: line.command ?? "", run: () => select([at]) }] : [],
   ),
+  ...presets.value.map((preset) => ({
+    text: `Material ${preset}`,
+    note: "starter material",
+    run: () => (wearers.value.length > 0 ? ask({ ask: "preset", lines: wearers.value, preset }) : void (notice.value = "Select objects first, which get the material.")),
+  })),
+  ...files.value.map(({ name }, file) => ({ text: visible(name), note: "script", run: () => showFile(file) })),
   ...examples.value.map((name) => ({
     text: `Open the example ${name}`,
     note: "replaces the script",
@@ -38,15 +46,17 @@ const all = computed((): readonly Found[] => [
   })),
 ]);
 
-/** The results: those that contain all words of the text. */
-export function matching<T extends { readonly text: string; readonly note: string }>(all: readonly T[], text: string): readonly T[] {
-  const words = text.toLowerCase().split(/\s+/);
-  return all.filter(({ text, note }) => words.every((word) => `${text} ${note}`.toLowerCase().includes(word))).slice(0, SHOWN);
-}
+/** What the upper bar has besides actions: outputs, files and the colours. */
+const buttons = (): readonly Found[] =>
+  [...document.querySelectorAll<HTMLElement>(".result :is(a, button:enabled:not(.more)), .bar :is(button[aria-label='File'], button[aria-label='Light or dark'])")].map((of) => ({
+    text: of.ariaLabel ?? of.textContent ?? "",
+    note: of.closest(".result") ? "output" : of.title,
+    run: () => of.click(),
+  }));
 
 export function Search(): JSX.Element | null {
   if (!searching.value) return null;
-  const results = (): readonly Found[] => matching(all.value, typed.value);
+  const results = (): readonly Found[] => matching([...all.value, ...buttons()], typed.value);
   const among = (found: readonly Found[]): number => Math.min(chosen.value, found.length - 1);
   const found = results();
   const at = among(found);
@@ -77,7 +87,7 @@ export function Search(): JSX.Element | null {
         aria-expanded="true"
         aria-controls="found"
         aria-activedescendant={found[at] && `found-${at}`}
-        placeholder="Actions, objects, materials, examples"
+        placeholder="Actions, objects, materials, outputs, scripts"
         onInput={(event) => {
           typed.value = event.currentTarget.value;
           chosen.value = 0;
