@@ -123,6 +123,33 @@ test("a key is dragged as a point of a curve, and as a point of the motion path"
   studio.check();
 });
 
+test("keys of the curves are at the frames of their tracks, stay held outside of the lane, and a zoom is for its tracks", async (t) => {
+  const text = ANIMATED.replace("0.3 1  .1 .1 .1 .2 .4 .9", "(1:2 9:4) 1  .1 .1 .1 .2 .4 .9").replace("(smooth 1:-1", "(smooth -3:5 1:-1");
+  const studio = await open(t, { text });
+  const { page } = studio;
+  await page.locator(".tracks .label").first().click();
+  await page.getByRole("button", { name: "Curves" }).click();
+  const lefts = (selector) => page.locator(selector).evaluateAll((all) => all.map((one) => Math.round(one.getBoundingClientRect().left)));
+  await page.locator(".curves .key").nth(1).waitFor();
+  assert.deepEqual(await lefts(".curves .key"), await lefts("[data-row='0']"), "also without the key before the first frame");
+  const lane = await page.locator(".curves .lane").boundingBox();
+  const key = await page.locator(".curves .key").last().boundingBox();
+  await page.mouse.move(key.x + 12, key.y + 12);
+  await page.mouse.down();
+  await page.mouse.move(key.x + 12, lane.y - 60, { steps: 5 });
+  await until(async () => / 10:[2-9]/.test(await studio.saved()));
+  await page.mouse.move(key.x + 12, lane.y + 70, { steps: 5 });
+  await page.mouse.up();
+  await until(async () => !/ 10:[2-9]/.test(await studio.saved()));
+  await page.mouse.move(lane.x + 50, lane.y + 70);
+  for (let times = 0; times < 6; times += 1) await page.mouse.wheel(0, -400);
+  await until(async () => (await page.locator(".curves .key").count()) === 0);
+  await page.locator(".tracks .label").nth(1).click();
+  await until(async () => (await page.locator(".curves .key").count()) === 2);
+  await shot(page, "curves-two");
+  studio.check();
+});
+
 test("the sun turns by its angles", async (t) => {
   const studio = await open(t, { text: SCENE });
   const { page } = studio;

@@ -357,9 +357,9 @@ test("a script whose folder is missing is refused at once", async () => {
   assert.match(text, /does not exist/);
 });
 
-test("at three sizes and in both themes nothing is clipped, and the picture has its room", async (t) => {
+test("at four sizes and in both themes nothing is clipped, bars have one row, and the picture has its room", async (t) => {
   const text = `${HEAD}${FLOOR}${ball(1, "(1:-2 40:2)", 1, 0, "ball")}Frames 40\nTrace\n`;
-  for (const [width, height] of [[1440, 900], [1024, 768], [390, 844]]) {
+  for (const [width, height] of [[1440, 900], [1024, 768], [768, 1024], [390, 844]]) {
     for (const scheme of ["light", "dark"]) {
       await t.test(`${width} x ${height}, ${scheme}`, async (t) => {
         const studio = await open(t, { text, size: [width, height], scheme });
@@ -377,6 +377,10 @@ test("at three sizes and in both themes nothing is clipped, and the picture has 
             .map((element) => element.outerHTML.slice(0, 80)),
         );
         assert.deepEqual(overflow, []);
+        const rows = (selector) => page.locator(selector).evaluateAll((all) => new Set(all.filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect()).map(({ top, height }) => Math.round((top + height / 2) / 8))).size);
+        assert.equal(await rows(".transport button, .transport input, .transport output"), 1, "rows of the transport");
+        if (width > 480) assert.equal(await rows(".bar button"), 1, "rows of the bar");
+        assert.ok(await page.locator(".transport").evaluate((of) => of.scrollWidth <= of.clientWidth), "the transport fits");
         assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
         assert.deepEqual(await audit(page), []);
         studio.check();

@@ -37,7 +37,7 @@ export function Button({ action, label, wide = false, pressed }: Props): JSX.Ele
       onClick={action.run}
     >
       {icon && <Icon of={icon} />}
-      {(!icon || wide) && name}
+      {(!icon || wide) && <span>{name}</span>}
     </button>
   );
 }

@@ -14,8 +14,8 @@ export const curving = signal(false);
 
 type Range = readonly [number, number];
 
-/** The zoomed values; `null` for all. */
-const zoomed = signal<Range | null>(null);
+/** The zoomed values of some tracks; `null` for all. */
+const zoomed = signal<{ readonly of: string; readonly range: Range } | null>(null);
 
 /** The most curves that are shown at once. */
 const SHOWN = 9;
@@ -50,7 +50,8 @@ export function pathOf({ keys, mode, slopes }: Track): string {
 export function Curves({ time }: { readonly time: TimeState }): JSX.Element {
   const held = useRef<{ readonly x: number; readonly y: number; readonly frame: number; readonly value: number; readonly range: Range } | null>(null);
   const all = shown.value;
-  const [low, high] = held.current?.range ?? zoomed.value ?? valuesOf(all);
+  const of = all.map(({ line, number }) => `${line}:${number}`).join();
+  const [low, high] = held.current?.range ?? (zoomed.value?.of === of ? zoomed.value.range : undefined) ?? valuesOf(all);
   const height = high - low;
   const press = (event: PointerEvent, key: KeyPlace): void => {
     const box = (event.currentTarget as HTMLElement).parentElement?.getBoundingClientRect();
@@ -74,16 +75,14 @@ export function Curves({ time }: { readonly time: TimeState }): JSX.Element {
     const box = event.currentTarget.getBoundingClientRect();
     const at = high - ((event.clientY - box.top) / box.height) * height;
     const factor = Math.exp(event.deltaY * 0.002);
-    zoomed.value = [at - (at - low) * factor, at + (high - at) * factor];
+    zoomed.value = { of, range: [at - (at - low) * factor, at + (high - at) * factor] };
   };
   return (
     <div class="curves track">
       <span class="label note">
-        {Number(high.toPrecision(3))}
-        <br />
-        {all.length === 0 ? "Select a track." : all.map(({ label }) => label).join(", ")}
-        <br />
-        {Number(low.toPrecision(3))}
+        <span>{Number(high.toPrecision(3))}</span>
+        <span>{all.length === 0 ? "Select a track." : all.map(({ label }) => label).join(", ")}</span>
+        <span>{Number(low.toPrecision(3))}</span>
       </span>
       <div class="lane" onWheel={zoom} onDblClick={() => (zoomed.value = null)} onPointerMove={move} onPointerUp={release} onPointerCancel={release}>
         <svg viewBox={`${time.first - 0.5} 0 ${span(time)} 1`} preserveAspectRatio="none" aria-hidden="true">
@@ -91,17 +90,20 @@ export function Curves({ time }: { readonly time: TimeState }): JSX.Element {
             <path key={nameOf({ ...track, frame: 0 })} class={`curve-${at % 3}`} d={pathOf(track)} transform={`matrix(1 0 0 ${-1 / height} 0 ${high / height})`} />
           ))}
         </svg>
+        <span class="head" style={{ left: `${place(time, time.number)}%` }} />
         {all.flatMap((track) =>
           keysOf(track).map((key, at) => {
             const top = ((high - (track.keys[at]?.[1] ?? 0)) / height) * 100;
+            // A key that is dragged out of the lane stays held at its edge.
+            const isHeld = held.current !== null && chosenNames.value.has(nameOf(key));
             return (
-              top >= 0 &&
-              top <= 100 && (
+              key.frame >= time.first &&
+              (isHeld || (top >= 0 && top <= 100)) && (
                 <button
                   type="button"
                   key={nameOf(key)}
                   class="key"
-                  style={{ left: `${place(time, key.frame)}%`, top: `${top}%` }}
+                  style={{ left: `${place(time, key.frame)}%`, top: `${Math.max(0, Math.min(100, top))}%` }}
                   aria-pressed={chosenNames.value.has(nameOf(key))}
                   aria-label={`${track.label}, frame ${key.frame}, value ${track.keys[at]?.[1] ?? 0}; Alt and arrow keys move it`}
                   onPointerDown={(event) => press(event, key)}

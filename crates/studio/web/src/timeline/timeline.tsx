@@ -28,7 +28,7 @@ export function Timeline(): JSX.Element | null {
   if (!now) return null;
   return (
     <section class="panel timeline" aria-label="Timeline">
-      <div class="transport">
+      <div class={now.frames > 1 ? "transport film" : "transport"}>
         {now.frames > 1 && <Player frame={now.frame} frames={now.frames} fps={now.fps} />}
         <Tools time={now.time} frames={now.frames} />
       </div>
@@ -95,10 +95,11 @@ function Player({ frame, frames, fps }: { readonly frame: number; readonly frame
         onChange={(event) => ask({ ask: "frame", frame: event.currentTarget.valueAsNumber - 1, moving: false })}
       />
       <output>
-        frame {frame + 1} of {frames}
+        <span>frame </span>
+        {frame + 1} of {frames}
       </output>
       <label class="fps" title={canCreate.value ? "Stored in animation.json" : "As long as the studio runs; rayfold render takes it as --fps"}>
-        <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} /> fps
+        <NumberField label="Frames a second" value={fps} least={0.01} most={1000} set={(asked) => wish({ do: "pace", fps: asked })} /> <span>fps</span>
       </label>
     </div>
   );
@@ -119,8 +120,8 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
   return (
     <div class="tools" role="group" aria-label="Keys">
       {isOne && (
-        <label>
-          <NumberField label="Frames" value={count} least={1} most={1_000_000} whole set={(asked) => wish({ do: "frames", count: asked })} /> frames
+        <label title="The number of frames">
+          <NumberField label="Frames" value={count} least={1} most={1_000_000} whole set={(asked) => wish({ do: "frames", count: asked })} /> <span>frames</span>
         </label>
       )}
       {isOne ? (
