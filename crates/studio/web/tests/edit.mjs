@@ -380,6 +380,8 @@ test("at four sizes and in both themes nothing is clipped, bars have one row, an
         const rows = (selector) => page.locator(selector).evaluateAll((all) => new Set(all.filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect()).map(({ top, height }) => Math.round((top + height / 2) / 8))).size);
         assert.equal(await rows(".transport button, .transport input, .transport output"), 1, "rows of the transport");
         if (width > 480) assert.equal(await rows(".bar button"), 1, "rows of the bar");
+        const cut = await page.locator(".tile span, .sphere span, .tools button, .fold").evaluateAll((all) => all.filter((one) => one.scrollWidth > one.clientWidth + 1 && one.clientWidth > 0).map((one) => one.textContent));
+        assert.deepEqual(cut, [], "labels that are cut off");
         assert.ok(await page.locator(".transport").evaluate((of) => of.scrollWidth <= of.clientWidth), "the transport fits");
         assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
         assert.deepEqual(await audit(page), []);

@@ -56,6 +56,9 @@ export const openNew: (() => void) | null = () => {
   location.reload();
 };
 
+/** The address of the start page. */
+export const startPage: string | null = "index.html";
+
 const newWorker = (): Worker => new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
 
 export function open({ opened, told, shown, closed }: Listener): Send {

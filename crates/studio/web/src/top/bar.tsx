@@ -1,8 +1,10 @@
 // The bar at the top: the project, undo and redo, the view, and the output.
 
 import "./top.css";
-import { ChevronDown, Download, FolderOpen, SunMoon } from "lucide";
+import { ChevronDown, Download, FolderOpen, House, SunMoon } from "lucide";
 import type { JSX } from "preact";
+
+import { startPage } from "#connection";
 
 import { actions } from "../actions";
 import { Button } from "../parts/button";
@@ -33,6 +35,11 @@ export function Bar(): JSX.Element {
         </span>
       </div>
       <nav aria-label="Edit" class="group">
+        {startPage && (
+          <a class="button icon-button" href={startPage} title="The start page: examples. What is open is kept" aria-label="Start page">
+            <Icon of={House} />
+          </a>
+        )}
         <button type="button" class="icon-button" title="Open an example or a file, save under another name" aria-label="File" onClick={() => (filing.value = true)}>
           <Icon of={FolderOpen} />
         </button>
