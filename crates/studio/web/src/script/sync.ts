@@ -84,7 +84,7 @@ export function sync(): Sync {
     const transaction = receiveUpdates(view.state, [{ changes, clientID }]);
     const after = view.state.selection.map(transaction.changes, 1);
     view.dispatch(transaction);
-    // What a step brings back is before the caret, as if it were typed again.
+    // The caret is behind the text that a step brings back, as if it were typed again.
     if (awaited && clientID === STUDIO && !after.eq(view.state.selection)) view.dispatch({ selection: after });
   };
 
@@ -101,7 +101,7 @@ export function sync(): Sync {
       all = all.compose(changes);
     }
     take(view, all, STUDIO);
-    // What was sent for an older version was refused.
+    // Changes of an older version were refused.
     flying = 0;
     proceed(view);
     timer = window.setTimeout(() => show(view), APART);

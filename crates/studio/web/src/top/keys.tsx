@@ -66,7 +66,7 @@ function Section({ title, rows }: { readonly title: string; readonly rows: reado
   );
 }
 
-/** What actions do not have: for each part, what its keys and the pointer do. */
+/** For each part, the keys and the uses of the pointer that are no actions. */
 const PARTS: Readonly<Record<string, readonly (readonly [string, string])[]>> = {
   "The pointer, in the picture": [
     ["Move along the ground", "drag"],

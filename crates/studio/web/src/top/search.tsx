@@ -46,7 +46,7 @@ const all = computed((): readonly Found[] => [
   })),
 ]);
 
-/** What the upper bar has besides actions: outputs, files and the colours. */
+/** The buttons of the upper bar that are no actions: outputs, files and the colours. */
 const buttons = (): readonly Found[] =>
   [...document.querySelectorAll<HTMLElement>(".result :is(a, button:enabled:not(.more)), .bar :is(button[aria-label='File'], button[aria-label='Light or dark'])")].map((of) => ({
     text: of.ariaLabel ?? of.textContent ?? "",
