@@ -146,6 +146,14 @@ test("keys of the curves are at the frames of their tracks, stay held outside of
   await until(async () => (await page.locator(".curves .key").count()) === 0);
   await page.locator(".tracks .label").nth(1).click();
   await until(async () => (await page.locator(".curves .key").count()) === 2);
+  // With Shift the wheel moves the values.
+  const first = page.locator(".curves .key").first();
+  const before = await first.boundingBox();
+  await page.mouse.move(lane.x + 50, lane.y + 70);
+  await page.keyboard.down("Shift");
+  await page.mouse.wheel(0, 20);
+  await page.keyboard.up("Shift");
+  await until(async () => Math.abs((await first.boundingBox()).y - before.y + 20) < 2);
   await shot(page, "curves-two");
   studio.check();
 });

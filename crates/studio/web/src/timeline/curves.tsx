@@ -1,5 +1,5 @@
 // The values of tracks as curves: of those with a selected key, else of the selected line. A key is dragged to another
-// frame and another value; the wheel zooms into the values, and a double click shows all of them again.
+// frame and another value. The wheel zooms into the values, with Shift it moves them, and a double click shows all again.
 
 import { computed, signal } from "@preact/signals";
 import type { JSX } from "preact";
@@ -74,8 +74,10 @@ export function Curves({ time }: { readonly time: TimeState }): JSX.Element {
     event.preventDefault();
     const box = event.currentTarget.getBoundingClientRect();
     const at = high - ((event.clientY - box.top) / box.height) * height;
-    const factor = Math.exp(event.deltaY * 0.002);
-    zoomed.value = { of, range: [at - (at - low) * factor, at + (high - at) * factor] };
+    // With Shift, a wheel turns sideways in some browsers.
+    const by = event.shiftKey ? ((event.deltaY || event.deltaX) / box.height) * height : 0;
+    const factor = event.shiftKey ? 1 : Math.exp(event.deltaY * 0.002);
+    zoomed.value = { of, range: [at - (at - low) * factor - by, at + (high - at) * factor - by] };
   };
   return (
     <div class="curves track">

@@ -97,6 +97,7 @@ const PARTS: Readonly<Record<string, readonly (readonly [string, string])[]>> = 
     ["Move keys", "drag | Alt+← | Alt+→"],
     ["Move keys by ten frames", "Alt+Shift+← | Alt+Shift+→"],
     ["Change values, in the curves", "drag | Alt+↑ | Alt+↓"],
+    ["Zoom, or move the values, in the curves", "wheel | Shift wheel"],
     ["Select several keys", "Shift click | Shift+→ | Ctrl+A"],
     ["Copy and paste keys", "Ctrl+C | Ctrl+V"],
   ],
