@@ -95,16 +95,18 @@ impl Drop for Making<'_> {
 struct Kept {
     name: String,
     smoothing: Smoothing,
-    sources: Vec<Source>,
+    sources: Sources,
     model: Arc<Model>,
 }
 
-/// A file that a model was made of, or that it lacked.
+/// The files that a model was made of.
 #[derive(Clone)]
-struct Source {
-    name: String,
-    path: String,
-    info: Option<FileInfo>,
+struct Sources {
+    /// The names and paths of the model and of the files that it refers to.
+    named: Vec<(String, String)>,
+    /// All files that were looked for, as they were, in the order of the looks. A comparison in another order could look
+    /// for files that the model no longer refers to.
+    looked: Vec<(String, Option<FileInfo>)>,
 }
 
 impl Library {
@@ -251,9 +253,8 @@ impl Library {
     /// asked for.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
         let models = self.made(name);
-        let pair = |source: &Source| (source.name.clone(), source.path.clone());
         match models.kept.iter().find(|kept| kept.name == name) {
-            Some(kept) => kept.sources.iter().map(pair).collect(),
+            Some(kept) => kept.sources.named.clone(),
             None => {
                 let faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);
                 faulty.get(name).cloned().unwrap_or_default()
@@ -268,25 +269,22 @@ impl Library {
         self.pictures.lock().unwrap_or_else(PoisonError::into_inner).retain(|kept| kept.name != name);
     }
 
-    fn decode(&self, name: &str) -> Result<(Model, Vec<Source>), AssetError> {
+    fn decode(&self, name: &str) -> Result<(Model, Sources), AssetError> {
         let info = self.look(name)?.ok_or_else(|| absent(&*self.files, name))?;
         let bytes = content(&*self.files, name)?;
         let picture = |name: &str| self.picture(name, Purpose::Surface);
         let mut referred = Referred::with_pictures(&*self.files, &picture);
         let model = decode(name, &bytes, &mut referred);
-        let mut sources = vec![Source { name: name.into(), path: name.into(), info: Some(info) }];
-        sources.extend(referred.sources().map(|(name, path, info)| Source {
-            name: name.into(),
-            path: path.into(),
-            info,
-        }));
+        let mut named = vec![(name.to_string(), name.to_string())];
+        named.extend(referred.sources().map(|(name, path, _)| (name.into(), path.into())));
+        let mut looked = vec![(name.to_string(), Some(info))];
+        looked.extend(referred.looked());
         let mut faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);
         faulty.remove(name);
         match model {
-            Ok(model) => Ok((model, sources)),
+            Ok(model) => Ok((model, Sources { named, looked })),
             Err(error) => {
-                let referred = sources.into_iter().map(|source| (source.name, source.path)).collect();
-                faulty.insert(name.into(), referred);
+                faulty.insert(name.into(), named);
                 Err(error)
             }
         }
@@ -296,8 +294,8 @@ impl Library {
         self.files.look(name).map_err(|why| AssetError::Unreadable { name: name.into(), why })
     }
 
-    fn is_current(&self, sources: &[Source]) -> bool {
-        sources.iter().all(|source| self.files.look(&source.name) == Ok(source.info))
+    fn is_current(&self, sources: &Sources) -> bool {
+        sources.looked.iter().all(|(name, info)| self.files.look(name) == Ok(*info))
     }
 }
 

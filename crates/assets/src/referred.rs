@@ -11,6 +11,13 @@ use crate::picture::{self, Picture};
 /// A function that makes the picture in the file of a name.
 type Pictures<'a> = &'a dyn Fn(&str) -> Result<Arc<Picture>, AssetError>;
 
+/// The most files that are looked for. A path with blanks can be several names.
+const LOOKED: usize = 4 * limits::FILES;
+
+fn too_many() -> Fault {
+    Fault::new(format!("it refers to more than {} files", limits::FILES))
+}
+
 /// The files that a model refers to, and all that was read of them.
 pub struct Referred<'a> {
     files: &'a dyn Files,
@@ -21,6 +28,9 @@ pub struct Referred<'a> {
     pixels: u64,
     /// The last part of each path, with the whole path and what is known about the file.
     by_name: BTreeMap<String, (String, Option<FileInfo>)>,
+    /// All files that were looked for, whether the model then referred to them or not, each with its number in the order of
+    /// the first looks.
+    looked: BTreeMap<String, (usize, Option<FileInfo>)>,
     /// An error that a decoder is to pass on as it is.
     pub(crate) error: Option<AssetError>,
 }
@@ -34,6 +44,7 @@ impl<'a> Referred<'a> {
             made: BTreeMap::new(),
             pixels: 0,
             by_name: BTreeMap::new(),
+            looked: BTreeMap::new(),
             error: None,
         }
     }
@@ -49,13 +60,31 @@ impl<'a> Referred<'a> {
         self.by_name.iter().map(|(name, (path, info))| (name.as_str(), path.as_str(), *info))
     }
 
+    /// Returns the names of all files that the outcome of reading the model depends on, in the order in which they were looked
+    /// for, each with what is known about the file.
+    pub(crate) fn looked(&self) -> Vec<(String, Option<FileInfo>)> {
+        let mut looked: Vec<_> = self.looked.iter().collect();
+        looked.sort_by_key(|(_, (number, _))| *number);
+        looked.into_iter().map(|(name, (_, info))| (name.clone(), *info)).collect()
+    }
+
     /// Returns whether there is a file for a path, without an error for a path that can have none.
-    pub(crate) fn exists(&self, path: &str) -> Result<bool, Fault> {
+    pub(crate) fn exists(&mut self, path: &str) -> Result<bool, Fault> {
         let name = last_part(path);
         if file_name(name).is_err() {
             return Ok(false);
         }
-        Ok(self.files.look(name).map_err(Fault::new)?.is_some())
+        Ok(self.look(name)?.is_some())
+    }
+
+    fn look(&mut self, name: &str) -> Result<Option<FileInfo>, Fault> {
+        let info = self.files.look(name).map_err(|why| self.give_up(unreadable(name, why)))?;
+        let number = self.looked.len();
+        if number >= LOOKED && !self.looked.contains_key(name) {
+            return Err(too_many());
+        }
+        self.looked.entry(name.into()).or_insert((number, info));
+        Ok(info)
     }
 
     /// Counts a file for a path among those that were referred to, if a file can have its name.
@@ -131,9 +160,9 @@ impl<'a> Referred<'a> {
             Some((_, info)) => *info,
             None => {
                 if self.by_name.len() >= limits::FILES {
-                    return Err(Fault::new(format!("it refers to more than {} files", limits::FILES)));
+                    return Err(too_many());
                 }
-                let info = self.files.look(name).map_err(|why| self.give_up(unreadable(name, why)))?;
+                let info = self.look(name)?;
                 self.by_name.insert(name.into(), (path.into(), info));
                 info
             }

@@ -226,8 +226,14 @@ impl World {
     }
 }
 
-/// A renderer for which `bad` has no frame. Every other script is one, which shows its name and its text.
+/// A renderer for which `bad` has no frame. Every other script is one, which shows its name and its text. `with FILE` has none
+/// before the file is there.
 struct OneLine;
+
+/// Returns the name of the file that a script names.
+fn named(script: &[u8]) -> Option<String> {
+    Some(str::from_utf8(script).ok()?.strip_prefix("with ")?.to_owned())
+}
 
 impl Renderer for OneLine {
     type BandJoiner = Whole;
@@ -240,12 +246,15 @@ impl Renderer for OneLine {
         1_000
     }
 
-    async fn missing(&self, _: &ScriptName, _: Bytes, _: Files) -> Result<Vec<String>> {
-        Ok(Vec::new())
+    async fn needed(&self, _: &ScriptName, script: Bytes, _: Files) -> Result<Vec<String>> {
+        Ok(named(&script).into_iter().collect())
     }
 
     async fn draw(&self, source: Source, _: Option<Duration>) -> Result<Drawing> {
         let (name, text) = (&source.name, String::from_utf8_lossy(&source.script));
+        if let Some(absent) = named(&source.script).filter(|file| source.files[file].is_none()) {
+            return Ok(Drawing::Waits(Reason::new(format!("{name}.txt waits for {absent}"))));
+        }
         Ok(match text.as_ref() {
             "bad" => Drawing::Fault(Reason::new(format!("{name}.txt: bad"))),
             text => Drawing::Frame(format!("{name}: {text}").into()),

@@ -22,8 +22,8 @@ struct Given {
     /// Files of earlier drawings, by their names. They stand in for files that are not given yet, so that models that were
     /// made of them are not dropped before it is known whether the files have changed.
     earlier: BTreeMap<String, File>,
-    /// The names that were asked for and not given.
-    missing: BTreeSet<String>,
+    /// The names that were asked for, given or not.
+    asked: BTreeSet<String>,
 }
 
 impl Given {
@@ -41,9 +41,9 @@ impl GivenLibrary {
         GivenLibrary { library: Library::new(Shared(given.clone())), given }
     }
 
-    /// Returns the names that were asked for and not given, since the last call.
-    pub(crate) fn take_missing(&self) -> Vec<String> {
-        std::mem::take(&mut lock(&self.given).missing).into_iter().collect()
+    /// Returns the names that were asked for since the last call.
+    pub(crate) fn take_asked(&self) -> Vec<String> {
+        std::mem::take(&mut lock(&self.given).asked).into_iter().collect()
     }
 }
 
@@ -57,9 +57,7 @@ impl assets::Files for Shared {
 
     fn look(&self, name: &str) -> Result<Option<FileInfo>, String> {
         let mut given = lock(&self.0);
-        if !given.files.contains_key(name) {
-            given.missing.insert(name.to_owned());
-        }
+        given.asked.insert(name.to_owned());
         Ok(given.get(name).map(|File { version, body }| {
             let mut tag = DefaultHasher::new();
             version.as_str().hash(&mut tag);
@@ -117,10 +115,13 @@ impl Kept {
         lock(&self.0).files.get(key).cloned()
     }
 
-    /// Keeps a file. If the files are too large together, the others are dropped.
-    pub(crate) fn keep(&self, key: &str, file: &File) {
+    /// Keeps a file, or nothing for this key. If the files are too large together, the others are dropped.
+    pub(crate) fn keep(&self, key: &str, file: Option<&File>) {
         let mut state = lock(&self.0);
-        state.files.insert(key.to_owned(), file.clone());
+        match file {
+            Some(file) => state.files.insert(key.to_owned(), file.clone()),
+            None => state.files.remove(key),
+        };
         if state.files.values().map(|file| file.body.len()).sum::<usize>() > KEPT_BYTES {
             state.files.retain(|kept, _| kept == key);
         }
@@ -150,13 +151,13 @@ mod tests {
         let files: Files = Arc::new(files.into_iter().collect());
         let asked = kept.with_earlier(Files::default(), |given| {
             let _ = given.library.model("c.obj", Smoothing::OfFile);
-            given.take_missing()
+            given.take_asked()
         });
         assert!(asked.contains(&"c.obj".to_owned()), "{asked:?}");
-        kept.keep("scripts/film/c.obj", files["c.obj"].as_ref().unwrap());
+        kept.keep("scripts/film/c.obj", files["c.obj"].as_ref());
         kept.with(files, |given| {
             let model = given.library.model("c.obj", Smoothing::OfFile).unwrap();
-            assert!(given.take_missing().is_empty());
+            assert_eq!(given.take_asked(), ["c.mtl", "c.obj"]);
             model
         })
     }

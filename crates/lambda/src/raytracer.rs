@@ -73,7 +73,7 @@ impl Renderer for RayTracer {
         assets::limits::FILE_BYTES
     }
 
-    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+    async fn needed(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
         // Names of files are in quotes.
         if !script.contains(&b'"') {
             return Ok(Vec::new());
@@ -82,7 +82,7 @@ impl Renderer for RayTracer {
         run(name, move || {
             Ok(kept.with_earlier(files, |given| {
                 rayfold_scene::parse_with_files(&file, &script, &limits, &given.library);
-                given.take_missing()
+                given.take_asked()
             }))
         })
         .await
@@ -92,7 +92,7 @@ impl Renderer for RayTracer {
         self.kept.file(key)
     }
 
-    fn keep(&self, key: &str, file: &File) {
+    fn keep(&self, key: &str, file: Option<&File>) {
         self.kept.keep(key, file);
     }
 
@@ -339,7 +339,9 @@ impl Drop for CancelOnDrop {
 
 #[cfg(test)]
 mod tests {
-    use rayfold_pipeline::BandJoiner;
+    use rayfold_pipeline::render::Outcome;
+    use rayfold_pipeline::store::{ListRequest, MemoryStore, PutOptions, Store};
+    use rayfold_pipeline::{BandJoiner, Invocation, Policy, Randomness, SystemClock, render_frame};
 
     use super::*;
 
@@ -416,6 +418,59 @@ mod tests {
     async fn a_frame_that_turns_out_to_take_too_long_is_cut() {
         let cut = draw(&script("1000 1000", "16 0"), Some(5)).await;
         assert!(matches!(cut, Drawing::Cut(bands) if bands.get() >= 2), "{cut:?}");
+    }
+
+    /// Works on an event with the renderer of a process.
+    async fn work(store: &MemoryStore<SystemClock>, process: &RayTracer, key: &str) -> Outcome {
+        let (random, policy) = (Randomness::seeded(1), Policy::new(1));
+        let invocation = Invocation::new(store, &SystemClock, &random, &policy, key);
+        render_frame(&invocation, process, key).await.unwrap().outcome
+    }
+
+    /// A process that had drawn an older model gave the newer one's version files to which only the older one refers. The
+    /// other processes, which had not, took their frames for superseded.
+    #[tokio::test]
+    async fn all_processes_give_a_script_the_same_version_whatever_they_have_drawn_before() {
+        const CORNER: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        let script = "Screen 4 3\nMesh \"c.obj\"\nTrace\nTrace\n";
+        // The second file of each pair replaces the first one. Names of pictures come before those of libraries.
+        let map = "newmtl a\nmap_Kd a.png\n";
+        let changes = [
+            [("c.obj", format!("mtllib c.mtl\nusemtl a\n{CORNER}")), ("c.obj", CORNER.to_owned())],
+            [("c.mtl", map.to_owned()), ("c.mtl", "newmtl a\nKd 1 0 0\n".to_owned())],
+            [("c.mtl", "newmtl a\nKd 1 0 0\n".to_owned()), ("c.mtl", map.to_owned())],
+        ];
+        for [(before, first), (name, second)] in changes {
+            let store = MemoryStore::new(SystemClock);
+            let put = async |name: &str, text: &str| {
+                let body = Bytes::copy_from_slice(text.as_bytes());
+                store.put(&format!("scripts/film/{name}"), body, PutOptions::always()).await.unwrap();
+            };
+            let events = async |process: &RayTracer, done: &mut Vec<String>| {
+                let request = || ListRequest::all("parts/film/");
+                let listed = store.list(request()).await.unwrap().objects;
+                let mut outcomes = Vec::new();
+                for key in
+                    listed.into_iter().map(|object| object.key).filter(|key| !key.ends_with("files.json"))
+                {
+                    if !done.contains(&key) {
+                        outcomes.push(work(&store, process, &key).await);
+                        done.push(key);
+                    }
+                }
+                outcomes
+            };
+            let (warm, mut done) = (RayTracer::default(), Vec::new());
+            put("c.obj", &format!("mtllib c.mtl\nusemtl a\n{CORNER}")).await;
+            put(before, &first).await;
+            put("1.txt", script).await;
+            assert!(matches!(work(&store, &warm, "scripts/film/1.txt").await, Outcome::Split(_)));
+            assert_eq!(events(&RayTracer::default(), &mut done).await, [Outcome::Drawn, Outcome::Drawn]);
+            put(name, &second).await;
+            assert!(matches!(work(&store, &warm, "scripts/film/1.txt").await, Outcome::Split(_)), "{name}");
+            let drawn = events(&RayTracer::default(), &mut done).await;
+            assert_eq!(drawn, [Outcome::Drawn, Outcome::Drawn], "{name}: {second}");
+        }
     }
 
     #[tokio::test]

@@ -202,10 +202,16 @@ impl Renderer for InstantRenderer {
         1_000
     }
 
-    async fn missing(&self, _: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
-        let body = |file: &Option<File>| file.as_ref().map(|file| file.body.to_vec());
-        let referred = files.values().filter_map(|file| referred(&body(file)?));
-        Ok(named(&script).into_iter().chain(referred).filter(|name| !files.contains_key(name)).collect())
+    async fn needed(&self, _: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        let mut needed = named(&script);
+        let mut at = 0;
+        while let Some(name) = needed.get(at) {
+            let file = files.get(name).and_then(Option::as_ref);
+            let referred = file.and_then(|file| referred(&file.body)).filter(|name| !needed.contains(name));
+            needed.extend(referred);
+            at += 1;
+        }
+        Ok(needed)
     }
 
     async fn draw(&self, source: Source, _: Option<Duration>) -> Result<Drawing> {

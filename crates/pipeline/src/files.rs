@@ -6,7 +6,8 @@
 //! whose set agrees with the files in the listing. If none agrees, the version is the entity tag alone, and no result
 //! belongs to it: the frame is pending.
 //!
-//! The set is complete: what a model refers to in turn follows from the model's content, and so from its entity tag.
+//! The set is complete: what a model refers to in turn follows from the model's content, and so from its entity tag. It has
+//! nothing else, so that all processes give the same files the same version, whatever they have read before.
 //!
 //! Invariant: a set is put before any result of its version, and the files are looked at once more after it was put. A
 //! file that changes before that look is seen by it. The event of one that changes later finds the set, and wakes the
@@ -209,6 +210,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     /// is a version whose set is there already, and the files are of it, nothing is written. If they are not and the
     /// event is about that version alone (`is_only`), nothing is written either: nothing is to be drawn.
     ///
+    /// Files that were kept decide nothing but that they are of the agreed version: otherwise all are read anew.
+    ///
     /// # Errors
     ///
     /// [`Error::Conflict`] if the files change as fast as they are read.
@@ -223,32 +226,54 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ) -> Result<(ETag, Files)> {
         let mut may_keep = true;
         for _ in 0..MAX_READS {
-            let mut files = BTreeMap::new();
-            loop {
-                let missing = renderer.missing(name, body.clone(), Arc::new(files.clone())).await?;
-                if missing.is_empty() {
-                    break;
-                }
-                for file in missing {
-                    let content = self.file(renderer, animation, &file, may_keep).await?;
-                    files.insert(file, content);
-                }
-            }
+            let (files, are_kept) = self.read_once(renderer, animation, (name, body), may_keep).await?;
+            may_keep = false;
             if files.is_empty() {
                 return Ok((script.clone(), Files::default()));
             }
             let set = set_of(&files);
             let version = script.with_files(&set);
-            if is_only || agreed == Some(&version) {
+            if agreed == Some(&version) || is_only && !are_kept {
                 return Ok((version, Arc::new(files)));
+            }
+            if is_only || are_kept && agreed.is_some() {
+                continue;
             }
             self.put_set(animation, name, &version, &set).await?;
             if self.are_current(animation, &files).await? {
                 return Ok((version, Arc::new(files)));
             }
-            may_keep = false;
         }
         Err(Error::Conflict { key: animation.script(name) })
+    }
+
+    /// Reads the files that a script's drawing needs, and says whether any was kept from an earlier drawing.
+    async fn read_once<R: Renderer>(
+        &self,
+        renderer: &R,
+        animation: &Animation,
+        (name, body): (&ScriptName, &Bytes),
+        may_keep: bool,
+    ) -> Result<(BTreeMap<String, Option<File>>, bool)> {
+        let (mut files, mut are_kept) = (BTreeMap::new(), false);
+        loop {
+            let needed = renderer.needed(name, body.clone(), Arc::new(files.clone())).await?;
+            let missing: Vec<_> = needed.iter().filter(|file| !files.contains_key(*file)).cloned().collect();
+            if missing.is_empty() {
+                // What an older content of a file has asked for is no part of the version.
+                files.retain(|file, _| needed.contains(file));
+                return Ok((files, are_kept));
+            }
+            for file in missing {
+                let kept = renderer.kept(&animation.file(&file)).filter(|_| may_keep);
+                are_kept |= kept.is_some();
+                let content = match kept {
+                    Some(kept) => Some(kept),
+                    None => self.file(renderer, animation, &file).await?,
+                };
+                files.insert(file, content);
+            }
+        }
     }
 
     async fn file<R: Renderer>(
@@ -256,17 +281,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         renderer: &R,
         animation: &Animation,
         name: &str,
-        may_keep: bool,
     ) -> Result<Option<File>> {
         let key = animation.file(name);
-        if let Some(kept) = renderer.kept(&key).filter(|_| may_keep) {
-            return Ok(Some(kept));
-        }
         let object = self.get_start(&key, renderer.most_file_bytes()).await?;
         let file = object.map(|object| File { version: object.info.etag, body: object.body });
-        if let Some(file) = &file {
-            renderer.keep(&key, file);
-        }
+        renderer.keep(&key, file.as_ref());
         Ok(file)
     }
 

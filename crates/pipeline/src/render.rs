@@ -43,13 +43,14 @@ pub trait Renderer: Send + Sync {
     /// Returns the largest size of a file in bytes. Of a larger file only these bytes and one more are read.
     fn most_file_bytes(&self) -> u64;
 
-    /// Returns the names of files that the drawing of a script reads and that are not among `files`, where an absent file is
-    /// `None`. It is asked again with those until none is missing.
+    /// Returns the names of the files that the drawing of a script reads, as far as these `files` show it; an absent file is
+    /// `None`. It is asked again with more files until it names no others. The last answer depends on the script and on the
+    /// contents of the files alone: it is a part of the script's version.
     ///
     /// # Errors
     ///
     /// Errors after which another attempt may succeed.
-    fn missing(
+    fn needed(
         &self,
         name: &ScriptName,
         script: Bytes,
@@ -61,8 +62,8 @@ pub trait Renderer: Send + Sync {
         None
     }
 
-    /// Keeps a file, so that the next drawing need not read it.
-    fn keep(&self, _key: &str, _file: &File) {}
+    /// Keeps a file, so that the next drawing need not read it. Without a file nothing is kept for the key any more.
+    fn keep(&self, _key: &str, _file: Option<&File>) {}
 
     /// Draws the script's one frame (`part` is `None`) or one of several, or says that it is too big: that drawing it takes
     /// most of the time that is `left`, or more memory than there is.

@@ -49,8 +49,8 @@ impl Renderer for TimedRenderer {
         InstantRenderer { bands: NonZeroU64::MIN }.most_file_bytes()
     }
 
-    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
-        InstantRenderer { bands: NonZeroU64::MIN }.missing(name, script, files).await
+    async fn needed(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        InstantRenderer { bands: NonZeroU64::MIN }.needed(name, script, files).await
     }
 
     async fn draw(&self, source: Source, time: Option<Duration>) -> Result<Drawing> {

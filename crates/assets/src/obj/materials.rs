@@ -126,7 +126,7 @@ impl Reader {
         self.parts.warnings.push(warning);
     }
 
-    fn read_materials(&mut self, file: &str, bytes: &[u8], refer: &Referred<'_>) -> Result<(), Fault> {
+    fn read_materials(&mut self, file: &str, bytes: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
         let within = |fault: Fault| within(file, fault);
         let mut look: Option<u32> = None;
         let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);

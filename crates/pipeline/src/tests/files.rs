@@ -1,6 +1,11 @@
 //! Scripts that name files: which files wake what, and which frames are drawn again.
 
+use std::collections::BTreeMap;
+
 use super::*;
+use crate::fakes::Paste;
+use crate::keys::Band;
+use crate::render::{Drawing, File, Files, Renderer, Source};
 
 const ONE: &str = "scripts/film/1.txt";
 const TWO: &str = "scripts/film/2.txt";
@@ -31,6 +36,156 @@ impl World {
         let head = self.manifest().head;
         (head.status, head.done, head.pending, head.waiting)
     }
+}
+
+const DRAWER: InstantRenderer = InstantRenderer { bands: BANDS };
+
+/// A function's process that keeps the files that it has read, and what they refer to.
+#[derive(Default)]
+struct Warm(Mutex<BTreeMap<String, File>>);
+
+impl Renderer for Warm {
+    type BandJoiner = Paste;
+
+    fn most_bytes(&self) -> u64 {
+        DRAWER.most_bytes()
+    }
+
+    fn most_file_bytes(&self) -> u64 {
+        DRAWER.most_file_bytes()
+    }
+
+    /// Files that were kept stand in for those that are not read yet.
+    async fn needed(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        let kept = self.0.lock().unwrap().clone();
+        let kept =
+            kept.into_iter().map(|(key, file)| (key.rsplit('/').next().unwrap().to_owned(), Some(file)));
+        let mut all: BTreeMap<_, _> = kept.collect();
+        all.extend(files.iter().map(|(name, file)| (name.clone(), file.clone())));
+        DRAWER.needed(name, script, Arc::new(all)).await
+    }
+
+    fn kept(&self, key: &str) -> Option<File> {
+        self.0.lock().unwrap().get(key).cloned()
+    }
+
+    fn keep(&self, key: &str, file: Option<&File>) {
+        let mut kept = self.0.lock().unwrap();
+        match file {
+            Some(file) => kept.insert(key.to_owned(), file.clone()),
+            None => kept.remove(key),
+        };
+    }
+
+    async fn draw(&self, source: Source, left: Option<Duration>) -> Result<Drawing> {
+        DRAWER.draw(source, left).await
+    }
+
+    async fn draw_band(&self, source: Source, band: Band) -> Result<Result<Bytes, Reason>> {
+        DRAWER.draw_band(source, band).await
+    }
+
+    async fn join(&self, source: Source, count: NonZeroU64) -> Result<Result<Paste, Reason>> {
+        DRAWER.join(source, count).await
+    }
+}
+
+impl World {
+    async fn render_warm(&self, process: &Warm, key: &str) -> Outcome {
+        self.with(async |invocation| render_frame(invocation, process, key).await.unwrap().outcome).await
+    }
+
+    /// Renders the events of new objects below `parts/` until there are none: those that are woken for whole scripts
+    /// by the first process, those of parts and bands by the processes in turn.
+    async fn render_woken(&self, processes: &[&Warm], seen: &mut Vec<String>) {
+        loop {
+            let mut keys = self.keys("parts/");
+            keys.retain(|key| !seen.contains(key));
+            if keys.is_empty() {
+                return;
+            }
+            for (number, key) in keys.into_iter().enumerate() {
+                let process = if key.ends_with("files.json") { 0 } else { number % processes.len() };
+                self.render_warm(processes[process], &key).await;
+                seen.push(key);
+            }
+        }
+    }
+}
+
+/// A process that still had the older file took the part's version for superseded, and the frame was drawn by nobody.
+#[tokio::test]
+async fn a_process_that_keeps_an_older_file_draws_the_frames_of_the_newer_one() {
+    for script in ["with earth split 3 1", "big with earth frame 1", "big with earth split 2 1"] {
+        let world = World::new();
+        let (writer, reader) = (Warm::default(), Warm::default());
+        let mut seen = Vec::new();
+        world.put(EARTH, "blue");
+        world.put(ONE, script);
+        world.render_warm(&writer, ONE).await;
+        world.render_woken(&[&writer, &reader], &mut seen).await;
+        assert_eq!(world.manifest().head.status, Status::Done, "{script}");
+        // Another file, none, and the first one again.
+        for (text, status) in
+            [(Some("green"), Status::Done), (None, Status::Waiting), (Some("red"), Status::Done)]
+        {
+            world.later(Duration::from_secs(1)).await;
+            match text {
+                Some(text) => drop(world.put(EARTH, text)),
+                None => drop(world.store.bucket.lock().unwrap().delete(EARTH)),
+            }
+            world.render_warm(&writer, EARTH).await;
+            world.render_woken(&[&reader, &writer], &mut seen).await;
+            assert_eq!(world.manifest().head.status, status, "{script}: {text:?}");
+        }
+    }
+}
+
+/// The set of a process that had known the older model had a file that the newer one no longer refers to, so that no
+/// other process could read the files of that version.
+#[tokio::test]
+async fn a_set_has_no_file_that_only_an_older_model_refers_to() {
+    let world = World::new();
+    let (warm, cold) = (Warm::default(), Warm::default());
+    let mut seen = Vec::new();
+    world.put("scripts/film/moon", "grey");
+    world.put(EARTH, "also moon");
+    world.put(ONE, "with earth split 2 1");
+    world.render_warm(&warm, ONE).await;
+    world.render_woken(&[&warm], &mut seen).await;
+    world.later(Duration::from_secs(1)).await;
+    world.put(EARTH, "blue");
+    world.render_warm(&warm, EARTH).await;
+    world.render_woken(&[&warm, &cold], &mut seen).await;
+    assert_eq!(world.status(), (Status::Done, 2, 0, 0));
+    // A change of the other file concerns nobody.
+    world.later(Duration::from_secs(1)).await;
+    world.put("scripts/film/moon", "white");
+    world.render_warm(&warm, "scripts/film/moon").await;
+    world.render_woken(&[&warm, &cold], &mut seen).await;
+    assert_eq!(world.status(), (Status::Done, 2, 0, 0));
+}
+
+#[tokio::test]
+async fn a_part_of_an_older_file_is_superseded_and_its_file_read_once() {
+    let world = World::new();
+    let (writer, reader) = (Warm::default(), Warm::default());
+    world.put(EARTH, "blue");
+    world.put(ONE, "with earth split 2 1");
+    world.render_warm(&writer, ONE).await;
+    let parts = world.keys("parts/");
+    world.put(EARTH, "green");
+    let count = Arc::new(AtomicU64::new(0));
+    let counted = count.clone();
+    world.refuse(move |request| {
+        counted.fetch_add(u64::from(request == "get scripts/film/earth"), Ordering::Relaxed);
+        None
+    });
+    assert_eq!(world.render_warm(&reader, &parts[0]).await, Outcome::Superseded);
+    assert_eq!(count.load(Ordering::Relaxed), 1);
+    // What it has kept need not be what is there.
+    assert_eq!(world.render_warm(&reader, &parts[1]).await, Outcome::Superseded);
+    assert_eq!(count.load(Ordering::Relaxed), 2);
 }
 
 #[tokio::test]

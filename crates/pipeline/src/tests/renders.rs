@@ -42,8 +42,8 @@ impl Renderer for Painter {
         DRAWER.most_file_bytes()
     }
 
-    async fn missing(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
-        DRAWER.missing(name, script, files).await
+    async fn needed(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
+        DRAWER.needed(name, script, files).await
     }
 
     async fn draw(&self, source: Source, left: Option<Duration>) -> Result<Drawing> {
