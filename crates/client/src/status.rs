@@ -257,6 +257,29 @@ mod tests {
         }
     }
 
+    /// The status was "behind" for ever if no file was in the folder: the versions of scripts whose files are all absent were
+    /// not looked for.
+    #[tokio::test]
+    async fn what_waits_for_the_only_file_of_its_folder_is_not_behind() {
+        let world = World::new();
+        let seen = async || {
+            let looks = world.client().look(&[world.film()]).await.unwrap();
+            (looks[0].is_behind(), looks[0].manifest().unwrap().head.waiting, looks[0].is_settled())
+        };
+        world.put("scripts/film/1.txt", "with ball.obj").await;
+        world.functions().await;
+        assert_eq!(seen().await, (false, 1, false), "it has not come");
+        world.put("scripts/film/ball.obj", "round").await;
+        assert!(seen().await.0, "nobody has seen it yet");
+        world.functions().await;
+        assert_eq!(seen().await, (false, 0, true), "it is there");
+        world.store.delete("scripts/film/ball.obj").await.unwrap();
+        assert!(seen().await.0, "nobody has seen that it is gone");
+        world.deletions(&["scripts/film/ball.obj"]).await;
+        world.functions().await;
+        assert_eq!(seen().await, (false, 1, false), "it is gone");
+    }
+
     /// The status was "Done, GIF current" for half a GIF whose metadata had been copied.
     #[tokio::test]
     async fn a_gif_that_was_cut_off_is_not_current() {

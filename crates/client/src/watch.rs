@@ -153,7 +153,7 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
     /// The errors of the store.
     pub async fn compare(&mut self) -> Result<()> {
         let Some(manifest) = &self.manifest else { return Ok(()) };
-        let versions = self.client.versions(&self.animation).await?;
+        let versions = self.client.versions(&self.animation, manifest).await?;
         self.is_behind = !stands_for(manifest, &self.animation, &versions);
         Ok(())
     }
@@ -233,10 +233,12 @@ impl<'a, S: Store, C: Clock> Watch<'a, S, C> {
 }
 
 impl<S: Store, C: Clock> Client<'_, S, C> {
-    /// Returns the versions of the animation's scripts, with their files, and settings, by key.
-    async fn versions(&self, animation: &Animation) -> Result<BTreeMap<String, ETag>> {
+    /// Returns the versions of the animation's scripts, with their files, and settings, by key. Only the receipts show the
+    /// files of a version, which may all be absent. They are not listed if neither the folder nor this manifest has files.
+    async fn versions(&self, animation: &Animation, manifest: &Manifest) -> Result<BTreeMap<String, ETag>> {
         let scripts = self.list(ListRequest::level(animation.scripts())).await?.objects;
-        let has_files = scripts.iter().any(|object| Uploaded::is_file(&object.key));
+        let has_files = scripts.iter().any(|object| Uploaded::is_file(&object.key))
+            || manifest.frames.iter().any(|frame| frame.version.has_files());
         let receipts = match has_files {
             true => self.list(ListRequest::level(animation.frames())).await?.objects,
             false => Vec::new(),
@@ -275,7 +277,7 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
                 // The files may have changed since, and the functions not have seen it.
                 let is_whole = !head.is_terminal()
                     || !manifest.frames.iter().any(|frame| frame.version.has_files())
-                    || stands_for(manifest, animation, &self.versions(animation).await?);
+                    || stands_for(manifest, animation, &self.versions(animation, manifest).await?);
                 match head.status {
                     _ if !is_whole => {}
                     Status::Done if watch.is_current() => {
