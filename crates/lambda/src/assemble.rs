@@ -121,9 +121,7 @@ async fn write_down<S: Store>(context: &Context<S>, call: &Call, failure: &Failu
 async fn clean<S: Store>(context: &Context<S>, call: &Call, how: Sweep) -> Result<Answer, Failed> {
     let policy = match how {
         Sweep::Patient => context.policy.clone(),
-        Sweep::CatchUp => {
-            Policy { stuck_after: std::time::Duration::ZERO, is_fresh_start: true, ..context.policy.clone() }
-        }
+        Sweep::CatchUp => Policy { is_fresh_start: true, ..context.policy.clone() },
     };
     let swept = match sweep(&context.invocation(&policy, call)).await {
         Ok(swept) => swept,
@@ -179,7 +177,7 @@ mod tests {
         ETag, ListPage, ListRequest, MemoryStore, MemoryUpload, Object, ObjectInfo, PutOptions,
         UnfinishedUpload,
     };
-    use rayfold_pipeline::{Randomness, Result, SystemClock, Timestamp};
+    use rayfold_pipeline::{Randomness, Result, SystemClock, Timestamp, render_frame};
     use serde_json::json;
 
     use super::*;
@@ -266,6 +264,34 @@ mod tests {
             (&unhandled[0]["animation"], &unhandled[0]["message"]),
             (&"bad".into(), &"not swept".into())
         );
+    }
+
+    /// A restart of `rayfold dev` failed frames whose files had not come yet, and with that deleted the GIF before.
+    #[tokio::test]
+    async fn catching_up_wakes_what_is_pending_and_lets_wait_what_waits() {
+        let context = context().await;
+        let put = async |key: &str, text: &'static str| {
+            context.store.put(key, Bytes::from_static(text.as_bytes()), PutOptions::always()).await.unwrap();
+        };
+        put("scripts/good/2.txt", "Screen 1 1\nMesh \"ball.obj\"\nTrace").await;
+        let call = call();
+        let invocation = context.invocation(&context.policy, &call);
+        let waits = render_frame(&invocation, &context.renderer, "scripts/good/2.txt").await.unwrap();
+        assert!(matches!(waits.outcome, rayfold_pipeline::render::Outcome::Waits(_)), "{waits:?}");
+        for _ in 0..2 {
+            handle(&context, &call, json!({ "sweep": true, "catch_up": true })).await.unwrap();
+            let keys = async |prefix: &str| {
+                let listed = context.store.list(ListRequest::all(prefix)).await.unwrap().objects;
+                listed.into_iter().map(|object| object.key).collect::<Vec<_>>()
+            };
+            let receipts = keys("frames/good/2@").await;
+            assert!(!receipts.iter().any(|key| key.ends_with(".error.json")), "{receipts:?}");
+            let woken = keys("retries/good/").await;
+            assert!(
+                woken.iter().all(|key| key.starts_with("retries/good/1@")) && !woken.is_empty(),
+                "{woken:?}"
+            );
+        }
     }
 
     #[tokio::test]

@@ -42,8 +42,8 @@ pub struct Policy {
     pub stuck_after: Duration,
     /// After how many wakings a pending frame is given up.
     pub attempts: u64,
-    /// Whether the functions themselves have just been restarted: an attempt that was cut off with them does not
-    /// count, and an earlier lease has no holder.
+    /// Whether the functions themselves have just been restarted: pending frames are woken at once, an attempt that was
+    /// cut off with them does not count, and an earlier lease has no holder.
     pub is_fresh_start: bool,
     /// The age of a superseded frame at which the sweep deletes it. A week: a script that is changed back
     /// finds its old frame.

@@ -189,13 +189,15 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let frames = || observation.manifest.frames.iter();
         let pending: Vec<&Frame> = frames().filter(|frame| frame.state == FrameState::Pending).collect();
         let now = self.clock.now();
-        let is_stuck = now.since(self.last_progress(observation)) >= self.policy.stuck_after;
+        let is_quiet = now.since(self.last_progress(observation)) >= self.policy.stuck_after;
+        // No invocation is left to wait for. But files may come as late as ever.
+        let is_stuck = is_quiet || self.policy.is_fresh_start;
         let swept = match lease {
             Some(SweepLease::Left(since)) => Some(since),
             Some(SweepLease::New | SweepLease::Anothers) | None => None,
         };
         let is_hopeless = observation.manifest.head.excess.is_some();
-        if is_stuck && !is_hopeless {
+        if is_quiet && !is_hopeless {
             for (frame, fault) in frames().filter_map(|frame| match &frame.state {
                 FrameState::Waiting(fault) => Some((frame, fault)),
                 _ => None,
@@ -274,11 +276,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         let WakeCount { attempts, last, begun } = waking;
         let doublings = attempts.saturating_sub(1).min(MAX_DOUBLINGS) as u32;
         let patience = self.policy.stuck_after.saturating_mul(2_u32.saturating_pow(doublings));
-        if attempts > 0 && now.since(last) < patience && !is_swept {
+        let is_at_once = is_swept || self.policy.is_fresh_start;
+        if attempts > 0 && now.since(last) < patience && !is_at_once {
             return Ok(Step::Patient);
         }
         let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-        if begun >= self.policy.attempts && !self.policy.is_fresh_start && !is_swept {
+        if begun >= self.policy.attempts && !is_at_once {
             let reason = Reason::new(format!("no result in each of {begun} attempts"));
             self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await?;
             return Ok(Step::GivenUp);

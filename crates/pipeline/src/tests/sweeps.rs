@@ -159,6 +159,25 @@ async fn where_attempts_do_not_count_those_at_pending_frames_are_forgotten() {
     assert_eq!(world.keys("frames/"), [other], "of another version");
 }
 
+/// The sweep at the start of the functions failed a frame whose file had not come yet.
+#[tokio::test]
+async fn a_fresh_start_wakes_pending_frames_at_once_and_fails_none_that_waits() {
+    let mut world = World::new();
+    stuck(&world).await;
+    world.upload("3.txt", "with earth frame 3").await;
+    world.policy.is_fresh_start = true;
+    for _ in 0..6 {
+        let visit = world.visit().await;
+        assert_eq!((visit.woken, visit.given_up), (2, 0));
+    }
+    world.policy.is_fresh_start = false;
+    assert_eq!(world.visit().await.given_up, 0);
+    // It waits no longer than ever.
+    world.policy.is_fresh_start = true;
+    world.later(15 * MINUTE).await;
+    assert_eq!(world.visit().await.given_up, 1);
+}
+
 #[tokio::test]
 async fn of_an_animation_that_has_too_many_frames_none_is_woken() {
     let mut world = World::new();
