@@ -33,7 +33,8 @@ async function computed({ scripts, files, manifest, receipts: found = [] }) {
   const keys = frames
     .filter(({ state }) => state === "done")
     .map(({ script, version, pixels, part }) => `frames/film/${receipts.named(script, version, pixels, part)}.png`);
-  return { summary: summary("film", known, outputs, isBehind(known, await receipts.versionsOf(there, found))), ...faults("film", known), frames, keys };
+  const versions = await receipts.versionsOf(there, receipts.haveFiles(there, known.frames) ? found : []);
+  return { summary: summary("film", known, outputs, isBehind(known, versions)), ...faults("film", known), frames, keys };
 }
 
 test("the state of a run is what the program computes", async () => {

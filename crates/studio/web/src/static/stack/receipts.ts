@@ -58,12 +58,17 @@ function setsOf(names: readonly string[]): Map<string, FileSet> {
   return sets;
 }
 
+const isOwn = (name: string): boolean => name.endsWith(".txt") || name === "animation.json";
+
+/** Whether versions of scripts may have files, so that receipts are needed to know them. The files of a manifest's versions may all be absent. */
+export const haveFiles = (there: ReadonlyMap<string, string>, frames: readonly { readonly version: string }[]): boolean =>
+  [...there.keys()].some((name) => !isOwn(name)) || frames.some(({ version }) => version.includes("+"));
+
 /**
  * Returns the versions of the scripts and of the settings of a folder, by their files' names. `there` has the entity tag of
  * each file, `receipts` the names of the receipts. A script that names files has the version whose files are those that are there.
  */
 export async function versionsOf(there: ReadonlyMap<string, string>, receipts: readonly string[]): Promise<Map<string, string>> {
-  const isOwn = (name: string): boolean => name.endsWith(".txt") || name === "animation.json";
   const own = new Map([...there].filter(([name]) => isOwn(name)));
   const beside = [...there].filter(([name]) => !isOwn(name));
   const files = new Map(await Promise.all(beside.map(async ([name, tag]) => [await digits(name, 10), await digits(tag, 8)] as const)));

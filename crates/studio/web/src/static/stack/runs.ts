@@ -9,7 +9,7 @@ import { bytesOf, textOf, type File } from "../module";
 import { Bucket } from "./bucket";
 import { estimated, wanted, type Wanted } from "./offer";
 import { isSignedIn, leave } from "./person";
-import { named, versionsOf } from "./receipts";
+import { haveFiles, named, versionsOf } from "./receipts";
 import { Refused } from "./refused";
 import { retryOf, type Scope } from "./retry";
 import { stack } from "./stack";
@@ -66,10 +66,9 @@ const scripts = (own: Bucket, animation: string): ReturnType<typeof below> => be
 const receipts = async (own: Bucket, animation: string, isLevel: boolean): Promise<string[]> => [...(await below(own, `frames/${animation}/`, isLevel)).keys()];
 
 /** Returns the versions of a run's scripts and settings as they are now. */
-async function versions(own: Bucket, animation: string): Promise<Map<string, string>> {
+async function versions(own: Bucket, animation: string, known: Manifest): Promise<Map<string, string>> {
   const there = new Map(Array.from(await scripts(own, animation), ([name, { etag }]) => [name, etag]));
-  const hasFiles = [...there.keys()].some((name) => !name.endsWith(".txt") && name !== "animation.json");
-  return versionsOf(there, hasFiles ? await receipts(own, animation, true) : []);
+  return versionsOf(there, haveFiles(there, known.frames) ? await receipts(own, animation, true) : []);
 }
 
 /** Does something to all items, some of them at the same time. */
@@ -94,7 +93,7 @@ async function look(own: Bucket, folder: string, run: string, before: Seen | nul
   const known = manifestOf(animation, text);
   if (known === "new") return { text, summary: summary(run, known, [], false), manifest: null };
   if (known === "unreadable") return { text, summary: summary(run, known, await outputs(own, animation, known), false), manifest: null };
-  const [made, there] = await Promise.all([outputs(own, animation, known), versions(own, animation)]);
+  const [made, there] = await Promise.all([outputs(own, animation, known), versions(own, animation, known)]);
   return { text, summary: summary(run, known, made, isBehind(known, there)), manifest: known };
 }
 
