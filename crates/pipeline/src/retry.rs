@@ -1,9 +1,10 @@
 //! Draws frames again, on demand: the effect of `rayfold retry` on the bucket.
 //!
-//! Error receipts are deleted first, for a receipt is what makes an event find its work done; then the wakings that
-//! the sweep has counted; then each frame is woken again. Everything after that is the render function's.
+//! Of each frame the receipts are deleted first, for a receipt is what makes an event find its work done, and the wakings
+//! that the sweep has counted; then the frame is woken again. Everything after that is the render function's. A retry that
+//! was cut off is made whole by one of [`Scope::Failed`]: frames that are missing are among those.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 
@@ -68,54 +69,63 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             wanted.iter().map(|frame| (&frame.script, &frame.version, frame.part)).collect();
         let stopped = wanted.iter().filter(|frame| frame.state != FrameState::Pending);
         let stopped: BTreeSet<_> = stopped.map(|frame| (&frame.script, &frame.version, frame.part)).collect();
-        let (mut doomed, mut counted) = (Vec::new(), Vec::new());
+        let (mut refusals, mut deleted) = (Vec::new(), 0);
+        let mut doomed: BTreeMap<_, Vec<String>> = BTreeMap::new();
         for found in &observation.results.receipts {
-            let (name, tag, part) = match &found.receipt {
-                Receipt::Frame { name, tag, part } | Receipt::Fault { name, tag, part } => (name, tag, *part),
+            let key = || animation.receipt(&found.receipt);
+            let (of, is_doomed, is_counted) = match &found.receipt {
+                Receipt::Frame { name, tag, part } | Receipt::Fault { name, tag, part } => {
+                    let of = (name, &tag.version, *part);
+                    (of, named.contains(&of), true)
+                }
                 Receipt::Refusal { .. } => {
-                    doomed.push(animation.receipt(&found.receipt));
+                    refusals.push(key());
                     continue;
                 }
                 // Attempts are counted from the start.
                 Receipt::Begun { name, tag, part, .. } => {
-                    if named.contains(&(name, &tag.version, *part)) {
-                        counted.push(animation.receipt(&found.receipt));
-                    }
-                    continue;
+                    let of = (name, &tag.version, *part);
+                    (of, named.contains(&of), false)
                 }
                 // A frame that failed is looked at from the beginning; of one that is on its way the bands stay.
                 Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
-                    if stopped.contains(&(name, &tag.version, *part)) {
-                        counted.push(animation.receipt(&found.receipt));
-                    }
-                    continue;
+                    let of = (name, &tag.version, *part);
+                    (of, stopped.contains(&of), false)
                 }
                 Receipt::Split { .. }
                 | Receipt::Files { .. }
                 | Receipt::Taken { .. }
                 | Receipt::Waits { .. } => continue,
             };
-            if named.contains(&(name, &tag.version, part)) {
-                doomed.push(animation.receipt(&found.receipt));
+            if is_doomed {
+                doomed.entry(of).or_default().push(key());
+                deleted += u64::from(is_counted);
             }
         }
-        let deleted = doomed.len() as u64;
-        doomed.extend(counted);
-        for listed in self.retries(animation).await? {
-            if let Ok(Key::Retry { name, tag, part, .. }) = listed.key.parse()
-                && named.contains(&(&name, &tag.version, part))
+        deleted += refusals.len() as u64;
+        let earlier = self.retries(animation).await?.into_iter();
+        let earlier: Vec<_> = earlier.map(|listed| (listed.key.parse::<Key>(), listed.key)).collect();
+        for (parsed, key) in &earlier {
+            if let Ok(Key::Retry { name, tag, part, .. }) = parsed
+                && named.contains(&(name, &tag.version, *part))
             {
-                doomed.push(listed.key);
+                doomed.entry((name, &tag.version, *part)).or_default().push(key.clone());
             }
         }
-        let deletions: Vec<_> = doomed.iter().map(|key| self.delete(key)).collect();
-        stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
-        let wakings = wanted.iter().map(|frame| {
+        for key in &refusals {
+            self.delete(key).await?;
+        }
+        // Frame by frame: if this is cut off, no more are missing and not woken than are worked on at the same time.
+        let doomed = &doomed;
+        let frames = wanted.iter().map(|frame| async move {
+            for key in doomed.get(&(&frame.script, &frame.version, frame.part)).into_iter().flatten() {
+                self.delete(key).await?;
+            }
             let tag = Tag { version: frame.version.clone(), pixels: self.policy.pixels };
-            self.put_retry(animation, &frame.script, tag, frame.part, 1)
+            self.put_retry(animation, &frame.script, tag, frame.part, 1).await
         });
-        let wakings: Vec<_> = wakings.collect();
-        stream::iter(wakings).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
+        let frames: Vec<_> = frames.collect();
+        stream::iter(frames).buffer_unordered(self.policy.concurrency).try_collect::<Vec<()>>().await?;
         let reassembled = manifest.head.refusal.is_some();
         if deleted > 0 {
             // No other invocation looks when only receipts go: the manifest must not stay as it was.

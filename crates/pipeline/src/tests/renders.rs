@@ -379,3 +379,28 @@ async fn the_attempts_at_other_parts_are_still_counted_when_one_is_drawn_again()
     world.again(Scope::Frame(&name, NonZeroU64::new(1))).await;
     assert_eq!(world.keys(&format!("frames/film/1@{version}-p1/")), [begun(2)]);
 }
+
+/// All receipts were deleted before the first frame was woken: after an interruption none was drawn before a sweep.
+#[tokio::test]
+async fn a_retry_that_is_cut_off_leaves_few_frames_that_nobody_draws_and_the_next_one_draws_those() {
+    let mut world = World::new();
+    world.policy.concurrency = 1;
+    for number in 1..=3 {
+        world.upload(&format!("{number}.txt"), &format!("frame {number}")).await;
+    }
+    world.refuse(|request| {
+        let is_it = request.starts_with("put retries/film/2@");
+        is_it.then(|| Error::Refused { key: "k".into(), source: "cut off".into() })
+    });
+    let cut_off = world.with(async |invocation| retry(invocation, &World::film(), Scope::All).await).await;
+    assert!(cut_off.is_err());
+    world.refuse(|_| None);
+    let is_there = |number: u32| !world.keys(&format!("frames/film/{number}@")).is_empty();
+    assert_eq!([1, 2, 3].map(is_there), [false, false, true]);
+    let [woken] = &world.keys("retries/")[..] else { panic!("{:?}", world.keys("retries/")) };
+    assert_eq!(world.render(woken).await, Outcome::Drawn);
+    assert_eq!(world.again(Scope::Failed).await.woken, 1);
+    let last = world.keys("retries/film/2@").remove(0);
+    assert_eq!(world.render(&last).await, Outcome::Drawn);
+    assert_eq!(world.manifest().head.status, Status::Done);
+}
