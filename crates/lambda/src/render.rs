@@ -41,7 +41,7 @@ async fn record<S: Store>(context: &Context<S>, call: &Call, key: String) -> Res
         Came::NearMiss(problem) => {
             tracing::warn!(request_id = %call.request_id, animation = %rendered.animation, key, problem, "not read");
         }
-        _ => log(call, &rendered, &what),
+        _ => log(call, &key, &rendered, &what),
     }
     Ok(what)
 }
@@ -65,10 +65,11 @@ fn described(outcome: &Came) -> String {
     }
 }
 
-fn log(call: &Call, rendered: &Rendered, what: &str) {
+fn log(call: &Call, key: &str, rendered: &Rendered, what: &str) {
     let stages = rendered.stages;
     tracing::info!(
         request_id = %call.request_id,
+        key,
         animation = %rendered.animation,
         frame = rendered.script.as_ref().map(tracing::field::display),
         outcome = what,

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use rayfold_local::observation::{Observation, Outcome, Seen};
-use rayfold_pipeline::keys::Animation;
+use rayfold_pipeline::keys::{Animation, Key};
 use rayfold_pipeline::manifest::{FrameState, Manifest, Status};
 use rayfold_pipeline::store::{S3Store, Store};
 use rayfold_scene::SETTINGS_FILE;
@@ -84,12 +84,7 @@ impl<'a> News<'a> {
         }
         match text("message") {
             "rendered" | "assembled" if self.is_brief => {}
-            "rendered" => {
-                let frame = if text("frame").is_empty() { SETTINGS_FILE } else { text("frame") };
-                let took = line["draw_ms"].as_u64().filter(|_| text("outcome") == "drawn");
-                let took = took.map(|ms| format!(" in {ms} ms")).unwrap_or_default();
-                self.console.note(format_args!("{}/{frame}: {}{took}", text("animation"), text("outcome")));
-            }
+            "rendered" => self.console.note(rendered(line)),
             "assembled" if line["built"].as_u64() > Some(0) => self.console.note(format_args!(
                 "{0}: {1} frames assembled in {2} ms: s3://{3}/animations/{0}.gif",
                 text("animation"),
@@ -119,6 +114,25 @@ impl<'a> News<'a> {
         }
         self.next = Instant::now() + APART;
     }
+}
+
+/// Returns the text of an event of the render function: the frame that it was about, or the file.
+fn rendered(line: &Value) -> String {
+    let text = |field: &str| line[field].as_str().unwrap_or_default();
+    let (animation, key, outcome) = (text("animation"), text("key"), text("outcome"));
+    let part = match key.parse() {
+        Ok(Key::Part { number, .. }) => Some(number),
+        Ok(Key::Band { part, .. } | Key::Retry { part, .. }) => part,
+        _ => None,
+    };
+    let name = match (text("frame"), part) {
+        ("", _) => key.rsplit('/').next().unwrap_or_default().to_owned(),
+        (script, Some(part)) => format!("{script}, frame {part}"),
+        (script, None) => script.to_owned(),
+    };
+    let took = line["draw_ms"].as_u64().filter(|_| outcome == "drawn");
+    let took = took.map(|ms| format!(" in {ms} ms")).unwrap_or_default();
+    format!("{animation}/{name}: {outcome}{took}")
 }
 
 /// Returns the text of a warning or an error in a function's log, with its subject and its reason.
@@ -174,6 +188,26 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    /// The event of a file that scripts name was called one of `animation.json`.
+    #[test]
+    fn events_name_the_file_or_the_frame_that_they_are_about() {
+        for (key, frame, outcome, expected) in [
+            ("scripts/film/ball.obj", None, "a file of scripts", "film/ball.obj: a file of scripts"),
+            ("scripts/film/animation.json", None, "settings", "film/animation.json: settings"),
+            ("scripts/film/1.txt", Some("1"), "drawn", "film/1: drawn in 7 ms"),
+            ("parts/film/1@e-p1/12.json", Some("1"), "drawn", "film/1, frame 12: drawn in 7 ms"),
+            ("parts/film/1@e-p1/2-of-3.band-0.json", Some("1"), "band 2-of-3", "film/1: band 2-of-3"),
+            ("parts/film/1@e-p1/files.json", Some("1"), "split into 2", "film/1: split into 2"),
+            ("retries/film/1@e-p1/1", Some("1"), "present", "film/1: present"),
+            ("retries/film/1@e-p1/12/1", Some("1"), "present", "film/1, frame 12: present"),
+        ] {
+            let line = json!({
+                "animation": "film", "key": key, "frame": frame, "outcome": outcome, "draw_ms": 7,
+            });
+            assert_eq!(rendered(&line), expected);
+        }
+    }
 
     #[test]
     fn faults_are_reported_once_and_in_words() {
