@@ -143,6 +143,47 @@ async fn it_goes_on_where_it_was_after_a_kill_and_leaves_nothing_behind() {
     .await;
 }
 
+/// Returns the names and the ids of the processes that a process has started.
+#[cfg(target_os = "linux")]
+fn children(of: u32) -> Vec<(String, u32)> {
+    let stats = std::fs::read_dir("/proc").unwrap().flatten();
+    let stats = stats.filter_map(|entry| std::fs::read_to_string(entry.path().join("stat")).ok());
+    let child = |stat: String| {
+        let (pid, rest) = stat.split_once(" (")?;
+        let (name, rest) = rest.rsplit_once(") ")?;
+        let parent: u32 = rest.split(' ').nth(1)?.parse().ok()?;
+        (parent == of).then(|| (name.to_owned(), pid.parse().unwrap()))
+    };
+    stats.filter_map(child).collect()
+}
+
+/// The functions of a killed `rayfold dev` drew on, for minutes and on all cores.
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn functions_end_with_a_killed_invoker_also_while_they_draw() {
+    let folder = tempfile::tempdir().unwrap();
+    let dev = Dev::start(StoreKind::BuiltIn, &folder.path().join("data"));
+    let ball = "Screen 4000 4000\nSamples 4096 0\nSphere 6 12 8 -9 .2 .2 .2 .7 .6 .5\nTrace\n";
+    put(&dev.store(), "scripts/ball/1.txt", ball.into()).await;
+    let start = Instant::now();
+    let render = loop {
+        assert!(start.elapsed() < PATIENCE, "no function is started");
+        let children = children(dev.child.id());
+        if let Some((_, pid)) = children.iter().find(|(name, _)| name.starts_with("rayfold-render")) {
+            break *pid;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    };
+    // It draws.
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    dev.signal("-KILL");
+    let start = Instant::now();
+    while Path::new("/proc").join(render.to_string()).join("exe").read_link().is_ok() {
+        assert!(start.elapsed() < Duration::from_secs(20), "the function outlives a killed `rayfold dev`");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
 /// A folder of scripts, a path for the GIF, and a folder for temporary files.
 struct Once {
     folder: tempfile::TempDir,

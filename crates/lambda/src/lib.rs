@@ -45,12 +45,24 @@ pub enum Function {
     Assemble,
 }
 
+/// If this variable is set, the process ends when its standard input ends.
+pub const LIFELINE: &str = "RAYFOLD_ENDS_WITH_STDIN";
+
 /// Serves the Lambda runtime until it ends.
+///
+/// With the variable [`LIFELINE`] the process ends at once when its standard input ends, also while it draws: whoever started
+/// it holds the other end of that pipe, and lets go of it in whatever way it ends itself.
 ///
 /// # Errors
 /// Returns what is missing in the environment, or the error of the runtime.
 pub fn run(function: Function) -> anyhow::Result<()> {
     logs::start();
+    if std::env::var_os(LIFELINE).is_some() {
+        std::thread::Builder::new().name("lifeline".into()).spawn(|| {
+            let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+            std::process::exit(0);
+        })?;
+    }
     // There is one invocation at a time, so one thread serves requests and timers. The pixels have the rayon pool.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
     runtime.block_on(async {

@@ -1,13 +1,13 @@
 //! A process of a function, from its cold start to its end.
 //!
-//! It ends with the invoker: dropping it kills the process, and one whose invoker was killed finds its runtime API gone
-//! at its next call and ends by itself.
+//! It ends with the invoker: dropping it kills the process, and one whose invoker was killed ends by itself, because the
+//! pipe ends that is its standard input. Otherwise it would draw on, for minutes, and only then find its runtime API gone.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncBufReadExt, AsyncRead, BufReader};
-use tokio::process::{Child, Command};
+use tokio::process::{Child, ChildStdin, Command};
 
 use super::meter::Meter;
 use super::runtime_api::{Call, Handout, RuntimeApi};
@@ -19,10 +19,15 @@ use crate::routes::Function;
 /// The time that Lambda gives a process before its first call of `next`.
 const INIT_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Tells the functions of this project to end when their standard input ends. The crate of the functions reads it.
+const LIFELINE: &str = "RAYFOLD_ENDS_WITH_STDIN";
+
 /// A process, warm after its first invocation.
 pub(crate) struct Sandbox {
     function: Function,
     child: Child,
+    /// The system closes it when this process ends, also by SIGKILL. The child must not have it, for a wait closes it.
+    _lifeline: Option<ChildStdin>,
     api: RuntimeApi,
     meter: Option<Meter>,
     started: Instant,
@@ -64,7 +69,8 @@ impl Sandbox {
             .env("AWS_LAMBDA_LOG_STREAM_NAME", format!("local/{}", api.address.port()))
             .env("AWS_EXECUTION_ENV", "AWS_Lambda_provided.al2023")
             .env("TZ", ":UTC")
-            .stdin(Stdio::null())
+            .env(LIFELINE, "1")
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             // A Ctrl-C in the terminal is the invoker's to answer.
@@ -74,7 +80,8 @@ impl Sandbox {
             .map_err(|source| Error::Spawn { program, source })?;
         listen_to(function, child.stdout.take(), observer);
         listen_to(function, child.stderr.take(), observer);
-        Ok(Self { function, child, api, meter, started, init: None, idle_since: started })
+        let _lifeline = child.stdin.take();
+        Ok(Self { function, child, _lifeline, api, meter, started, init: None, idle_since: started })
     }
 
     pub(crate) fn is_alive(&mut self) -> bool {
