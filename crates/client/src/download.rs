@@ -26,8 +26,18 @@ impl Output for Download {
     }
 
     fn write(&mut self, piece: &[u8]) -> io::Result<()> {
-        self.file.as_mut().map_or(Ok(()), |file| file.write_all(piece))
+        self.file.as_mut().map_or(Ok(()), |file| write_to(&self.path, file, piece))
     }
+}
+
+/// Writes to the file of this name, which an error has.
+fn write_to(path: &Path, mut file: impl Write, piece: &[u8]) -> io::Result<()> {
+    file.write_all(piece).map_err(|source| io::Error::other(unwritten(path, source)))
+}
+
+/// Returns the error of the system with the name of the file.
+fn unwritten(path: &Path, source: io::Error) -> rayfold_files::Error {
+    rayfold_files::Error::Io { path: path.to_path_buf(), source }
 }
 
 impl Output for Vec<u8> {
@@ -57,8 +67,9 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         let info = self.fetch(animation, container, &mut download).await?;
         if let Some(file) = download.file {
             let file = file.into_inner().map_err(IntoInnerError::into_error);
-            let written = |source| rayfold_files::Error::Io { path: path.to_path_buf(), source };
-            file.map_err(written).and_then(|file| file.finish(true)).map_err(Error::Write)?;
+            file.map_err(|source| unwritten(path, source))
+                .and_then(|file| file.finish(true))
+                .map_err(Error::Write)?;
         }
         Ok(info)
     }
@@ -87,5 +98,12 @@ mod tests {
         let missing = folder.path().join("none").join("film.gif");
         let error = world.client().download(&world.film(), Container::Gif, &missing).await.unwrap_err();
         assert!(error.to_string().contains("none"), "{error}");
+    }
+
+    /// The message was "No space left on device", of whichever file.
+    #[test]
+    fn a_file_that_cannot_grow_is_named() {
+        let error = write_to(Path::new("film.gif"), &mut [0; 2][..], b"GIF89a").unwrap_err();
+        assert_eq!(Error::Output(error).to_string(), "cannot write film.gif");
     }
 }
