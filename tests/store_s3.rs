@@ -20,6 +20,7 @@ use rayfold_pipeline::{
 use rayfold_scene::{AnimationSettings, Container};
 use rayfold_simulation::conformance;
 use stores::on_every_store;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 async fn started(store: StoreKind) -> (S3Server, tempfile::TempDir) {
     let data = tempfile::tempdir().unwrap();
@@ -182,4 +183,33 @@ async fn refusals_differ_from_trouble() {
         assert!(!refused && retryable, "{source}");
     })
     .await;
+}
+
+/// A full disk was reported as "no answer from the store".
+#[tokio::test]
+async fn a_store_without_room_says_so() {
+    let listener = tokio::net::TcpListener::bind(any_port()).await.unwrap();
+    let endpoint = format!("http://{}", listener.local_addr().unwrap());
+    let server = tokio::spawn(async move {
+        loop {
+            let (mut stream, _) = listener.accept().await.unwrap();
+            let mut request = [0; 4096];
+            let _ = stream.read(&mut request).await.unwrap();
+            let body = "<Error><Code>InsufficientStorage</Code><Message>the disk is full</Message></Error>";
+            let head =
+                "HTTP/1.1 507 Insufficient Storage\r\nConnection: close\r\nContent-Type: application/xml";
+            let answer = format!("{head}\r\nContent-Length: {}\r\n\r\n{body}", body.len());
+            stream.write_all(answer.as_bytes()).await.unwrap();
+        }
+    });
+    let (access_key, secret_key) = ("key".to_owned(), "secret".to_owned());
+    let region = "us-east-1".to_owned();
+    let connection = Connection { endpoint, region, access_key, secret_key, session_token: None };
+    let store = S3Store::at(&connection, "films");
+    let error = store.put("scripts/film/1.txt", "x".into(), PutOptions::always()).await.unwrap_err();
+    assert!(matches!(error, Error::Full { .. }) && error.is_retryable(), "{error:?}");
+    assert_eq!(error.to_string(), "the store has no room: scripts/film/1.txt");
+    let source = std::error::Error::source(&error).unwrap().to_string();
+    assert_eq!(source, "InsufficientStorage: the disk is full");
+    server.abort();
 }

@@ -29,6 +29,7 @@ impl Error {
                     format!("bucket {bucket}")
                 })
             }
+            Self::Store(StoreError::Full { .. }) => Some(format!("bucket {bucket}")),
             _ => None,
         }
     }
@@ -57,6 +58,13 @@ mod tests {
         assert_eq!(refused("AccessDenied").explain("films").as_deref(), Some("bucket films"));
         assert!(refused("no credentials").explain("films").unwrap().contains("AWS_PROFILE"));
         assert!(refused("AccessDenied").is_of_store());
+    }
+
+    #[test]
+    fn a_bucket_without_room_is_named() {
+        let (key, source) = ("scripts/a/1.txt".to_owned(), "the disk is full".into());
+        let full = Error::Store(StoreError::Full { key, source });
+        assert_eq!(full.explain("films").as_deref(), Some("bucket films"));
     }
 
     #[test]

@@ -28,6 +28,14 @@ pub enum Error {
         /// The error of the store.
         source: Cause,
     },
+    /// The store has no room for the object (507): nothing was done.
+    #[error("the store has no room: {key}")]
+    Full {
+        /// The object's key.
+        key: String,
+        /// The error of the store.
+        source: Cause,
+    },
     /// The answer was lost (timeout, broken connection, 500): the request may or may not have taken effect.
     #[error("no answer from the store: {key}")]
     Ambiguous {
@@ -93,7 +101,8 @@ impl Error {
 
     /// Returns whether the same request may succeed later.
     pub fn is_retryable(&self) -> bool {
-        matches!(self, Error::Conflict { .. } | Error::Throttled { .. } | Error::Ambiguous { .. })
+        use Error::{Ambiguous, Conflict, Full, Throttled};
+        matches!(self, Conflict { .. } | Throttled { .. } | Full { .. } | Ambiguous { .. })
     }
 
     /// Whether the request took effect is unknown.
@@ -140,6 +149,7 @@ mod tests {
             (Error::PreconditionFailed { key: key() }, [true, false, false, false, false]),
             (Error::Conflict { key: key() }, [true, false, true, false, false]),
             (Error::Throttled { key: key(), source: cause() }, [false, false, true, false, false]),
+            (Error::Full { key: key(), source: cause() }, [false, false, true, false, false]),
             (Error::Ambiguous { key: key(), source: cause() }, [false, false, true, true, false]),
             (Error::Refused { key: key(), source: cause() }, [false; 5]),
             (Error::NoRegion, [false; 5]),

@@ -27,6 +27,7 @@ where
             Some(412) => Error::PreconditionFailed { key },
             Some(409) => Error::Conflict { key },
             Some(429 | 503) => Error::Throttled { key, source: described(error) },
+            Some(507) => Error::Full { key, source: described(error) },
             Some(500..) => Error::Ambiguous { key, source: described(error) },
             _ if named("SlowDown") || named("RequestTimeout") => {
                 Error::Throttled { key, source: described(error) }
