@@ -50,8 +50,8 @@ pub const LIFELINE: &str = "RAYFOLD_ENDS_WITH_STDIN";
 
 /// Serves the Lambda runtime until it ends.
 ///
-/// With the variable [`LIFELINE`] the process ends at once when its standard input ends, also while it draws: whoever started
-/// it holds the other end of that pipe, and lets go of it in whatever way it ends itself.
+/// With the variable [`LIFELINE`] the process ends at once when its standard input ends, also while it draws. The process that
+/// started it holds the other end of that pipe, and the system closes it however that process ends.
 ///
 /// # Errors
 /// Returns what is missing in the environment, or the error of the runtime.

@@ -1,7 +1,8 @@
 //! A process of a function, from its cold start to its end.
 //!
-//! It ends with the invoker: dropping it kills the process, and one whose invoker was killed ends by itself, because the
-//! pipe ends that is its standard input. Otherwise it would draw on, for minutes, and only then find its runtime API gone.
+//! It ends with the invoker: dropping it kills the process. If the invoker is killed, the process ends by itself, because its
+//! standard input is a pipe of the invoker, which the system then closes. Otherwise it would draw on for minutes before it
+//! found its runtime API gone.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -26,7 +27,8 @@ const LIFELINE: &str = "RAYFOLD_ENDS_WITH_STDIN";
 pub(crate) struct Sandbox {
     function: Function,
     child: Child,
-    /// The system closes it when this process ends, also by SIGKILL. The child must not have it, for a wait closes it.
+    /// The invoker's end of the pipe. The system closes it when the invoker ends, also by SIGKILL. It is no part of `child`,
+    /// because waiting for a child closes its standard input.
     _lifeline: Option<ChildStdin>,
     api: RuntimeApi,
     meter: Option<Meter>,
