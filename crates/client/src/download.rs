@@ -100,7 +100,7 @@ mod tests {
         assert!(error.to_string().contains("none"), "{error}");
     }
 
-    /// The message was "No space left on device", of whichever file.
+    /// The message was "No space left on device", without the name of the file.
     #[test]
     fn a_file_that_cannot_grow_is_named() {
         let error = write_to(Path::new("film.gif"), &mut [0; 2][..], b"GIF89a").unwrap_err();

@@ -34,7 +34,7 @@ function set({ field, inspected }: FieldProps, at: number, values: readonly numb
   if (!values.every(Number.isFinite)) return;
   const { line } = inspected;
   const others = values.length > 0 ? sameFields(field, inspected) : [];
-  // Several lines are one step, whose end is told.
+  // Several lines are one step. An empty list of values ends it.
   const step = under ?? (others.length > 0 ? gesture() : null);
   for (const [other, first] of others) ask({ ask: "set", line: other, first: first + at, values, gesture: step });
   ask({ ask: "set", line, first: field.first + at, values, gesture: step });
