@@ -276,7 +276,7 @@ impl Library {
         let mut referred = Referred::with_pictures(&*self.files, &picture);
         let model = decode(name, &bytes, &mut referred);
         let mut named = vec![(name.to_string(), name.to_string())];
-        named.extend(referred.sources().map(|(name, path, _)| (name.into(), path.into())));
+        named.extend(referred.sources().map(|(name, path)| (name.into(), path.into())));
         let mut looked = vec![(name.to_string(), Some(info))];
         looked.extend(referred.looked());
         let mut faulty = self.faulty.lock().unwrap_or_else(PoisonError::into_inner);

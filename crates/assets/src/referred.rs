@@ -26,8 +26,8 @@ pub struct Referred<'a> {
     /// The pictures in files so far, and the pixels of these and of embedded ones.
     made: BTreeMap<String, Arc<Picture>>,
     pixels: u64,
-    /// The last part of each path, with the whole path and what is known about the file.
-    by_name: BTreeMap<String, (String, Option<FileInfo>)>,
+    /// The last part of each path, with the whole path.
+    by_name: BTreeMap<String, String>,
     /// All files that were looked for, whether the model then referred to them or not, each with its number in the order of
     /// the first looks.
     looked: BTreeMap<String, (usize, Option<FileInfo>)>,
@@ -54,10 +54,9 @@ impl<'a> Referred<'a> {
         Self { pictures: Some(pictures), ..Self::new(files) }
     }
 
-    /// Returns the names of the files that were referred to, each with its path in the model, and what is known about the
-    /// file; `None` if there is none.
-    pub fn sources(&self) -> impl Iterator<Item = (&str, &str, Option<FileInfo>)> {
-        self.by_name.iter().map(|(name, (path, info))| (name.as_str(), path.as_str(), *info))
+    /// Returns the names of the files that were referred to, each with its path in the model.
+    pub fn sources(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.by_name.iter().map(|(name, path)| (name.as_str(), path.as_str()))
     }
 
     /// Returns the names of all files that the outcome of reading the model depends on, in the order in which they were looked
@@ -78,12 +77,15 @@ impl<'a> Referred<'a> {
     }
 
     fn look(&mut self, name: &str) -> Result<Option<FileInfo>, Fault> {
-        let info = self.files.look(name).map_err(|why| self.give_up(unreadable(name, why)))?;
+        if let Some((_, info)) = self.looked.get(name) {
+            return Ok(*info);
+        }
         let number = self.looked.len();
-        if number >= LOOKED && !self.looked.contains_key(name) {
+        if number >= LOOKED {
             return Err(too_many());
         }
-        self.looked.entry(name.into()).or_insert((number, info));
+        let info = self.files.look(name).map_err(|why| self.give_up(unreadable(name, why)))?;
+        self.looked.insert(name.into(), (number, info));
         Ok(info)
     }
 
@@ -151,23 +153,17 @@ impl<'a> Referred<'a> {
         }
         let name = last_part(path);
         file_name(name).map_err(|fault| Fault::new(format!("it refers to `{path}`, but {fault}")))?;
-        let info = match self.by_name.get(name) {
-            Some((other, _)) if other != path => {
+        match self.by_name.get(name) {
+            Some(other) if other != path => {
                 return Err(Fault::new(format!(
                     "it refers to both `{other}` and `{path}`, which are one file here"
                 )));
             }
-            Some((_, info)) => *info,
-            None => {
-                if self.by_name.len() >= limits::FILES {
-                    return Err(too_many());
-                }
-                let info = self.look(name)?;
-                self.by_name.insert(name.into(), (path.into(), info));
-                info
-            }
-        };
-        Ok(info.map(|_| name.into()))
+            Some(_) => {}
+            None if self.by_name.len() >= limits::FILES => return Err(too_many()),
+            None => drop(self.by_name.insert(name.into(), path.into())),
+        }
+        Ok(self.look(name)?.map(|_| name.into()))
     }
 
     /// Returns the warning of a model that does without a file, and the effect of that.
