@@ -60,7 +60,7 @@ parts! {
     lenses, "lenses", |scene| is_sampled(scene) && scene.lens.radius() > 0.0;
     shutters, "shutters", |scene| is_sampled(scene) && scene.shutter.open() > 0.0;
     // Lights that have an extent.
-    extents, "extents", |scene| is_sampled(scene) && scene.lights.iter().any(has_extent);
+    extents, "extents", |scene| is_sampled(scene) && scene.lights.iter().any(|light| light.has_extent());
     glows, "glows", |scene| is_made(scene, |f| f.glow != glam::DVec3::ZERO);
     paths, "paths", Scene::goes_round;
     fogs, "fogs", |scene| scene.fog.get().is_some();
@@ -123,11 +123,4 @@ pub fn is_turned_box(object: &Object) -> bool {
 /// Returns whether a pixel of a scene has several rays.
 pub fn is_sampled(scene: &Scene) -> bool {
     scene.samples.most() > 1
-}
-
-fn has_extent(light: &Light) -> bool {
-    match light {
-        Light::Directional(sun) => sun.angle() > 0.0,
-        Light::Lamp(lamp) => lamp.radius() > 0.0,
-    }
 }

@@ -197,8 +197,7 @@ impl<'a> Parser<'a> {
 
     pub(super) fn doubt_light(&mut self, s: &Statement<'a, '_>, light: &Value<Light>) {
         let is_soft = match light {
-            Value::Constant(Light::Directional(sun)) => sun.angle() > 0.0,
-            Value::Constant(Light::Lamp(lamp)) => lamp.radius() > 0.0,
+            Value::Constant(light) => light.has_extent(),
             Value::Animated(template) => template.row.largest(6).is_some_and(|size| size > 0.0),
         };
         if is_soft && self.doubts.light.is_none() {

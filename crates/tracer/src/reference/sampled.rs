@@ -18,8 +18,9 @@ use crate::cover::Lit;
 use crate::meshes::{Expanded, Shared};
 use crate::parallel::{CHANNELS, bands, bands_of};
 use crate::sampling::guide::Guide;
+use crate::sampling::lights;
 use crate::sampling::paths::{Way, choice, choice_dimension, direction_dimension};
-use crate::sampling::places::{in_ball, in_cone, on_disc, spread};
+use crate::sampling::places::on_disc;
 use crate::sampling::rough::Energies;
 use crate::sampling::{Dimensions, coordinate, pixel_seed};
 use crate::{Exposure, RenderError, RenderOptions};
@@ -211,20 +212,10 @@ impl Moment<'_> {
     }
 
     fn light_points(&self, number: impl Fn(usize) -> f64) -> Vec<DVec3> {
-        let middles = self.world.middles();
-        let lights = self.world.lights.iter().zip(middles).zip(&self.dimensions.lights);
-        let point = |((light, middle), first): ((&Light, DVec3), &Option<usize>)| {
-            let &Some(first) = first else { return middle };
-            match light {
-                Light::Directional(sun) => {
-                    let (x, y) = middle.any_orthonormal_pair();
-                    let at = in_cone(number(first), number(first + 1), spread(sun.angle()));
-                    at.x * x + at.y * y + at.z * middle
-                }
-                Light::Lamp(lamp) => {
-                    middle + lamp.radius() * in_ball(number(first), number(first + 1), number(first + 2))
-                }
-            }
+        let lights = self.world.lights.iter().zip(&self.dimensions.lights);
+        let point = |(light, first): (&Light, &Option<usize>)| match *first {
+            Some(first) => lights::shape(light).point(&|k| number(first + k)),
+            None => lights::shape(light).middle(),
         };
         lights.map(point).collect()
     }

@@ -3,8 +3,7 @@
 use std::borrow::Cow;
 
 use glam::DVec3;
-use rayfold_scene::model::unit;
-use rayfold_scene::{Camera, Glass, Lamp, Light, Object, Scene};
+use rayfold_scene::{Camera, Glass, Light, Object, Scene};
 
 use super::Hit;
 use super::shapes::{self, Surface};
@@ -12,6 +11,7 @@ use crate::camera::{Ray, Rays, Single};
 use crate::meshes::{Expanded, FaceHit, Faces, Shading};
 use crate::parallel::map;
 use crate::pictures::Panorama;
+use crate::sampling::lights;
 
 /// The world that rays are traced through.
 pub(super) struct World<'a> {
@@ -72,13 +72,7 @@ impl<'a> World<'a> {
             Camera::Look(look) => look.eye(),
         };
         let objects = map(&self.objects, |object| shapes::seen_from(object, eye));
-        let lights = self.lights.iter().map(|light| match light {
-            Light::Directional(_) => Some(*light),
-            Light::Lamp(lamp) => {
-                let position = lamp.position() - eye;
-                Lamp::new(lamp.color(), position, lamp.radius(), lamp.reach()).ok().map(Light::Lamp)
-            }
-        });
+        let lights = self.lights.iter().map(|light| lights::shape(light).seen_from(eye));
         Some(Self {
             objects: objects.into_iter().collect::<Option<Vec<_>>>()?.into(),
             lights: lights.collect::<Option<Vec<_>>>()?.into(),
@@ -89,13 +83,9 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Returns the centre of each light: for a sun the unit vector towards it, for a lamp its position.
+    /// Returns the centre of each light.
     pub(super) fn middles(&self) -> Vec<DVec3> {
-        let middle = |light: &Light| match light {
-            Light::Directional(sun) => -unit(sun.direction()),
-            Light::Lamp(lamp) => lamp.position(),
-        };
-        self.lights.iter().map(middle).collect()
+        self.lights.iter().map(|light| lights::shape(light).middle()).collect()
     }
 
     /// Returns the light that comes from where a ray goes that hits nothing.

@@ -9,6 +9,7 @@ pub(crate) mod bright;
 pub(crate) mod cube_table;
 pub(crate) mod film;
 pub(crate) mod guide;
+pub(crate) mod lights;
 pub(crate) mod paths;
 pub(crate) mod places;
 pub(crate) mod rough;
@@ -41,23 +42,15 @@ impl Dimensions {
         let lights = moments.iter().map(|scene| scene.lights.len()).max().unwrap_or(0);
         let mut count = SQUARE;
         let mut take = |of_these: usize| (of_these > 0).then(|| (count, count += of_these).0);
+        let coordinates = |light: &Light| lights::shape(light).coordinates();
         let lights = (0..lights)
-            .map(|k| take(moments.iter().map(|m| m.lights.get(k).map_or(0, extent)).max().unwrap_or(0)))
+            .map(|k| take(moments.iter().map(|m| m.lights.get(k).map_or(0, coordinates)).max().unwrap_or(0)))
             .collect();
         let has_lens = moments.iter().any(has_lens);
         let lens = take(if has_lens { 2 } else { 0 });
         let time = take(usize::from(moments.len() > 1));
         let directions = moments.iter().map(Scene::indirect_bounces).max().unwrap_or(0) as usize;
         Self { lights, lens, time, count, directions }
-    }
-}
-
-/// Dimensions of a point of a light.
-fn extent(light: &Light) -> usize {
-    match light {
-        Light::Directional(sun) if sun.angle() > 0.0 => 2,
-        Light::Lamp(lamp) if lamp.radius() > 0.0 => 3,
-        Light::Directional(_) | Light::Lamp(_) => 0,
     }
 }
 

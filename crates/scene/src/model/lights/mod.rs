@@ -32,6 +32,14 @@ impl Light {
         }
     }
 
+    /// Returns whether it has an extent, so that its shadows are soft: a sun has an angle, a lamp a radius.
+    pub fn has_extent(&self) -> bool {
+        match self {
+            Self::Directional(light) => light.angle() > 0.0,
+            Self::Lamp(light) => light.radius() > 0.0,
+        }
+    }
+
     /// Writes a line of a script.
     pub(crate) fn write(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {

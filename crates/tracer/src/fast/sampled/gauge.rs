@@ -7,6 +7,7 @@ use rayfold_scene::{Light, Object, Outline, Scene, Shine};
 use crate::fast::placement::lens::Lens;
 use crate::fast::rays::view::{View, view};
 use crate::fast::shapes::instance::in_world;
+use crate::sampling::lights;
 
 /// Pixels in the scene, and where its light comes from.
 #[derive(Debug)]
@@ -14,7 +15,7 @@ pub(super) struct Gauge {
     /// None where rays are parallel.
     eye: Option<Eye>,
     lens: Option<Lens>,
-    lights: Vec<Source>,
+    lights: Vec<Light>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -25,14 +26,6 @@ struct Eye {
     back: DVec3,
     /// The size of a pixel at a distance of 1, the larger of its two.
     pixel: f64,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Source {
-    /// The direction to it.
-    Far(DVec3),
-    /// Its place.
-    Near(DVec3),
 }
 
 /// The width of an object in pixels, at its narrowest.
@@ -72,11 +65,7 @@ impl Gauge {
             }
             (View::Parallel { .. }, _) => None,
         };
-        let source = |light: &Light| match light {
-            Light::Directional(sun) => Source::Far(-unit(sun.direction())),
-            Light::Lamp(lamp) => Source::Near(lamp.position()),
-        };
-        Self { eye, lens: Lens::of(scene), lights: scene.lights.iter().map(source).collect() }
+        Self { eye, lens: Lens::of(scene), lights: scene.lights.to_vec() }
     }
 
     /// The size of a pixel at a place.
@@ -117,10 +106,7 @@ impl Gauge {
         let seen = counts(seen);
         let middle = points.iter().sum::<DVec3>() / points.len() as f64;
         let lit = self.lights.iter().map(|light| {
-            let towards = match *light {
-                Source::Far(towards) => towards,
-                Source::Near(place) => (place - middle).normalize_or_zero(),
-            };
+            let towards = lights::shape(light).towards(middle);
             let (x, y) =
                 if towards == DVec3::ZERO { (DVec3::X, DVec3::Y) } else { towards.any_orthonormal_pair() };
             let flat = points.iter().map(|p| DVec2::new((*p - middle).dot(x), (*p - middle).dot(y)));
