@@ -191,6 +191,32 @@ fn with_one_sample_nothing_has_an_extent() {
 }
 
 #[test]
+fn a_short_flash_counts_for_the_time_that_it_lasts() {
+    // The expected levels are 255 times the share of the exposure.
+    let flashes = [
+        ("(step .5:0 1.2:1 1.21:0)", 0.01),
+        ("(step .5:0 .98:1 1.02:0)", 0.04),
+        ("(1:0 1.03:1 1.06:0)", 0.03),
+        // Twice in the exposure.
+        ("(step cycle 0:1 .015:0 .5:0)", 0.03),
+    ];
+    for (curve, share) in flashes {
+        for (samples, error) in [(1024, 1.0), (1024, 8.0), (256, 2.0), (256, 0.0)] {
+            let text = format!(
+                "Screen 64 48\nCamera 0 0 0  0 0 -1  0 1 0  1  -1 -.75 1 .75\nShutter 1\n\
+                 Plane 0 0 -5  0 0 1  {curve} 0 0  0 0 0  0 0 0\nTrace"
+            );
+            let image = Frame::new(&text, samples, error).draw(&RenderOptions::default());
+            let wanted = 255.0 * share;
+            for (x, y, pixel) in image.enumerate_pixels() {
+                let off = (f64::from(pixel[0]) - wanted).abs();
+                assert!(off < 2.0, "{curve}, {samples} {error}: {} at {x} {y}, not {wanted}", pixel[0]);
+            }
+        }
+    }
+}
+
+#[test]
 fn what_does_not_change_does_not_flicker() {
     let text = |ball: &str| table("96 72", ball, WIDE_SUN);
     let (before, after) = (text("Sphere .3 3 .3 2 1 0 0 0 0 0"), text("Sphere .3 3.1 .3 2 1 0 0 0 0 0"));

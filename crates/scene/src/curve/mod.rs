@@ -53,6 +53,9 @@ pub(crate) struct Moment {
     pub(crate) value: f64,
 }
 
+/// In frames, a time between two keys that a few moments of an exposure can miss.
+pub(crate) const QUICK: f64 = 0.125;
+
 /// The distance by which computed values may lie outside of the values at the ends of an interval without
 /// keys, relative to the largest value. A cubic's terms are at most 23 times its ends, and there are
 /// less than 16 roundings.
@@ -210,6 +213,26 @@ impl Curve {
         (low - slack, high + slack)
     }
 
+    /// Returns whether two neighbouring keys are closer than [`QUICK`].
+    pub(crate) fn is_quick(&self) -> bool {
+        self.keys.windows(2).any(|pair| pair[1].frame - pair[0].frame < QUICK)
+    }
+
+    /// Returns the shortest time between two neighbouring keys of which both are within an interval.
+    pub(crate) fn shortest_step(&self, from: f64, to: f64) -> Option<f64> {
+        let shifts = if self.cycle {
+            let shift = from - self.within_cycle(from);
+            // The interval can begin in one cycle and end in the next.
+            vec![shift, shift + self.period()]
+        } else {
+            vec![0.0]
+        };
+        let is_within = |frame: f64, shift: f64| (from..=to).contains(&(frame + shift));
+        let pairs = shifts.into_iter().flat_map(|shift| self.keys.windows(2).map(move |pair| (pair, shift)));
+        let within = pairs.filter(|(pair, shift)| pair.iter().all(|key| is_within(key.frame, *shift)));
+        within.map(|(pair, _)| pair[1].frame - pair[0].frame).reduce(f64::min)
+    }
+
     /// Returns the largest absolute value at any time, up to rounding errors.
     pub(crate) fn largest(&self) -> f64 {
         self.largest
@@ -333,6 +356,17 @@ mod tests {
     fn curve(mode: Mode, cycle: bool, keys: &[(f64, f64)]) -> Curve {
         let keys = keys.iter().map(|&(frame, value)| Key { frame, value }).collect();
         Curve::new(mode, cycle, keys).unwrap()
+    }
+
+    #[test]
+    fn the_shortest_step_is_between_keys_within_the_interval() {
+        let step = |text: &str, from, to| crate::parse_curve(text).unwrap().shortest_step(from, to);
+        assert_eq!(step("(1:0 2:1 2.5:0 7:1)", 0.0, 3.0), Some(0.5));
+        assert_eq!(step("(1:0 2:1 2.5:0 7:1)", 0.0, 2.4), Some(1.0));
+        assert_eq!(step("(1:0 2:1 2.5:0 7:1)", 3.0, 8.0), None);
+        assert_eq!(step("(cycle 1:0 2:1 2.5:0)", 3.0, 4.25), Some(0.5));
+        assert_eq!(step("(cycle 1:0 2:1 2.5:0)", -2.875, -2.25), None);
+        assert_eq!(step("(cycle 0:0 .25:1 1:0)", 0.75, 1.5), Some(0.25));
     }
 
     #[test]

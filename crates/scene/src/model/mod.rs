@@ -77,6 +77,9 @@ pub struct Scene {
     pub hides_rough: bool,
     /// The exposure time of a frame.
     pub shutter: Shutter,
+    /// The shortest time between two neighbouring keys of a curve while the shutter is open, in frames, if a few moments can
+    /// miss what happens between them. It is known in the middle of an exposure alone.
+    pub shortest_step: Option<f64>,
     /// The conversion of colours to levels.
     pub tone: Tone,
     /// The largest number of bounces.
@@ -102,6 +105,7 @@ impl Scene {
             samples: Samples::default(),
             hides_rough: false,
             shutter: Shutter::default(),
+            shortest_step: None,
             tone: Tone::default(),
             depth: Depth::default(),
             indirect: Indirect::default(),

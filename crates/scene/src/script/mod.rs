@@ -19,6 +19,7 @@ mod write;
 use std::ops::Range;
 
 use crate::command::Command;
+use crate::curve::Curve;
 use crate::model::{
     Background, Camera, Clause, Depth, Fog, FrameNumbers, Image, Indirect, InvalidValue, Lens, Light,
     Material, Mesh, Object, PictureFile, Samples, Scene, Screen, Shutter, SkyColors, SkyTurn, Tone,
@@ -49,6 +50,8 @@ pub struct Script {
     lights: Sequence<Light, Template>,
     views: Vec<View>,
     shots: Vec<Shot>,
+    /// The curves with neighbouring keys close to each other.
+    quick_curves: Vec<Curve>,
 }
 
 /// A summary of one `Trace`, or of several consecutive ones that see the same, without their scenes.
@@ -200,7 +203,12 @@ impl Script {
     /// Copies no object of a frame without motion.
     pub fn frame(&self, k: usize) -> Option<Scene> {
         let (shot, number) = self.shot_of(k)?;
-        self.scene(shot, number).ok()
+        let mut scene = self.scene(shot, number).ok()?;
+        let half = 0.5 * scene.shutter.open();
+        let steps = self.quick_curves.iter();
+        scene.shortest_step =
+            steps.filter_map(|curve| curve.shortest_step(number - half, number + half)).reduce(f64::min);
+        Some(scene)
     }
 
     /// Returns the number of frame `k`, counted from 0, which is the time at which its curves are evaluated.
@@ -295,6 +303,7 @@ impl Script {
             lights,
             views: vec![self.views[self.shot_of(k)?.0.view].clone()],
             shots: vec![shot],
+            quick_curves: self.quick_curves.clone(),
         };
         script.forget_unused();
         Some(script)

@@ -22,6 +22,7 @@ use self::scouts::Scouts;
 use self::tile::{Drawn, Pass, SampledTile, Workspace};
 use super::shapes::Shape;
 use crate::cover::{self, Lit};
+use crate::exposure::fewest_moments;
 use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::build::features::{self, Kernel};
@@ -228,8 +229,14 @@ impl<'a, E: Real> Sampled<'a, E> {
         let too_large = || RenderError::TooLarge { width: size.0, height: size.1 };
         let has_cover = parts::BUILT.covers && scene.background.is_none();
         let is_unclamped = parts::BUILT.paths && scene.goes_round();
-        Film::new(size, self.side, scene.samples, scene.tone, PASS, (has_cover, is_unclamped))
-            .ok_or_else(too_large)
+        let kinds = (has_cover, is_unclamped);
+        let mut film =
+            Film::new(size, self.side, scene.samples, scene.tone, PASS, kinds).ok_or_else(too_large)?;
+        let fewest = if self.moments.len() > 1 { fewest_moments(scene) } else { 1 };
+        if fewest > 1 && scene.samples.error() > 0.0 {
+            film.raise_all(fewest.min(scene.samples.most()), fewest).ok_or_else(too_large)?;
+        }
+        Ok(film)
     }
 
     /// The first samples of the pixels of some rows, which are whole rows of tiles: of all or of some.

@@ -51,6 +51,8 @@ pub(super) struct SampleSchedule {
     samples: Samples,
     /// No pass adds more samples to a pixel.
     pub(super) step: u32,
+    /// The number of moments of the first samples, a power of two.
+    pub(super) few_moments: u32,
     tone: Tone,
     /// Whether samples are not clamped, as where light goes round.
     is_unclamped: bool,
@@ -100,7 +102,18 @@ impl SampleSchedule {
         let still = limit(VARYING, SECOND);
         let slopes = (tone == Tone::Srgb && !is_unclamped && samples.error() > 0.0)
             .then(|| Box::new(SlopeBounds::new()));
-        Self { samples, step, tone, is_unclamped, limits, calm, even, still, slopes }
+        Self {
+            samples,
+            step,
+            few_moments: FEW_MOMENTS,
+            tone,
+            is_unclamped,
+            limits,
+            calm,
+            even,
+            still,
+            slopes,
+        }
     }
 
     /// Whether samples are not clamped.
@@ -152,7 +165,7 @@ impl SampleSchedule {
     #[inline(always)]
     pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
         if self.has_error() {
-            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(FEW_MOMENTS).min(all)
+            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(self.few_moments).min(all)
         } else {
             all
         }

@@ -116,6 +116,13 @@ impl Film {
         self.plan.floors.add_all(floors);
     }
 
+    /// Gives all pixels some number of samples in any case, of so many moments, a power of two; `None` where there is no memory
+    /// for it.
+    pub(crate) fn raise_all(&mut self, count: u32, moments: u32) -> Option<()> {
+        self.plan.raise_moments(moments);
+        self.plan.raise(count)
+    }
+
     /// The first samples of its pixels.
     pub(crate) fn into_first(self) -> Option<First> {
         self.first

@@ -182,6 +182,11 @@ impl Plan {
         Some(())
     }
 
+    /// Takes the first samples at so many moments, a power of two, or at more.
+    pub(super) fn raise_moments(&mut self, count: u32) {
+        self.chain.few_moments = self.chain.few_moments.max(count);
+    }
+
     /// Whether means are raised before they are shown.
     pub(super) fn shows_raised(&self) -> bool {
         self.chain.tone() == Tone::Srgb && !self.chain.is_unclamped()
