@@ -1,7 +1,8 @@
 //! The studio's page in a real browser with the real program: runs `crates/studio/web/tests`.
 //!
 //! The test needs Node, Chromium and the page's packages (`npm ci` in `crates/studio/web`). If one of them is missing,
-//! a line reports that the page was not tested; likewise for Firefox. Nothing is installed here.
+//! a line reports that the page was not tested; likewise for Firefox. Nothing is installed here. `.ci/run` runs this program
+//! beside the others, and sets `RAYFOLD_PAGE_TESTS=apart` for these.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -40,6 +41,11 @@ const OF_THE_SITE_IN_FIREFOX: &str = "tests/site-firefox.mjs";
 
 #[test]
 fn the_page_does_in_a_browser_what_it_promises() {
+    if std::env::var_os("RAYFOLD_PAGE_TESTS").is_some_and(|value| value == "apart") {
+        return note(
+            "the page is tested by another command at the same time, as RAYFOLD_PAGE_TESTS=apart says",
+        );
+    }
     let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studio/web");
     let browser = match tools(&web) {
         Ok(browser) => browser,
@@ -87,12 +93,16 @@ fn site() -> Result<PathBuf, String> {
     if !Path::new(String::from_utf8_lossy(&libraries.stdout).trim()).is_dir() {
         return Err(format!("its target is not installed: `rustup target add {TARGET}`"));
     }
-    let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-    let status = Command::new(cargo)
-        .args(["xtask", "site", "--draft"])
-        .current_dir(&root)
-        .stdin(Stdio::null())
-        .status();
+    // `.ci/run` has built it with the features of the tests: `cargo xtask` would build half of its dependencies again.
+    let mut xtask = match std::env::var_os("RAYFOLD_XTASK") {
+        Some(built) => Command::new(built),
+        None => {
+            let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+            cargo.arg("xtask");
+            cargo
+        }
+    };
+    let status = xtask.args(["site", "--draft"]).current_dir(&root).stdin(Stdio::null()).status();
     assert!(status.is_ok_and(|status| status.success()), "`cargo xtask site --draft` fails: see above");
     Ok(root.join("target/site-draft"))
 }

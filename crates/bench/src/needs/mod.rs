@@ -33,10 +33,10 @@ pub struct Args {
     /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
-    /// Use the build without all parts of version 2, and every fifth of those without some of them; write nothing
+    /// Use the build without all parts of version 2, and every tenth of those without some of them; write nothing
     #[arg(long)]
     slice: bool,
-    /// Begin with this of those; without it, with one of the first five
+    /// Begin with this of those; without it, with one of the first ten
     #[arg(long, requires = "slice")]
     first: Option<usize>,
 }
@@ -68,7 +68,7 @@ const MOST: f64 = 0.5;
 const LEFT_OUT: i32 = 3;
 
 /// The number of slices that have all builds.
-const SLICES: usize = 5;
+const SLICES: usize = 10;
 
 /// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;
