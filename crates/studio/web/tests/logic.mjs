@@ -1,18 +1,9 @@
 // What the page's parts compute, without a browser.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { join } from "node:path";
+import { test } from "node:test";
 
-import { createServer } from "vite";
-
-const root = join(import.meta.dirname, "..");
-let server;
-before(async () => {
-  server = await createServer({ root, configFile: false, resolve: { alias: { "#connection": join(root, "src/connection/socket.ts"), "#drawn": join(root, "src/connection/drawn.tsx"), "#runs": join(root, "src/connection/runs.ts") } }, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
-});
-after(() => server?.close());
-const load = (path) => server.ssrLoadModule(`/src/${path}`);
+import { load } from "./modules.mjs";
 
 test("copied lines bring the materials and groups that they name, in the order of the script", async () => {
   const { scriptOf } = await load("clipboard.ts");

@@ -25,12 +25,14 @@ test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   studio.check();
 });
 
-test("moving one object of each example by an arrow key changes one line of one file", async (t) => {
+test("the viewport shows each example as the tracer draws it, and an arrow key changes one line of one file", async (t) => {
   for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
     await t.test(name, async (t) => {
       const from = join(scenes, name);
-      // Whatever its pictures take: it is moved while they get finer.
-      const studio = await open(t, { from, name });
+      // A small window, as some of them take many rays a pixel.
+      const studio = await open(t, { from, name, size: [820, 380] });
+      await studio.settled();
+      await isDrawn(studio.page, studio.path);
       // A model and letters have no place of their own: the group that uses them has it.
       await clickRow(studio.page, '.item.object:not([aria-label^="Mesh "], [aria-label^="Text "])');
       await studio.page.locator(".viewport").focus();
@@ -43,18 +45,6 @@ test("moving one object of each example by an arrow key changes one line of one 
         });
       await until(() => changed().length > 0);
       assert.equal(changed().length, 1, changed().join("\n"));
-      studio.check();
-    });
-  }
-});
-
-test("the viewport shows each example as the tracer draws it", async (t) => {
-  for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
-    await t.test(name, async (t) => {
-      // A small window, as some of them take many rays a pixel.
-      const studio = await open(t, { from: join(scenes, name), name, size: [820, 380] });
-      await studio.settled();
-      await isDrawn(studio.page, studio.path);
       studio.check();
     });
   }

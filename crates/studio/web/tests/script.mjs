@@ -9,6 +9,9 @@ import { audit, caret, drag, goLine, open, over, random, scenes, seenLines, setL
 
 const text = "Screen 320 180\nLook 0 1 8  0 0 0  40\nIlight 1 1 1 1 -1 -1\nSphere 1 0 1 0 .1 .1 .1 .8 .2 .2\nTrace\n";
 
+/** The number of lines that are typed at once; `LINES` sets another one. */
+const LINES = Number(process.env.LINES ?? 40);
+
 /** Lines of all kinds, different each time. */
 function written(count) {
   const kinds = [
@@ -22,7 +25,7 @@ function written(count) {
   return Array.from({ length: count }, (_, n) => kinds[n % kinds.length](n));
 }
 
-for (const [delay, count] of [[0, 200], [5, 12], [30, 6], [60, 6]]) {
+for (const [delay, count] of [[0, LINES], [5, 12], [30, 6], [60, 6]]) {
   test(`${count} lines typed at ${delay} ms a key are the lines of the file`, async (t) => {
     const studio = await open(t, { text });
     const { page } = studio;
@@ -46,11 +49,11 @@ for (const [delay, count] of [[0, 200], [5, 12], [30, 6], [60, 6]]) {
   });
 }
 
-test("200 lines typed at 0 to 60 ms a key, with slips of the finger, are the lines of the file", async (t) => {
+test(`${LINES} lines typed at 0 to 60 ms a key, with slips of the finger, are the lines of the file`, async (t) => {
   const below = random(t, 20261128);
   const studio = await open(t, { text });
   const { page } = studio;
-  const lines = Array.from({ length: 200 }, (_, at) => ["# ", "Depth ", "", "Samples "][below(4)] + at);
+  const lines = Array.from({ length: LINES }, (_, at) => ["# ", "Depth ", "", "Samples "][below(4)] + at);
   await page.locator(".cm-content").focus();
   await page.keyboard.press("Control+a");
   const pause = async () => {

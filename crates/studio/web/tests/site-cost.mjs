@@ -6,16 +6,14 @@ import { spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { before, test } from "node:test";
 
-import { createServer } from "vite";
+import { load } from "./modules.mjs";
 
-let server, cost;
+let cost;
 before(async () => {
-  server = await createServer({ root: join(import.meta.dirname, ".."), configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
-  cost = await server.ssrLoadModule("/src/static/stack/cost.ts");
+  cost = await load("static/stack/cost.ts");
 });
-after(() => server?.close());
 
 function program(...args) {
   const run = spawnSync(process.env.RAYFOLD, ["cost", "--format", "json", "--quiet", ...args]);

@@ -4,12 +4,12 @@
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { chromium } from "playwright-core";
 
 import { expected, film, linked, unzipped } from "./host.mjs";
+import { load } from "./modules.mjs";
 import { cognito, dev } from "./site-dev.mjs";
 
 /** Longer than a bucket takes on a loaded machine, in milliseconds. */
@@ -180,10 +180,7 @@ test("the credentials of the page end at the person's folder", async (t) => {
   const { page } = await open(t, [["film.txt", film]]);
   const { endpoint } = await page.evaluate(() => fetch("rayfold.json").then((answer) => answer.json()));
   const given = await page.evaluate(() => fetch("/credentials", { method: "POST" }).then((answer) => answer.json()));
-  const { createServer: vite } = await import("vite");
-  const server = await vite({ root: join(import.meta.dirname, ".."), configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
-  t.after(() => server.close());
-  const { signed, encoded } = await server.ssrLoadModule("/src/static/stack/sign.ts");
+  const { signed, encoded } = await load("static/stack/sign.ts");
   const status = async (method, key, query = "") => {
     const url = new URL(`${endpoint}/${key.split("/").map(encoded).join("/")}${query}`);
     const body = method === "PUT" ? { body: new Uint8Array([1]) } : {};

@@ -4,18 +4,16 @@ import assert from "node:assert/strict";
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { before, test } from "node:test";
 
-import { createServer } from "vite";
+import { load } from "./modules.mjs";
 
 const root = join(import.meta.dirname, "..");
-let server, standing, receipts;
+let standing, receipts;
 before(async () => {
-  server = await createServer({ root, configFile: false, appType: "custom", logLevel: "error", server: { middlewareMode: true, hmr: false, ws: false } });
-  standing = await server.ssrLoadModule("/src/static/stack/standing.ts");
-  receipts = await server.ssrLoadModule("/src/static/stack/receipts.ts");
+  standing = await load("static/stack/standing.ts");
+  receipts = await load("static/stack/receipts.ts");
 });
-after(() => server?.close());
 
 /** The version of an object in the store of the program's test. */
 const versionOf = (text) => createHash("sha256").update(text).digest("hex").slice(0, 32);
