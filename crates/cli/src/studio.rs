@@ -68,27 +68,29 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
 /// Opens the items that are chosen on the start page, each in a studio of its own.
 async fn from_start_page(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     let folder = std::env::current_dir().context("there is no current folder")?;
-    let mut start = Start::open(&Recent::of_user(), &folder, args.port).await?;
+    let mut start = Start::open(Recent::of_user(), &folder, args.port).await?;
     show(args, start.address(), console)?;
-    let mut servers = Vec::new();
+    let mut servers: Vec<(PathBuf, Server)> = Vec::new();
     loop {
         let choice = tokio::select! {
             choice = start.choice() => choice,
             () = until_stopped() => None,
         };
         let Some(Choice { path, answer }) = choice else { break };
-        let opened = open_studio(args, &path, 0, console).await;
-        // The browser may have gone.
-        let _ = answer.send(match opened {
-            Ok(server) => {
+        let path = path.canonicalize().unwrap_or(path);
+        let opened = match servers.iter().find(|(opened, _)| *opened == path) {
+            Some((_, server)) => Ok(server.address().to_owned()),
+            None => open_studio(args, &path, 0, console).await.map(|server| {
+                server.lead_to_start(start.address());
                 let address = server.address().to_owned();
-                servers.push(server);
-                Ok(address)
-            }
-            Err(error) => Err(format!("{error:#}")),
-        });
+                servers.push((path, server));
+                address
+            }),
+        };
+        // The browser may have gone.
+        let _ = answer.send(opened.map_err(|error| format!("{error:#}")));
     }
-    stop(servers).await
+    stop(servers.into_iter().map(|(_, server)| server).collect()).await
 }
 
 async fn open_studio(args: &Args, path: &Path, port: u16, console: &Console) -> anyhow::Result<Server> {

@@ -3,7 +3,7 @@
 //!
 //! Knows commands only by the kinds of their parameters. A position is a handle. A length is a handle at that
 //! distance from the first position. A direction is the tip of an arrow. Angles and a scale have handles of
-//! their own (`rotate_handles`). Invariant: a drag is computed from the state at its start, so returning to
+//! their own (`rotate_handles`), and so has the size of an object without a scale (`scale_handles`). Invariant: a drag is computed from the state at its start, so returning to
 //! the start changes nothing.
 
 use std::cell::Cell;
@@ -14,7 +14,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::line::Line;
 use crate::rotate_handles;
+use crate::scale_handles;
 use crate::snap_to_boxes::{Neighbours, Snap};
+use crate::steps::{exactly, middle, rounded, shifted};
 use crate::tables::{Role, fields, role};
 use crate::values::{Keying, Values, changed};
 use crate::view::Projection;
@@ -90,6 +92,8 @@ pub(crate) enum HandleKind {
         /// The index in the line's numbers, from 0.
         first: usize,
     },
+    /// All positions and lengths, from the middle of the positions.
+    Size,
 }
 
 /// A handle in the picture.
@@ -232,12 +236,13 @@ pub(crate) fn handles(
             | Kind::Word => {}
         }
     }
+    if scale_handles::is_scaled(values) {
+        let (right, up, _) = projection.axes();
+        let (middle, arrow) = (middle(&positions), arrow + body);
+        let at = middle + arrow * rotate_handles::SCALE * (right + up);
+        add(HandleKind::Size, middle, at, "scale", straight());
+    }
     handles
-}
-
-/// Returns the mean of some positions.
-fn middle(positions: &[(usize, DVec3)]) -> DVec3 {
-    positions.iter().map(|(_, position)| position).sum::<DVec3>() / positions.len().max(1) as f64
 }
 
 /// Returns the direction of the handle of a line's length number `index`.
@@ -310,7 +315,7 @@ impl Drag {
         let positions: Vec<_> = values.positions().collect();
         let grabbed = match grip {
             HandleKind::Body => grabbed.unwrap_or(anchor),
-            HandleKind::Key { .. } => middle(&positions),
+            HandleKind::Key { .. } | HandleKind::Size => middle(&positions),
             HandleKind::Axis { .. } | HandleKind::Plane { .. } if role(values.command) != Role::Camera => {
                 middle(&positions)
             }
@@ -422,13 +427,16 @@ impl Drag {
                 }
                 changed(line, first + axis, &[exactly(degrees[axis], by, rotate_handles::STEP)], keying)
             }),
-            HandleKind::Scale { first } => {
+            HandleKind::Scale { .. } | HandleKind::Size => {
                 let Some(center) = projection.point(self.grabbed) else { return self.unmoved() };
                 let factor = to.distance(center) / from.distance(center);
                 if from == to || !factor.is_finite() {
                     return self.unmoved();
                 }
                 self.first(|line, values| {
+                    let HandleKind::Scale { first } = self.grip else {
+                        return scale_handles::scaled(line, values, factor, step, keying);
+                    };
                     let scale = values.number(first)?;
                     let step = self::step(scale.abs() * 3e-2, options.snap);
                     changed(line, first, &[rounded((scale * factor).max(step), step)], keying)
@@ -494,33 +502,6 @@ fn step(pixel: f64, snap: bool) -> f64 {
     let least = if snap { SNAP * pixel } else { 0.5 * pixel };
     let power = if snap { least.log10().ceil() } else { least.log10().floor() };
     if power.is_finite() { 10f64.powi(power.clamp(-12.0, 12.0) as i32) } else { 1e-3 }
-}
-
-/// Returns the multiple of a power of ten nearest to `x`, as its shortest decimal.
-fn rounded(x: f64, step: f64) -> f64 {
-    let decimals = -step.log10().round();
-    let x = (x / step).round() * step;
-    if decimals > 0.0 { format!("{x:.*}", decimals as usize).parse().unwrap_or(x) } else { x.round() }
-}
-
-/// Moves a position along some of the axes, on each by a multiple of its step. The other coordinates keep their numbers.
-fn shifted(position: DVec3, by: DVec3, axes: [bool; 3], steps: [f64; 3]) -> [f64; 3] {
-    let mut to = position.to_array();
-    for axis in (0..3).filter(|&axis| axes[axis]) {
-        let way = rounded(by[axis], steps[axis]);
-        if way != 0.0 {
-            to[axis] = exactly(to[axis], way, steps[axis]);
-        }
-    }
-    to
-}
-
-/// Returns the sum without rounding noise: it has as many decimals as the longer of the two numbers.
-fn exactly(x: f64, way: f64, step: f64) -> f64 {
-    let sum = x + way;
-    let of = |x: f64| x.to_string().split_once('.').map_or(0, |(_, decimals)| decimals.len());
-    let decimals = of(x).max((-step.log10().round()).max(0.0) as usize);
-    if decimals <= 12 { format!("{sum:.decimals$}").parse().unwrap_or(sum) } else { sum }
 }
 
 #[cfg(test)]
@@ -742,8 +723,5 @@ mod tests {
     fn steps_are_powers_of_ten() {
         assert_eq!(step(0.013, false), 1e-3);
         assert_eq!(step(0.013, true), 1.0);
-        assert_eq!(rounded(1.23456, 1e-2), 1.23);
-        assert_eq!(rounded(1234.0, 100.0), 1200.0);
-        assert_eq!(exactly(-3.515, 0.1, 0.01), -3.415);
     }
 }

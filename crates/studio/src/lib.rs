@@ -46,6 +46,7 @@ mod protocol;
 mod rotate_handles;
 #[cfg(feature = "server")]
 mod runs;
+mod scale_handles;
 #[cfg(feature = "server")]
 mod server;
 mod session;
@@ -56,6 +57,7 @@ mod snap_to_ground;
 mod source_map;
 #[cfg(feature = "server")]
 mod start;
+mod steps;
 mod storage;
 mod tables;
 mod text_edit;

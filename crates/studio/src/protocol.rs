@@ -235,6 +235,8 @@ pub(crate) enum ViewPreset {
     Side,
     /// The view from above.
     Top,
+    /// The view from the opposite side.
+    Opposite,
     /// The view of the selection.
     Selection,
 }

@@ -1,7 +1,7 @@
 //! The server of the page, behind its [`Door`]. No path of a request reaches the file system. One page works at a time,
 //! and a new one replaces it.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use axum::Router;
@@ -10,7 +10,7 @@ use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::from_fn_with_state;
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::{any, get};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio::task::JoinHandle;
@@ -62,6 +62,8 @@ struct Shared {
     thumbnails: Semaphore,
     /// Ends the session of the current page.
     working: Mutex<Option<oneshot::Sender<()>>>,
+    /// The address of the start page that it was opened from.
+    start_page: OnceLock<String>,
 }
 
 impl Server {
@@ -81,6 +83,7 @@ impl Server {
             drawing: Arc::new(Semaphore::new(DRAWN)),
             thumbnails: Semaphore::new(1),
             working: Mutex::default(),
+            start_page: OnceLock::new(),
         });
         let router = Router::new()
             .route("/{token}/", get(html))
@@ -95,6 +98,7 @@ impl Server {
             .route("/{token}/script.txt", get(one_script))
             .route("/{token}/material.png", get(material))
             .route("/{token}/preset.png", get(preset))
+            .route("/{token}/start", get(start_page))
             .with_state(Arc::clone(&shared))
             .nest("/{token}/runs", cloud.router(project))
             .layer(from_fn_with_state(door, guard));
@@ -111,6 +115,12 @@ impl Server {
     /// Returns the URL of the page, with the token.
     pub fn address(&self) -> &str {
         &self.address
+    }
+
+    /// Lets the page lead to the start page that it was opened from.
+    pub fn lead_to_start(&self, address: &str) {
+        // A second address would be the same.
+        let _ = self.shared.start_page.set(address.to_owned());
     }
 
     /// Writes pending changes and stops. Returns the names of the files that could not be written.
@@ -229,6 +239,14 @@ async fn preset(request: Request) -> Response {
     let name = request.uri().query().unwrap_or_default();
     let png = tokio::task::block_in_place(|| materials::preset_sphere(name));
     picture(png, (StatusCode::NOT_FOUND, "there is no such starter material\n"))
+}
+
+/// Leads to the start page that the studio was opened from.
+async fn start_page(State(shared): State<Arc<Shared>>) -> Response {
+    match shared.start_page.get() {
+        Some(address) => Redirect::to(address).into_response(),
+        None => (StatusCode::NOT_FOUND, "the studio was opened without a start page\n").into_response(),
+    }
 }
 
 fn picture(png: Result<Option<Vec<u8>>, Error>, missing: impl IntoResponse) -> Response {

@@ -7,7 +7,7 @@ mod html;
 mod recent;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::Router;
 use axum::extract::{Query, State};
@@ -50,7 +50,9 @@ pub struct Choice {
 }
 
 struct Shared {
-    recent: Vec<PathBuf>,
+    recent: Recent,
+    /// The recent scenes that pages have shown, by their numbers in links.
+    shown: Mutex<Vec<PathBuf>>,
     /// The folder for copies of examples.
     folder: PathBuf,
     choices: mpsc::Sender<Choice>,
@@ -70,12 +72,13 @@ impl Start {
     ///
     /// # Errors
     /// Fails if the port is taken or the system has no randomness.
-    pub async fn open(recent: &Recent, folder: &Path, port: u16) -> Result<Self, Error> {
+    pub async fn open(recent: Recent, folder: &Path, port: u16) -> Result<Self, Error> {
         let (listener, door) = Door::open(port).await?;
         let (address, door) = (door.address(), Arc::new(door));
         let (sender, choices) = mpsc::channel(1);
         let shared = Arc::new(Shared {
-            recent: recent.list(),
+            recent,
+            shown: Mutex::default(),
             folder: folder.to_owned(),
             choices: sender,
             drawing: Semaphore::new(1),
@@ -101,6 +104,24 @@ impl Start {
     }
 }
 
+impl Shared {
+    fn shown(&self) -> MutexGuard<'_, Vec<PathBuf>> {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the recent scenes with their numbers, the newest first. A path keeps its number.
+    fn recent(&self) -> Vec<(usize, PathBuf)> {
+        let mut shown = self.shown();
+        let mut number = |path: &PathBuf| {
+            shown.iter().position(|other| other == path).unwrap_or_else(|| {
+                shown.push(path.clone());
+                shown.len() - 1
+            })
+        };
+        self.recent.list().into_iter().map(|path| (number(&path), path)).collect()
+    }
+}
+
 impl Drop for Start {
     fn drop(&mut self) {
         self.task.abort();
@@ -108,7 +129,7 @@ impl Drop for Start {
 }
 
 async fn page(State(shared): State<Arc<Shared>>) -> Response {
-    let html = html::page(&shared.recent, &shared.folder, &examples::names());
+    let html = html::page(&shared.recent(), &shared.folder, &examples::names());
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], html).into_response()
 }
 
@@ -137,7 +158,9 @@ fn text(what: &SceneQuery) -> Option<&'static str> {
 
 async fn choose(State(shared): State<Arc<Shared>>, Query(what): Query<SceneQuery>) -> Response {
     let path = match what.recent {
-        Some(at) => shared.recent.get(at).cloned().ok_or_else(|| "there is no such scene".to_owned()),
+        Some(number) => {
+            shared.shown().get(number).cloned().ok_or_else(|| "there is no such scene".to_owned())
+        }
         None => copy(&shared.folder, &what),
     };
     let opened = match path {
@@ -153,7 +176,8 @@ async fn choose(State(shared): State<Arc<Shared>>, Query(what): Query<SceneQuery
         Err(error) => Err(error),
     };
     match opened {
-        Ok(address) => Redirect::to(&address).into_response(),
+        // The page has a link back.
+        Ok(address) => Redirect::to(&format!("{address}?start")).into_response(),
         Err(why) => (StatusCode::CONFLICT, format!("{why}\n")).into_response(),
     }
 }
@@ -196,7 +220,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let recent = Recent::at(folder.path().join("recent.json"));
         recent.add(folder.path());
-        let mut start = Start::open(&recent, folder.path(), 0).await.unwrap();
+        let mut start = Start::open(recent, folder.path(), 0).await.unwrap();
         let address = start.address().to_owned();
         let host = address.split('/').nth(2).unwrap().to_owned();
         let root = address.strip_prefix(&format!("http://{host}")).unwrap().to_owned();
@@ -214,13 +238,20 @@ mod tests {
         };
         let page = request("").await;
         assert!(page.contains("open?recent=0") && page.contains("open?example=hello"), "{page}");
+        Recent::at(folder.path().join("recent.json")).add(&folder.path().join("recent.json"));
+        let page = request("").await;
+        let (newest, older) = (page.find("open?recent=1").unwrap(), page.find("open?recent=0").unwrap());
+        assert!(newest < older, "a scene keeps its number: {page}");
         assert!(request("example.png?example=hello").await.contains("image/png"));
         let asked = tokio::spawn(request("open?recent=0"));
         let choice = start.choice().await.unwrap();
         assert_eq!(choice.path, folder.path().canonicalize().unwrap());
         choice.answer.send(Ok("http://127.0.0.1:1/a/".into())).unwrap();
         let answer = asked.await.unwrap();
-        assert!(answer.starts_with("HTTP/1.1 303") && answer.contains("http://127.0.0.1:1/a/"), "{answer}");
+        assert!(
+            answer.starts_with("HTTP/1.1 303") && answer.contains("http://127.0.0.1:1/a/?start"),
+            "{answer}"
+        );
         let asked = tokio::spawn(request("open"));
         start.choice().await.unwrap().answer.send(Err("no room".into())).unwrap();
         assert!(asked.await.unwrap().contains("409"));

@@ -120,6 +120,11 @@ impl Orbit {
         Self { target, distance, yaw: back.x.atan2(back.z), pitch, ..self }
     }
 
+    /// Looks at the same target from the opposite side.
+    pub(crate) fn opposite(self) -> Self {
+        Self { yaw: self.yaw + std::f64::consts::PI, pitch: -self.pitch, ..self }
+    }
+
     /// Returns the position of the camera.
     pub(crate) fn eye(&self) -> DVec3 {
         self.target + self.distance * self.backward()

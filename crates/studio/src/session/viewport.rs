@@ -221,6 +221,7 @@ impl Session {
             ViewPreset::Front => Some(Orbit::at(bounds, 0.0, 0.0)),
             ViewPreset::Side => Some(Orbit::at(bounds, quarter, 0.0)),
             ViewPreset::Top => Some(Orbit::at(bounds, 0.0, quarter)),
+            ViewPreset::Opposite => self.orbit(project).map(Orbit::opposite),
             ViewPreset::Selection => {
                 let what = self.selected_bounds(project).unwrap_or(bounds);
                 let from = self.orbit(project);

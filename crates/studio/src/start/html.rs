@@ -7,19 +7,19 @@ const HEAD: &str = "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\"
                     <link rel=\"stylesheet\" href=\"start.css\">\n<link rel=\"icon\" href=\"data:,\">\n\
                     <main>\n<h1>rayfold studio</h1>\n";
 
-/// Returns the page with recent scenes and examples, of which copies are made in `folder`.
-pub(super) fn page(recent: &[PathBuf], folder: &Path, examples: &[&str]) -> String {
+/// Returns the page with recent scenes, each with its number, and examples, of which copies are made in `folder`.
+pub(super) fn page(recent: &[(usize, PathBuf)], folder: &Path, examples: &[&str]) -> String {
     let mut html = HEAD.to_owned();
     html.push_str("<section>\n<h2>New</h2>\n<div class=\"cards\">\n");
     html.push_str(&card("open", "example.png", "Empty scene", "A floor, a sun and a camera"));
     html.push_str("</div>\n</section>\n");
     if !recent.is_empty() {
         html.push_str("<section>\n<h2>Recent</h2>\n<ul>\n");
-        for (at, path) in recent.iter().enumerate() {
+        for (number, path) in recent {
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
             let (name, path) = (escaped(&name), escaped(&path.to_string_lossy()));
             html.push_str(&format!(
-                "<li><a href=\"open?recent={at}\"><b>{name}</b> <span>{path}</span></a></li>\n"
+                "<li><a href=\"open?recent={number}\"><b>{name}</b> <span>{path}</span></a></li>\n"
             ));
         }
         html.push_str("</ul>\n</section>\n");
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn names_are_text_and_show_what_they_are() {
-        let page = page(&[PathBuf::from("/a/<b>\u{202e}&\"c")], Path::new("/x<y"), &["hello"]);
+        let page = page(&[(7, PathBuf::from("/a/<b>\u{202e}&\"c"))], Path::new("/x<y"), &["hello"]);
         assert!(page.contains("<b>&lt;b&gt;U+202E&amp;&quot;c</b>"), "{page}");
         assert!(page.contains("made in /x&lt;y."), "{page}");
     }

@@ -106,6 +106,7 @@ export const actions = {
   lookFront: { title: "Look from the front", keys: ["1"], run: () => ask({ ask: "look", at: "front" }) },
   lookSide: { title: "Look from the side", keys: ["3"], run: () => ask({ ask: "look", at: "side" }) },
   lookTop: { title: "Look from above", keys: ["7"], run: () => ask({ ask: "look", at: "top" }) },
+  lookBack: { title: "Look from the opposite side", keys: ["9"], run: () => ask({ ask: "look", at: "opposite" }) },
   frame: { title: "Look at the selection", keys: ["f"], icon: Focus, run: () => ask({ ask: "look", at: "selection" }) },
   keepCamera: {
     title: "Make this the script's camera",

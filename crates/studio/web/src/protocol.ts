@@ -25,7 +25,7 @@ export type Switch = "auto-key" | "path" | "onion";
 export type Navigation = "turn" | "pan" | "zoom";
 
 /** A camera to look through. */
-export type ViewPreset = "script" | "free" | "front" | "side" | "top" | "selection";
+export type ViewPreset = "script" | "free" | "front" | "side" | "top" | "opposite" | "selection";
 
 /** The modifiers of a drag. */
 export type DragOptions = { 
@@ -293,7 +293,7 @@ axis: number, } | { "what": "key",
 /** The frame of the key. */
 frame: number, } | { "what": "scale", 
 /** The index in the line's numbers, from 0. */
-first: number, };
+first: number, } | { "what": "size" };
 
 /** A handle in the picture. */
 export type Handle = { 

@@ -23,7 +23,11 @@ test("the start page opens copies of examples, an empty scene and recent scenes,
   await page.getByText("hello", { exact: true }).click();
   await page.locator("canvas[data-picture]").waitFor();
   assert.ok(existsSync(join(folder, "hello.txt")));
-  await page.goto(address);
+  await page.getByRole("link", { name: "Start page" }).click();
+  await page.waitForURL(address);
+  await page.getByText("hello.txt", { exact: true }).click();
+  await page.locator("canvas[data-picture]").waitFor();
+  await page.getByRole("link", { name: "Start page" }).click();
   await page.getByText("Empty scene").click();
   await page.locator("canvas[data-picture]").waitFor();
   assert.ok(existsSync(join(folder, "scene.txt")));
@@ -73,8 +77,25 @@ test("a box selects what is in it, and the axes turn the view", async (t) => {
   await page.keyboard.up("Control");
   await until(async () => (await page.locator(".item[aria-selected=true]").count()) === 2);
   assert.equal(readFileSync(studio.path, "utf8"), SCENE);
-  await page.locator(".cube .axis-y circle").click();
+  // The ends of the axes with letters come last.
+  await page.locator(".cube .axis-y circle").last().click();
   await until(async () => (await page.getByRole("button", { name: "Camera", exact: true }).getAttribute("aria-pressed")) === "false");
+  // The larger ball is on the right, and on the left from behind.
+  const red = () => page.locator("canvas").evaluate((canvas) => {
+    const { data, width } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let [sum, count] = [0, 0];
+    for (let at = 0; at < data.length; at += 4) {
+      if (data[at] > 60 && data[at] > 3 * data[at + 1]) [sum, count] = [sum + ((at / 4) % width) / width, count + 1];
+    }
+    return count > 0 ? sum / count : NaN;
+  });
+  await page.locator(".cube .axis-z circle").last().click();
+  await studio.settled();
+  const before = await red();
+  // A click on an axis that is looked along turns to the other side.
+  await page.locator(".cube .axis-z circle").last().click();
+  await studio.settled();
+  assert.ok(before > 0.55 && (await red()) < 0.45, `${before} ${await red()}`);
   studio.check();
 });
 

@@ -5,8 +5,8 @@ import type { Listener, Send } from "./listener";
 /** Leaves what is open for a new project. The program has one project. */
 export const openNew: (() => void) | null = null;
 
-/** The address of the start page, if the page knows it. */
-export const startPage: string | null = null;
+/** The address of the start page, if the studio was opened from it. */
+export const startPage: string | null = globalThis.location?.search === "?start" ? "start" : null;
 
 export function open({ opened, told, shown, closed }: Listener): Send {
   const address = new URL("socket", location.href);

@@ -264,20 +264,29 @@ function ViewCube({ axes }: { readonly axes: readonly (readonly [number, number]
   const looks = [actions.lookSide, actions.lookTop, actions.lookFront];
   return (
     <svg class="cube" viewBox="-40 -40 80 80" role="group" aria-label="Axes">
-      {axes.map(([x, y], axis) => {
-        const action = looks[axis];
-        const name = "xyz"[axis] ?? "";
-        return (
-          action && (
-            <g key={name} class={`axis-${name}`} role="button" tabindex={0} aria-label={`${action.title}, along ${name}`} onPointerDown={(event) => event.stopPropagation()} onClick={action.run} onKeyDown={(event) => event.key === "Enter" && action.run()}>
-              <title>{action.title}</title>
-              <line x2={x * 28} y2={y * 28} />
-              <circle cx={x * 28} cy={y * 28} r={9} />
-              <text x={x * 28} y={y * 28}>{name}</text>
+      {[-1, 1].map((end) =>
+        axes.map(([x, y], axis) => {
+          const action = looks[axis];
+          const name = "xyz"[axis] ?? "";
+          if (!action) return null;
+          // Of an axis that is looked along, a click shows the other side.
+          const isEndOn = Math.hypot(x, y) < 0.01;
+          const run = (): void => {
+            if (!isEndOn) action.run();
+            if (end < 0 || isEndOn) actions.lookBack.run();
+          };
+          const title = end < 0 ? `${action.title}, then ${actions.lookBack.title.toLowerCase()}` : action.title;
+          const [to, up] = [28 * end * x, 28 * end * y];
+          return (
+            <g key={`${name}${end}`} class={`axis-${name}`} role="button" tabindex={0} aria-label={`${title}, along ${name}`} onPointerDown={(event) => event.stopPropagation()} onClick={run} onKeyDown={(event) => event.key === "Enter" && run()}>
+              <title>{title}</title>
+              <line x2={to} y2={up} />
+              <circle cx={to} cy={up} r={end < 0 ? 5 : 9} />
+              {end > 0 && <text x={to} y={up}>{name}</text>}
             </g>
-          )
-        );
-      })}
+          );
+        }),
+      )}
     </svg>
   );
 }
