@@ -368,8 +368,9 @@ fn handles_lead_to_the_numbers_of_the_line() {
     let axes = [0, 1, 2].map(|axis| HandleKind::Axis { axis });
     let planes = [1, 2].map(|axis| HandleKind::Plane { axis });
     let points = [0, 3].map(|first| HandleKind::Point { first });
-    assert_eq!(grips, [axes.as_slice(), &planes, &points].concat(), "that of y and z is seen edge on");
-    let Handle { at, .. } = *handles.last().unwrap();
+    let size = [HandleKind::Size];
+    assert_eq!(grips, [axes.as_slice(), &planes, &points, &size].concat(), "that of y and z is seen edge on");
+    let Handle { at, .. } = handles[grips.len() - 2];
     let (grip, line) = (Some(HandleKind::Point { first: 3 }), Some(5));
     desk.ask(ClientMessage::Press { x: at[0], y: at[1], extend: false, grip, line });
     desk.ask(ClientMessage::Drag {
