@@ -13,8 +13,11 @@ const MOMENTS_IF_ADAPTIVE: u32 = 1;
 /// The smallest and the largest number of moments.
 const MOMENTS: (u32, u32) = (16, 256);
 
-/// The number of moments, on average, while a change happens that is short compared with the exposure.
-const MOMENTS_OF_A_STEP: f64 = 2.0;
+/// The largest number of moments: those of an exposure with a short change.
+pub(crate) const MOST_MOMENTS: u32 = MOMENTS.1;
+
+/// The number of samples of a pixel, on average, while a change happens that is short compared with the exposure.
+const SAMPLES_OF_A_STEP: f64 = 2.0;
 
 /// The largest number of objects at all moments together. Scenes with more objects have fewer moments, because each
 /// moment is prepared and kept in memory.
@@ -76,17 +79,18 @@ impl<'a> Exposure<'a> {
         let wanted = samples.most().saturating_mul(for_a_sample).min(most).next_power_of_two();
         let few = (OBJECTS / expanded_count(&self.scene.objects).max(1)).clamp(least as usize, most as usize)
             as u32;
-        let count = wanted.max(fewest_moments(self.scene)).clamp(least, most).min(1 << few.ilog2());
+        let wanted = if fewest_samples(self.scene) > 1 { most } else { wanted };
+        let count = wanted.clamp(least, most).min(1 << few.ilog2());
         let moments: Vec<Scene> =
             (0..count).map(|k| self.at((f64::from(k) + 0.5) / f64::from(count))).collect();
         if moments.iter().all(|moment| moment == &moments[0]) { moments[..1].to_vec() } else { moments }
     }
 }
 
-/// Returns the number of moments of a moving scene of which some see the shortest change, a power of two. It is 1 if nothing
-/// changes in a small part of the exposure.
-pub(crate) fn fewest_moments(scene: &Scene) -> u32 {
+/// Returns the number of samples that each pixel of a moving scene needs so that some see the shortest change: a power of two,
+/// 1 if nothing changes in a small part of the exposure. They need all moments.
+pub(crate) fn fewest_samples(scene: &Scene) -> u32 {
     // The conversion saturates.
-    let wanted = |step: f64| (MOMENTS_OF_A_STEP * scene.shutter.open() / step).ceil() as u32;
-    scene.shortest_step.map_or(1, |step| wanted(step).clamp(1, MOMENTS.1).next_power_of_two())
+    let wanted = |step: f64| (SAMPLES_OF_A_STEP * scene.shutter.open() / step).ceil() as u32;
+    scene.shortest_step.map_or(1, |step| wanted(step).clamp(1, MOST_MOMENTS).next_power_of_two())
 }
