@@ -50,6 +50,14 @@ impl Row {
         &self.0
     }
 
+    /// Returns the curves of the numbers.
+    pub(crate) fn curves(&self) -> impl Iterator<Item = &Curve> {
+        self.0.iter().filter_map(|number| match number {
+            Number::Animated(curve) => Some(&**curve),
+            Number::Constant(_) | Number::Level(_) => None,
+        })
+    }
+
     /// Returns the values at a time, for a picture of this tone; 0 for omitted ones.
     pub(crate) fn at(&self, frame: f64, tone: Tone) -> [f64; MAX_NUMBERS] {
         let mut values = [0.0; MAX_NUMBERS];

@@ -13,9 +13,6 @@ const MOMENTS_IF_ADAPTIVE: u32 = 1;
 /// The smallest and the largest number of moments.
 const MOMENTS: (u32, u32) = (16, 256);
 
-/// The largest number of moments: those of an exposure with a short change.
-pub(crate) const MOST_MOMENTS: u32 = MOMENTS.1;
-
 /// The number of samples of a pixel, on average, while a change happens that is short compared with the exposure.
 const SAMPLES_OF_A_STEP: f64 = 2.0;
 
@@ -92,5 +89,5 @@ impl<'a> Exposure<'a> {
 pub(crate) fn fewest_samples(scene: &Scene) -> u32 {
     // The conversion saturates.
     let wanted = |step: f64| (SAMPLES_OF_A_STEP * scene.shutter.open() / step).ceil() as u32;
-    scene.shortest_step.map_or(1, |step| wanted(step).clamp(1, MOST_MOMENTS).next_power_of_two())
+    scene.shortest_step.map_or(1, |step| wanted(step).clamp(1, MOMENTS.1).next_power_of_two())
 }

@@ -53,7 +53,7 @@ pub(crate) struct Moment {
     pub(crate) value: f64,
 }
 
-/// In frames, a time between two keys that a few moments of an exposure can miss.
+/// The share of an exposure below which a few moments can miss the time between two keys. An exposure takes at most a frame.
 pub(crate) const QUICK: f64 = 0.125;
 
 /// The distance by which computed values may lie outside of the values at the ends of an interval without
@@ -213,7 +213,7 @@ impl Curve {
         (low - slack, high + slack)
     }
 
-    /// Returns whether two neighbouring keys are closer than [`QUICK`].
+    /// Returns whether two neighbouring keys are so close that the time between them can be [`QUICK`].
     pub(crate) fn is_quick(&self) -> bool {
         self.keys.windows(2).any(|pair| pair[1].frame - pair[0].frame < QUICK)
     }

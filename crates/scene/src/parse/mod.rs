@@ -206,12 +206,7 @@ impl<'a> Parser<'a> {
         self.settle_all();
         self.doubt_curves();
         visibility::check(&self.moving, &self.exposures, &mut self.report);
-        let script = if self.report.has_errors() {
-            None
-        } else {
-            self.recorder.quick_curves = visibility::quick_curves(&self.moving);
-            self.recorder.finish()
-        };
+        let script = if self.report.has_errors() { None } else { self.recorder.finish() };
         // Of a file in another language, the first errors say all.
         if self.unknown > self.read {
             self.report.describe_at_most(foreign::DESCRIBED);

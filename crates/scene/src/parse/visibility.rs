@@ -10,7 +10,6 @@ use std::ops::Range;
 
 use super::wording;
 use crate::command::Command;
-use crate::curve::Curve;
 use crate::form::{Form, Numbers};
 use crate::model::{Clause, Clauses, Coefficients, Faults, FrameNumbers, Material, Tone};
 use crate::report::{Line, Report};
@@ -137,16 +136,6 @@ pub(super) fn check(moving: &[Animated<'_>], exposures: &[Exposure], report: &mu
             line.check_together(&exposures[visible_span.traces.clone()], &mut work, report);
         }
     }
-}
-
-/// Returns the curves of visible lines that have neighbouring keys close to each other.
-pub(super) fn quick_curves(moving: &[Animated<'_>]) -> Vec<Curve> {
-    let visible = moving.iter().filter(|line| line.visible_span.is_some());
-    let curves = visible.flat_map(|line| line.row.numbers()).filter_map(|number| match number {
-        Number::Animated(curve) if curve.is_quick() => Some(Curve::clone(curve)),
-        _ => None,
-    });
-    curves.collect()
 }
 
 impl Animated<'_> {

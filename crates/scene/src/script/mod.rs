@@ -19,7 +19,7 @@ mod write;
 use std::ops::Range;
 
 use crate::command::Command;
-use crate::curve::Curve;
+use crate::curve::{Curve, QUICK};
 use crate::model::{
     Background, Camera, Clause, Depth, Fog, FrameNumbers, Image, Indirect, InvalidValue, Lens, Light,
     Material, Mesh, Object, PictureFile, Samples, Scene, Screen, Shutter, SkyColors, SkyTurn, Tone,
@@ -50,8 +50,8 @@ pub struct Script {
     lights: Sequence<Light, Template>,
     views: Vec<View>,
     shots: Vec<Shot>,
-    /// The curves with neighbouring keys close to each other.
-    quick_curves: Vec<Curve>,
+    /// Whether a curve can have neighbouring keys close to each other.
+    is_quick: bool,
 }
 
 /// A summary of one `Trace`, or of several consecutive ones that see the same, without their scenes.
@@ -204,10 +204,7 @@ impl Script {
     pub fn frame(&self, k: usize) -> Option<Scene> {
         let (shot, number) = self.shot_of(k)?;
         let mut scene = self.scene(shot, number).ok()?;
-        let half = 0.5 * scene.shutter.open();
-        let steps = self.quick_curves.iter();
-        scene.shortest_step =
-            steps.filter_map(|curve| curve.shortest_step(number - half, number + half)).reduce(f64::min);
+        scene.shortest_step = self.shortest_step(k, number, scene.shutter.open());
         Some(scene)
     }
 
@@ -296,17 +293,44 @@ impl Script {
             before: 0,
             drawn: shot.drawn,
         };
-        let mut script = Self {
+        let script = Self {
             materials: self.materials.clone(),
             groups: self.groups.clone(),
             objects,
             lights,
             views: vec![self.views[self.shot_of(k)?.0.view].clone()],
             shots: vec![shot],
-            quick_curves: self.quick_curves.clone(),
+            is_quick: self.is_quick,
         };
-        script.forget_unused();
-        Some(script)
+        Some(script.settled())
+    }
+
+    /// Returns the script without what it does not use.
+    fn settled(mut self) -> Self {
+        self.forget_unused();
+        let is_quick = self.is_quick && self.rows().flat_map(Row::curves).any(Curve::is_quick);
+        Self { is_quick, ..self }
+    }
+
+    /// Returns [`Scene::shortest_step`] of frame `k`, which depends on no line that the frame does not use.
+    fn shortest_step(&self, k: usize, number: f64, open: f64) -> Option<f64> {
+        if !self.is_quick {
+            return None;
+        }
+        let only = self.only(k)?;
+        let (from, to) = (number - 0.5 * open, number + 0.5 * open);
+        let steps = only.rows().flat_map(Row::curves).filter_map(|curve| curve.shortest_step(from, to));
+        steps.filter(|step| *step < QUICK * open).reduce(f64::min)
+    }
+
+    /// Returns the numbers of all lines that can have curves.
+    fn rows(&self) -> impl Iterator<Item = &Row> {
+        let objects = self.groups.iter().map(|group| &group.objects).chain([&self.objects]);
+        let views = self.views.iter().flat_map(View::rows);
+        let lights = self.lights.others.iter().map(|(_, template)| &template.row);
+        let drawn = objects.flat_map(|objects| &objects.list.others).map(|(_, drawn)| drawn.row());
+        let clauses = self.materials.iter().flat_map(|material| &material.clauses).map(|line| &line.row);
+        views.chain(lights).chain(drawn).chain(clauses)
     }
 
     /// Returns whether an object is rough, also one that is hidden.
@@ -369,6 +393,35 @@ impl Script {
                     Drawn::Use { group, .. } => new(group, &groups),
                 }
             }
+        }
+    }
+}
+
+impl View {
+    fn rows(&self) -> impl Iterator<Item = &Row> {
+        let sky = self.sky.as_ref().and_then(|sky| match sky {
+            SkyLine::Colors(colors) => colors.row(),
+            SkyLine::Picture(_, turn) => turn.row(),
+        });
+        [self.camera.row(), self.background.row(), self.lens.row(), self.fog.row(), sky].into_iter().flatten()
+    }
+}
+
+impl<T> Value<T> {
+    /// Returns the numbers, if they have curves.
+    fn row(&self) -> Option<&Row> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Animated(template) => Some(&template.row),
+        }
+    }
+}
+
+impl Drawn {
+    fn row(&self) -> &Row {
+        match self {
+            Self::Object { template, .. } => &template.row,
+            Self::Use { row, .. } | Self::Mesh { row, .. } => row,
         }
     }
 }

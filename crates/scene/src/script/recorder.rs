@@ -4,7 +4,6 @@ use super::{
     Drawn, Extent, Group, NamedMaterial, Objects, Script, Sequence, Shot, SkyLine, SourceLines, Template,
     Value, View,
 };
-use crate::curve::Curve;
 use crate::model::{
     Background, Camera, Depth, Fog, FrameNumbers, Indirect, Lens, Light, Object, Samples, Screen, Shutter,
     Tone,
@@ -36,8 +35,6 @@ pub(crate) struct Recorder {
     pub(crate) numbers: FrameNumbers,
     views: Vec<View>,
     shots: Vec<Shot>,
-    /// The curves with neighbouring keys close to each other.
-    pub(crate) quick_curves: Vec<Curve>,
 }
 
 /// The objects of a group that is being defined.
@@ -227,12 +224,10 @@ impl Recorder {
     /// Returns the script, or `None` if there are no frames.
     pub(crate) fn finish(mut self) -> Option<Script> {
         self.clear();
-        let Self { materials, groups, objects, surfaces, lines, lights, views, shots, quick_curves, .. } =
-            self;
+        let Self { materials, groups, objects, surfaces, lines, lights, views, shots, .. } = self;
         let objects = Objects { list: objects.finish(), surfaces: surfaces.0, lines };
-        let mut script =
-            Script { materials, groups, objects, lights: lights.finish(), views, shots, quick_curves };
-        script.forget_unused();
+        let lights = lights.finish();
+        let script = Script { materials, groups, objects, lights, views, shots, is_quick: true }.settled();
         (!script.shots.is_empty()).then_some(script)
     }
 }

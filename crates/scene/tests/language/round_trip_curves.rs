@@ -305,3 +305,23 @@ proptest! {
         prop_assert!(first.frames().count() == first.frame_count());
     }
 }
+
+#[test]
+fn a_frame_knows_the_shortest_step_of_what_it_uses_alone() {
+    let text = "Screen 4 3\nShutter .8\nMaterial lit diffuse (step 2:0 2.05:1 2.15:0) 0 0\n\
+                Group g\nSphere 1 0 0 0 lit\nEnd\nSphere (1:1 1.5:2) 0 0 -5 1 0 0 0 0 0\nFrames 3\nTrace\n\
+                Clear\nUse g 0 0 -5\nTrace\nClear\nShutter .1\nUse g 0 0 -5\nTrace";
+    let script = read(text).unwrap();
+    let steps: Vec<_> = script.frames().map(|scene| scene.shortest_step).collect();
+    // The lines of the material are used by the frames from the fourth on; the last ones have short exposures, in which a
+    // step of half of it is not short.
+    let close = |step: Option<f64>, to: f64| step.is_some_and(|step| (step - to).abs() < 1e-12);
+    assert!(close(steps[4], 0.05), "{steps:?}");
+    assert!(steps.iter().enumerate().all(|(k, step)| k == 4 || step.is_none()), "{steps:?}");
+    for (k, step) in steps.into_iter().enumerate() {
+        let only = script.only(k).unwrap();
+        assert_eq!(only.frame(0).unwrap().shortest_step, step);
+        let again = read(&only.to_string()).unwrap();
+        assert_eq!(again.frame(0).unwrap().shortest_step, step, "{only}");
+    }
+}

@@ -22,7 +22,7 @@ use self::scouts::Scouts;
 use self::tile::{Drawn, Pass, SampledTile, Workspace};
 use super::shapes::Shape;
 use crate::cover::{self, Lit};
-use crate::exposure::{MOST_MOMENTS, fewest_samples};
+use crate::exposure::fewest_samples;
 use crate::fast::arithmetic::dispatch::on;
 use crate::fast::arithmetic::real::Real;
 use crate::fast::build::features::{self, Kernel};
@@ -234,7 +234,7 @@ impl<'a, E: Real> Sampled<'a, E> {
             Film::new(size, self.side, scene.samples, scene.tone, PASS, kinds).ok_or_else(too_large)?;
         let fewest = if self.moments.len() > 1 { fewest_samples(scene) } else { 1 };
         if fewest > 1 && scene.samples.error() > 0.0 {
-            film.raise_all(fewest.min(scene.samples.most()), MOST_MOMENTS).ok_or_else(too_large)?;
+            film.raise_all(fewest.min(scene.samples.most())).ok_or_else(too_large)?;
         }
         Ok(film)
     }

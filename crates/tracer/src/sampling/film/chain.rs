@@ -51,8 +51,8 @@ pub(super) struct SampleSchedule {
     samples: Samples,
     /// No pass adds more samples to a pixel.
     pub(super) step: u32,
-    /// The number of moments of the first samples, a power of two.
-    pub(super) few_moments: u32,
+    /// Whether the first samples are of few moments.
+    pub(super) has_few_moments: bool,
     tone: Tone,
     /// Whether samples are not clamped, as where light goes round.
     is_unclamped: bool,
@@ -105,7 +105,7 @@ impl SampleSchedule {
         Self {
             samples,
             step,
-            few_moments: FEW_MOMENTS,
+            has_few_moments: samples.error() > 0.0,
             tone,
             is_unclamped,
             limits,
@@ -164,8 +164,8 @@ impl SampleSchedule {
     /// How many of so many moments a sample is one of.
     #[inline(always)]
     pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
-        if self.has_error() {
-            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(self.few_moments).min(all)
+        if self.has_few_moments {
+            sample.saturating_add(1).checked_next_power_of_two().unwrap_or(all).max(FEW_MOMENTS).min(all)
         } else {
             all
         }

@@ -116,10 +116,10 @@ impl Film {
         self.plan.floors.add_all(floors);
     }
 
-    /// Gives all pixels some number of samples in any case, of so many moments, a power of two; `None` where there is no memory
-    /// for it.
-    pub(crate) fn raise_all(&mut self, count: u32, moments: u32) -> Option<()> {
-        self.plan.raise_moments(moments);
+    /// Gives all pixels some number of samples in any case, of all moments from the first on; `None` where there is no memory for
+    /// it.
+    pub(crate) fn raise_all(&mut self, count: u32) -> Option<()> {
+        self.plan.take_all_moments();
         self.plan.raise(count)
     }
 

@@ -182,9 +182,9 @@ impl Plan {
         Some(())
     }
 
-    /// Takes the first samples at so many moments, a power of two, or at more.
-    pub(super) fn raise_moments(&mut self, count: u32) {
-        self.chain.few_moments = self.chain.few_moments.max(count);
+    /// Takes also the first samples at all moments.
+    pub(super) fn take_all_moments(&mut self) {
+        self.chain.has_few_moments = false;
     }
 
     /// Whether means are raised before they are shown.
