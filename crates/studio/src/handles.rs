@@ -3,8 +3,8 @@
 //!
 //! Knows commands only by the kinds of their parameters. A position is a handle. A length is a handle at that
 //! distance from the first position. A direction is the tip of an arrow. Angles and a scale have handles of
-//! their own (`rotate_handles`), and so has the size of an object without a scale (`scale_handles`). Invariant: a drag is computed from the state at its start, so returning to
-//! the start changes nothing.
+//! their own (`rotate_handles`), and so has the size of an object without a scale (`scale_handles`). Invariant: a drag is
+//! computed from the state at its start, so returning to the start changes nothing.
 
 use std::cell::Cell;
 
