@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn of_two_equal_rings_the_first_is_seen() {
-        let head = "Screen 201 151\nLook 2.1 2.7 3.3 0 .4 0 35\nTorus .8 .25 0 .4 0 0 1 0 1 0 0 0 0 0\n";
+        let head = "Screen 81 61\nLook 2.1 2.7 3.3 0 .4 0 35\nTorus .8 .25 0 .4 0 0 1 0 1 0 0 0 0 0\n";
         let second = "Torus .8 .25 0 .4 0 0 1 0 0 1 0 0 0 0\n";
         shows(&format!("{head}{second}Trace\n"), &format!("{head}Trace\n"));
     }

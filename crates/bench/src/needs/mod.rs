@@ -33,28 +33,21 @@ pub struct Args {
     /// Use only builds without a part whose name contains this, and write nothing
     #[arg(long, default_value = "")]
     only: String,
-    /// Use the build without all parts of version 2, and every tenth of those without some of them; write nothing
+    /// Use one build without parts, drawn at random; write nothing
     #[arg(long)]
     slice: bool,
-    /// Begin with this of those; without it, with one of the first ten
+    /// Use this one of them, counted from 0
     #[arg(long, requires = "slice")]
     first: Option<usize>,
 }
 
 impl Args {
     fn builds(&self) -> Vec<Build> {
-        let (of_version_2, mut builds): (Vec<_>, Vec<_>) =
-            builds().into_iter().partition(|build| build.is_of_version_2);
+        let mut builds = builds();
         if self.slice {
-            // The last one is without all of version 2.
-            builds = builds.pop().into_iter().collect();
-        }
-        if self.slice {
-            let first = self.first.unwrap_or_else(|| fastrand::usize(..SLICES));
+            let first = self.first.unwrap_or_else(|| fastrand::usize(..builds.len()));
             eprintln!("a slice: --first {first} repeats it");
-            builds.extend(of_version_2.into_iter().skip(first).step_by(SLICES));
-        } else {
-            builds.extend(of_version_2);
+            builds = builds.into_iter().nth(first).into_iter().collect();
         }
         builds.retain(|build| build.name.contains(&self.only));
         builds
@@ -66,9 +59,6 @@ const MOST: f64 = 0.5;
 
 /// The driver's exit code for a scene that needs a part that its build lacks.
 const LEFT_OUT: i32 = 3;
-
-/// The number of slices that have all builds.
-const SLICES: usize = 10;
 
 /// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;

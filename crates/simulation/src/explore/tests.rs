@@ -3,10 +3,10 @@
 use super::*;
 
 /// States of a world up to which every `cargo test` searches it.
-const SMALL: u64 = 15_000;
+const SMALL: u64 = 8_000;
 
 /// Worlds of no more states than that.
-const SMALL_WORLDS: usize = 33;
+const SMALL_WORLDS: usize = 26;
 
 fn world(name: &str) -> World {
     worlds().into_iter().find(|world| world.name == name).expect(name)

@@ -359,34 +359,32 @@ test("a script whose folder is missing is refused at once", async () => {
 
 test("at four sizes and in both themes nothing is clipped, bars have one row, and the picture has its room", async (t) => {
   const text = `${HEAD}${FLOOR}${ball(1, "(1:-2 40:2)", 1, 0, "ball")}Frames 40\nTrace\n`;
-  for (const [width, height] of [[1440, 900], [1024, 768], [768, 1024], [390, 844]]) {
-    for (const scheme of ["light", "dark"]) {
-      await t.test(`${width} x ${height}, ${scheme}`, async (t) => {
-        const studio = await open(t, { text, size: [width, height], scheme });
-        const { page } = studio;
-        await clickRow(page, ".item", { hasText: "ball" });
-        await studio.settled();
-        await shot(page, `look-${width}-${scheme}`);
-        const box = await page.locator(".viewport").boundingBox();
-        if (width === 1440) assert.ok(box.width * box.height >= 0.5 * width * height, `${box.width} x ${box.height}`);
-        if (width === 1024) assert.ok(box.width > 500, `${box.width}`);
-        const overflow = await page.evaluate(() =>
-          [...document.querySelectorAll("header *, main *")]
-            .filter((element) => element.checkVisibility() && !element.closest("svg, .list, .menu"))
-            .filter((element) => element.getBoundingClientRect().right > innerWidth + 1)
-            .map((element) => element.outerHTML.slice(0, 80)),
-        );
-        assert.deepEqual(overflow, []);
-        const rows = (selector) => page.locator(selector).evaluateAll((all) => new Set(all.filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect()).map(({ top, height }) => Math.round((top + height / 2) / 8))).size);
-        assert.equal(await rows(".transport button, .transport input, .transport output"), 1, "rows of the transport");
-        if (width > 480) assert.equal(await rows(".bar button"), 1, "rows of the bar");
-        const cut = await page.locator(".tile span, .sphere span, .tools button, .fold").evaluateAll((all) => all.filter((one) => one.scrollWidth > one.clientWidth + 1 && one.clientWidth > 0).map((one) => one.textContent));
-        assert.deepEqual(cut, [], "labels that are cut off");
-        assert.ok(await page.locator(".transport").evaluate((of) => of.scrollWidth <= of.clientWidth), "the transport fits");
-        assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
-        assert.deepEqual(await audit(page), []);
-        studio.check();
-      });
-    }
+  for (const [width, height, scheme] of [[1440, 900, "light"], [1024, 768, "dark"], [768, 1024, "light"], [390, 844, "dark"]]) {
+    await t.test(`${width} x ${height}, ${scheme}`, async (t) => {
+      const studio = await open(t, { text, size: [width, height], scheme });
+      const { page } = studio;
+      await clickRow(page, ".item", { hasText: "ball" });
+      await studio.settled();
+      await shot(page, `look-${width}-${scheme}`);
+      const box = await page.locator(".viewport").boundingBox();
+      if (width === 1440) assert.ok(box.width * box.height >= 0.5 * width * height, `${box.width} x ${box.height}`);
+      if (width === 1024) assert.ok(box.width > 500, `${box.width}`);
+      const overflow = await page.evaluate(() =>
+        [...document.querySelectorAll("header *, main *")]
+          .filter((element) => element.checkVisibility() && !element.closest("svg, .list, .menu"))
+          .filter((element) => element.getBoundingClientRect().right > innerWidth + 1)
+          .map((element) => element.outerHTML.slice(0, 80)),
+      );
+      assert.deepEqual(overflow, []);
+      const rows = (selector) => page.locator(selector).evaluateAll((all) => new Set(all.filter((one) => one.checkVisibility()).map((one) => one.getBoundingClientRect()).map(({ top, height }) => Math.round((top + height / 2) / 8))).size);
+      assert.equal(await rows(".transport button, .transport input, .transport output"), 1, "rows of the transport");
+      if (width > 480) assert.equal(await rows(".bar button"), 1, "rows of the bar");
+      const cut = await page.locator(".tile span, .sphere span, .tools button, .fold").evaluateAll((all) => all.filter((one) => one.scrollWidth > one.clientWidth + 1 && one.clientWidth > 0).map((one) => one.textContent));
+      assert.deepEqual(cut, [], "labels that are cut off");
+      assert.ok(await page.locator(".transport").evaluate((of) => of.scrollWidth <= of.clientWidth), "the transport fits");
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
+      assert.deepEqual(await audit(page), []);
+      studio.check();
+    });
   }
 });

@@ -9,7 +9,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, caret, drag, goLine, isDrawn, open, over, program, clickRow, scenes, seenLines, selectLine, setLine, shot, until } from "./stage.mjs";
+import { audit, caret, drag, goLine, half, isDrawn, open, over, program, clickRow, scenes, seenLines, selectLine, setLine, shot, until } from "./stage.mjs";
 
 test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   const studio = await open(t, { from: join(scenes, "hello/frame01.txt") });
@@ -25,8 +25,8 @@ test("the viewport's pixels are the tracer's, also after a drag", async (t) => {
   studio.check();
 });
 
-test("an arrow key changes one line of one file of each example, and the viewport shows it as the tracer draws it", async (t) => {
-  for (const name of readdirSync(scenes).filter((name) => !name.includes("."))) {
+test("an arrow key changes one line of one file of an example, and the viewport shows it as the tracer draws it", async (t) => {
+  for (const name of half(t, readdirSync(scenes).filter((name) => !name.includes(".")))) {
     await t.test(name, async (t) => {
       const from = join(scenes, name);
       // A small window, as some of them take many rays a pixel.

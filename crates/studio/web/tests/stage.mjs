@@ -197,6 +197,13 @@ export function random(t, own) {
   };
 }
 
+/** About half of the cases, drawn anew by each run, for a test that takes long; `RAYFOLD_TESTS=all` takes all. */
+export function half(t, cases) {
+  if (process.env.RAYFOLD_TESTS === "all") return cases;
+  const below = random(t, Date.now());
+  return cases.filter(() => below(2) === 0);
+}
+
 export async function drag(page, from, to, steps = 8) {
   await page.mouse.move(...from);
   await page.mouse.down();

@@ -182,14 +182,13 @@ f 3//3 1//1 6//6\nf 2//2 3//3 6//6\nf 4//4 2//2 6//6\nf 1//1 4//4 6//6
                      30\nMaterial chrome mirror .8 .8 .8\nMaterial glassy glass .95 .97 1 1.5 shine .5 .5 .5 60\nMaterial own \
                      diffuse 1 1 1 own\nDepth 4\nPlane 0 -1.05 0 0.02 1 .01 floor\n";
         let library = Library::new(MemoryFiles::from([("m.obj", MODEL.to_vec())]));
-        for (mesh, tone) in
+        for mesh in
             ["", " red", " chrome", " glassy", " own", " glassy flat", " red smooth 180", " red smooth 60"]
                 .map(|mesh| format!("Mesh \"m.obj\"{mesh}"))
                 .into_iter()
                 .chain(["", " red", " glassy"].map(|surface| format!("Text \"D\" 1.6 .4{surface} centre")))
-                .flat_map(|mesh| ["", "Tone srgb\n"].map(|tone| (mesh.clone(), tone)))
         {
-            for used in [false, true] {
+            for (used, tone) in [(false, ""), (true, "Tone srgb\n")] {
                 let line = format!("{mesh}\n");
                 let line = match used {
                     true => format!("Group g\n{line}End\nUse g .1 .2 -.3 10 20 30 .8\n"),
