@@ -171,7 +171,7 @@ pub(crate) enum TimelineEdit {
     Copy { keys: Vec<KeyPlace> },
     /// Paste the copied keys, the first at the shown frame.
     Paste,
-    /// Set the interpolation of the tracks of these keys.
+    /// Set the interpolation of the tracks of these keys, given as in a script.
     Ease { keys: Vec<KeyPlace>, mode: String, cycle: bool },
     /// Set the number of frames per second.
     Pace { fps: f64 },

@@ -20,6 +20,12 @@ const TRACKS: usize = 300;
 /// The largest number of keys of all these tracks.
 const KEYS: usize = 20_000;
 
+/// The keys up to which all curves are drawn with [`LINES`].
+const FINE_KEYS: usize = 1000;
+
+/// The lines between two keys of a curve that no cubic draws.
+const LINES: u32 = 32;
+
 /// A number that changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
@@ -30,14 +36,14 @@ pub(crate) struct Track {
     pub(crate) number: usize,
     /// The name of the parameter, such as `centre: cx`.
     pub(crate) label: String,
-    /// The interpolation: linear, smooth or step.
-    pub(crate) mode: &'static str,
+    /// The interpolation as in a script: a word, and after `bezier` its four numbers.
+    pub(crate) mode: String,
     /// Whether the curve restarts at its last key.
     pub(crate) cycle: bool,
     /// Frames and values of the keys.
     pub(crate) keys: Vec<(f64, f64)>,
-    /// The slopes of a smooth curve at its keys.
-    pub(crate) slopes: Vec<f64>,
+    /// The curve as a path of SVG, in frames and values.
+    pub(crate) path: String,
 }
 
 /// All tracks of a script, up to the limit of the page.
@@ -122,28 +128,67 @@ pub(crate) fn tracks(lines: &[Line]) -> Tracks {
                 line: at,
                 number: slot.number,
                 label: label(&slot),
-                mode: curve.mode().name(),
+                mode: words_of(curve.mode()),
                 cycle: curve.is_cycle(),
                 keys: curve.keys().iter().map(|key| (key.frame, key.value)).collect(),
-                slopes: slopes(&curve),
+                path: path(&curve, keys <= FINE_KEYS),
             });
         }
     }
     found
 }
 
-/// Returns the slopes of a smooth curve at its keys; nothing for others.
-fn slopes(curve: &Curve) -> Vec<f64> {
-    let keys = curve.keys();
-    if curve.mode() != Mode::Smooth || keys.len() < 2 {
-        return Vec::new();
+/// Returns a mode as it stands in a script.
+fn words_of(mode: Mode) -> String {
+    match mode {
+        Mode::Bezier([a, b, c, d]) => format!("{} {a} {b} {c} {d}", mode.name()),
+        _ => mode.name().to_owned(),
     }
-    let slope = |at: usize| {
-        let beside = if at + 1 < keys.len() { keys[at + 1] } else { keys[at - 1] };
-        let step = 1e-4 * (beside.frame - keys[at].frame);
-        (curve.at(keys[at].frame + step) - keys[at].value) / step
-    };
-    (0..keys.len()).map(slope).collect()
+}
+
+/// Returns the mode with this name, or with these words of a script.
+fn mode_of(words: &str) -> Option<Mode> {
+    let by_name = Mode::ALL.iter().copied().find(|mode| mode.name() == words);
+    by_name.or_else(|| parse_curve(&format!("({words} 1:0 2:1)")).map(|curve| curve.mode()))
+}
+
+/// Returns a curve as a path of SVG, in frames and values. Its pieces are lines and cubics, which are exact, but for modes
+/// with other functions: those have [`LINES`] lines, or a single one if they are not to be fine.
+fn path(curve: &Curve, fine: bool) -> String {
+    let keys = curve.keys();
+    let mut path = format!("M{:e} {:e}", keys[0].frame, keys[0].value);
+    for (from, to) in keys.iter().zip(&keys[1..]) {
+        let (long, high) = (to.frame - from.frame, to.value - from.value);
+        let slope = |key: &Key, step: f64| (curve.at(key.frame + step) - key.value) / step;
+        let step = 1e-4 * long;
+        let cubic = match curve.mode() {
+            // The control points lie at thirds.
+            Mode::Smooth => {
+                let third = long / 3.0;
+                let (begin, end) = (slope(from, step), slope(to, -step));
+                Some([1.0 / 3.0, from.value + third * begin, 2.0 / 3.0, to.value - third * end])
+            }
+            Mode::Bezier([a, b, c, d]) => Some([a, from.value + b * high, c, from.value + d * high]),
+            _ => None,
+        };
+        let (x, y) = (to.frame, to.value);
+        match (cubic, curve.mode()) {
+            (Some([a, b, c, d]), _) => {
+                let at = |share: f64| tidy(from.frame + share * long);
+                path += &format!("C{:e} {:e} {:e} {:e} {x:e} {y:e}", at(a), tidy(b), at(c), tidy(d));
+            }
+            (None, Mode::Step) => path += &format!("H{x:e}V{y:e}"),
+            (None, mode) => {
+                let lines = if fine && mode != Mode::Linear { LINES } else { 1 };
+                for k in 1..lines {
+                    let frame = from.frame + long * f64::from(k) / f64::from(lines);
+                    path += &format!("L{:e} {:e}", tidy(frame), tidy(curve.at(frame)));
+                }
+                path += &format!("L{x:e} {y:e}");
+            }
+        }
+    }
+    path
 }
 
 fn label(slot: &Slot) -> String {
@@ -246,7 +291,8 @@ pub(crate) fn removed(lines: &[Line], keys: &[KeyPlace]) -> Vec<(usize, Line)> {
 }
 
 /// Returns the lines that change if the tracks of some keys get another interpolation.
-pub(crate) fn eased(lines: &[Line], keys: &[KeyPlace], mode: Mode, cycle: bool) -> Vec<(usize, Line)> {
+pub(crate) fn eased(lines: &[Line], keys: &[KeyPlace], mode: &str, cycle: bool) -> Vec<(usize, Line)> {
+    let Some(mode) = mode_of(mode) else { return Vec::new() };
     each(lines, keys, |curve, _| {
         // A cycle needs two keys.
         let cycle = cycle && curve.keys().len() > 1;
@@ -419,7 +465,7 @@ mod tests {
     fn tracks_are_told_by_what_they_are() {
         let found = tracks(&lines(TEXT));
         let labels: Vec<_> =
-            found.tracks.iter().map(|t| (t.line, t.number, t.label.as_str(), t.mode, t.cycle)).collect();
+            found.tracks.iter().map(|t| (t.line, t.number, t.label.as_str(), t.mode.as_str(), t.cycle)).collect();
         assert_eq!(
             labels,
             [
@@ -457,8 +503,39 @@ mod tests {
     #[test]
     fn easing_is_that_of_the_track() {
         let lines = lines(TEXT);
-        let eased = one(eased(&lines, &[key(0, 1, 1.0), key(0, 1, 9.0)], Mode::Step, true));
-        assert_eq!(eased, "Sphere 1  (step cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+        let keys = [key(0, 1, 1.0), key(0, 1, 9.0)];
+        let with = |mode| one(eased(&lines, &keys, mode, true));
+        assert_eq!(with("step"), "Sphere 1  (step cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
+        assert_eq!(
+            with("bezier .5 -1 1 2"),
+            "Sphere 1  (bezier .5 -1 1 2 cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball"
+        );
+        for wrong in ["no", "bezier 1", "bezier 2 0 0 0", "bezier 0 0 0 x", "smooth) (step", "cycle 1:0"] {
+            assert_eq!(eased(&lines, &keys, wrong, false), [], "{wrong}");
+        }
+    }
+
+    #[test]
+    fn paths_go_through_their_keys_as_the_curve_does() {
+        let of = |curve: &str| path(&parse_curve(curve).unwrap(), true);
+        assert_eq!(of("(1:0 4:3 7:3)"), "M1e0 0e0L4e0 3e0L7e0 3e0");
+        assert_eq!(of("(step 1:0 4:3)"), "M1e0 0e0H4e0V3e0");
+        assert_eq!(of("(bezier .25 .1 .5 2 1:0 5:10)"), "M1e0 0e0C2e0 1e0 3e0 2e1 5e0 1e1");
+        // The slope at the middle key is the harmonic mean of 2 and 1, weighted alike: 4/3.
+        assert!(of("(smooth 1:0 4:6 7:9)").contains("C2e0 0e0 3e0 4.667"), "{}", of("(smooth 1:0 4:6 7:9)"));
+        for mode in ["in", "out", "inout", "back", "elastic", "bounce cycle"] {
+            let curve = parse_curve(&format!("({mode} 3:-1 11:4)")).unwrap();
+            let path = of(&curve.to_string());
+            let points: Vec<(f64, f64)> = path[1..]
+                .split('L')
+                .map(|point| point.split_once(' ').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap())).unwrap())
+                .collect();
+            assert_eq!((points.len(), points[0], points[32]), (33, (3.0, -1.0), (11.0, 4.0)), "{mode}");
+            for &(frame, value) in &points[..32] {
+                assert!((curve.at(frame) - value).abs() < 1e-6, "{mode} at {frame}: {value}");
+            }
+        }
+        assert_eq!(path(&parse_curve("(bounce 1:0 4:3)").unwrap(), false), "M1e0 0e0L4e0 3e0");
     }
 
     #[test]

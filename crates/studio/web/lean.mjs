@@ -8,6 +8,9 @@ const own = (name) => join(import.meta.dirname, "src/script", name);
 /** The sources that replace whole packages. */
 export const REPLACED = { "@marijn/find-cluster-break": own("clusters.ts"), "w3c-keyname": own("keynames.ts") };
 
+/** Rules of a theme for light or dark editors, with those inside of them. */
+const COLOURS = /^ {4}"&(light|dark)[^"]*": (\{[^{}\n]*\}|\{\n[^]*?\n {4}\}),?$/gm;
+
 /** Replacements in a package's text. Each must be found: a new version of the package may have moved its code. */
 const CUTS = {
   "@codemirror/view": [
@@ -21,12 +24,12 @@ const CUTS = {
     [/\b(BadMouseDetail|brokenClipboardAPI|useCharData)\b/g, "false"],
     [/typeof (ResizeObserver|IntersectionObserver) == "function"/g, "true"],
     [/^ {4}tabSize: .*$/gm, '    tabSize: "tab-size"'],
+    [COLOURS, ""],
   ],
-  "@codemirror/search": [],
+  "@codemirror/search": [[COLOURS, ""]],
+  // What it says of wrong calls is for those who write an editor; the place of the error says it, too.
+  "@codemirror/state": [[/new RangeError\((?:"[^"]*"|`[^`]*`)\)/g, "new RangeError()"]],
 };
-
-/** Rules of a theme for light or dark editors, with those inside of them. */
-const COLOURS = /^ {4}"&(light|dark)[^"]*": (\{[^{}\n]*\}|\{\n[^]*?\n {4}\}),?$/gm;
 
 /** Cuts the packages while they are bundled. */
 export function lean() {
@@ -36,7 +39,7 @@ export function lean() {
       const name = Object.keys(CUTS).find((name) => id.includes(`/${name}/dist/`));
       if (!name) return null;
       let text = code;
-      for (const [pattern, by] of [...CUTS[name], [COLOURS, ""]]) {
+      for (const [pattern, by] of CUTS[name]) {
         const cut = text.replace(pattern, by);
         if (cut === text) throw new Error(`${name} has no ${pattern} any more`);
         text = cut;

@@ -114,8 +114,15 @@ impl Session {
                 return self.paste_keys(project, &keys, tell);
             }
             TimelineEdit::Ease { keys, mode, cycle } => {
-                let mode = Mode::ALL.iter().copied().find(|known| known.name() == mode);
-                set(mode.map(|mode| tracks::eased(lines, &keys, mode, cycle)).unwrap_or_default())
+                let splices = set(tracks::eased(lines, &keys, &mode, cycle));
+                // While a tangent is dragged, all is one step.
+                let gesture = match &self.held {
+                    Some(Held::Keys(held)) => held.gesture,
+                    _ => self.next_gesture(),
+                };
+                self.edit(project, splices, Some(gesture), tell);
+                self.outline(project, tell);
+                return Change::Still;
             }
             TimelineEdit::Pace { fps } => {
                 let file = self.place(project).file;

@@ -359,14 +359,14 @@ line: number,
 number: number, 
 /** The name of the parameter, such as `centre: cx`. */
 label: string, 
-/** The interpolation: linear, smooth or step. */
+/** The interpolation as in a script: a word, and after `bezier` its four numbers. */
 mode: string, 
 /** Whether the curve restarts at its last key. */
 cycle: boolean, 
 /** Frames and values of the keys. */
 keys: ReadonlyArray<[number, number]>, 
-/** The slopes of a smooth curve at its keys. */
-slopes: ReadonlyArray<number>, };
+/** The curve as a path of SVG, in frames and values. */
+path: string, };
 
 /** All tracks of a script, up to the limit of the page. */
 export type Tracks = { 

@@ -144,6 +144,44 @@ test("a key is dragged as a point of a curve, and as a point of the motion path"
   studio.check();
 });
 
+test("every easing of the language is chosen, and the tangents of a bezier are dragged in one step each", async (t) => {
+  const studio = await open(t, { text: ANIMATED });
+  const { page } = studio;
+  await clickRow(page, ".item", { hasText: "runner" });
+  await page.getByRole("button", { name: "Curves" }).click();
+  await page.locator(".curves .key").first().click();
+  const easing = page.getByLabel("Easing");
+  const curve = async () => /\((.*?) 1:-1 10:/.exec(await studio.saved())?.[1];
+  const names = await easing.locator("option").allTextContents();
+  assert.deepEqual(names, ["linear", "smooth", "step", "in", "out", "inout", "back", "elastic", "bounce", "bezier"]);
+  for (const name of names.slice(1)) {
+    await easing.selectOption({ label: name });
+    await until(async () => (await curve())?.split(" ")[0] === name);
+    await until(async () => (await page.locator(".tangent").count()) === (name === "bezier" ? 2 : 0));
+    await shot(page, `curves-${name}`);
+  }
+  assert.equal(await curve(), "bezier .25 .1 .25 1");
+  const [from, to] = await page.locator(".curves .key:not(.tangent)").evaluateAll((all) => all.map((one) => one.getBoundingClientRect()).map(({ x, y }) => [x + 12, y + 12]));
+  // To the middle in time, and three quarters of the way.
+  const at = ([x, y]) => [from[0] + x * (to[0] - from[0]), from[1] + y * (to[1] - from[1])];
+  await drag(page, at([0.25, 0.1]), at([0.5, 0.75]));
+  const numbers = async () => (await curve())?.split(" ").slice(1).map(Number);
+  const near = (found, expected) => found?.length === 4 && found.every((number, at) => Math.abs(number - expected[at]) < 0.03);
+  await until(async () => near(await numbers(), [0.5, 0.75, 0.25, 1]));
+  await drag(page, at([0.25, 1]), at([-0.4, 1]));
+  await until(async () => near(await numbers(), [0.5, 0.75, 0, 1]));
+  await page.keyboard.press("Control+z");
+  await until(async () => near(await numbers(), [0.5, 0.75, 0.25, 1]));
+  await page.locator(".tangent").nth(1).focus();
+  await page.keyboard.press("Alt+ArrowDown");
+  await until(async () => near(await numbers(), [0.5, 0.75, 0.25, 0.97]));
+  await page.getByRole("button", { name: "Repeat", exact: true }).click();
+  await until(async () => /bezier .* cycle 1:-1/.test(await studio.saved()));
+  assert.ok(near((await numbers()).slice(0, 4), [0.5, 0.75, 0.25, 0.97]), "a cycle keeps its tangents");
+  assert.deepEqual(await audit(page), []);
+  studio.check();
+});
+
 test("keys of the curves are at the frames of their tracks, stay held outside of the lane, and a zoom is for its tracks", async (t) => {
   const text = ANIMATED.replace("0.3 1  .1 .1 .1 .2 .4 .9", "(1:2 9:4) 1  .1 .1 .1 .2 .4 .9").replace("(smooth 1:-1", "(smooth -3:5 1:-1");
   const studio = await open(t, { text });

@@ -82,14 +82,20 @@ test("a sun's direction and its angles are the same", async () => {
   }
 });
 
-test("curves go through their keys, with the slopes of smooth ones", async () => {
-  const { pathOf, valuesOf } = await load("timeline/curves.tsx");
-  const track = (mode, slopes = []) => ({ line: 0, number: 1, label: "x", mode, cycle: false, slopes, keys: [[1, 0], [4, 3], [7, 3]] });
-  assert.equal(pathOf(track("linear")), "M1 0L4 3L7 3");
-  assert.equal(pathOf(track("step")), "M1 0H4V3H7V3");
-  assert.equal(pathOf(track("smooth", [2, 1, 0])), "M1 0C2 2 3 2 4 3C5 4 6 3 7 3");
+test("curves have their values with a margin, and the tangents of a bezier curve", async () => {
+  const { tangentsOf, valuesOf } = await load("timeline/curves.tsx");
+  const { chosenKeys } = await load("timeline/keys.ts");
+  const track = (mode) => ({ line: 0, number: 1, label: "x", mode, cycle: false, path: "", keys: [[1, 0], [5, 10], [9, 10], [11, 0]] });
   const [low, high] = valuesOf([track("linear")]);
-  assert.ok(low < 0 && high > 3);
+  assert.ok(low < 0 && high > 10);
+  assert.deepEqual(tangentsOf(track("smooth")), []);
+  const bezier = track("bezier 0.25 0.1 0.5 2");
+  assert.deepEqual(tangentsOf(bezier), [[1, 0], [2, 1], [5, 10], [3, 20]]);
+  chosenKeys.value = [{ line: 0, number: 1, frame: 11 }];
+  assert.deepEqual(tangentsOf(bezier), [[9, 10], [9.5, 9], [11, 0], [10, -10]], "behind the last key there is no other");
+  chosenKeys.value = [{ line: 0, number: 1, frame: 5 }];
+  assert.deepEqual(tangentsOf(bezier), [], "nothing changes there");
+  chosenKeys.value = [];
 });
 
 test("the search finds what has all words, also in another order", async () => {

@@ -13,14 +13,13 @@ import { List } from "../parts/list";
 import { NumberField } from "../parts/number";
 import { visible } from "../parts/visible";
 import type { KeyPlace, LineState, TimeState, Track } from "../protocol";
-import { ask, canCreate, files, lines, playing, select, selected, selection, state, tracks } from "../store";
+import { ask, canCreate, files, language, lines, playing, select, selected, selection, state, tracks } from "../store";
 import { Curves, curving } from "./curves";
 import { chosenKeys, chosenNames, chosenTracks, choose, dragKeys, end, ease, grabKeys, keysOf, looping, nameOf, place, releaseKeys, removeKeys, span, wish } from "./keys";
 
 const ROW = 26;
 /** The number of visible rows. */
 const SEEN = 6;
-const MODES: readonly string[] = ["linear", "smooth", "step"];
 
 export function Timeline(): JSX.Element | null {
   const now = state.value;
@@ -148,8 +147,8 @@ function Chosen({ chosen }: { readonly chosen: readonly Track[] }): JSX.Element 
     <div class="chosen-keys" role="group" aria-label="Selected keys">
         <select aria-label="Easing" title="How the number moves between its keys" value={mode} disabled={none} onChange={(event) => ease(event.currentTarget.value, cycle)}>
           {mode === "" && <option value="">{none ? "easing" : "several"}</option>}
-          {MODES.map((name) => (
-            <option key={name} value={name}>
+          {language.value?.curve_modes.map(({ name, about }) => (
+            <option key={name} value={mode.split(" ")[0] === name ? mode : name} title={about}>
               {name}
             </option>
           ))}
