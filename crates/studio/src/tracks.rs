@@ -159,14 +159,15 @@ fn path(curve: &Curve, fine: bool) -> String {
     let mut path = format!("M{:e} {:e}", keys[0].frame, keys[0].value);
     for (from, to) in keys.iter().zip(&keys[1..]) {
         let (long, high) = (to.frame - from.frame, to.value - from.value);
-        let slope = |key: &Key, step: f64| (curve.at(key.frame + step) - key.value) / step;
-        let step = 1e-4 * long;
         let cubic = match curve.mode() {
-            // The control points lie at thirds.
+            // The cubic through its values at the thirds.
             Mode::Smooth => {
-                let third = long / 3.0;
-                let (begin, end) = (slope(from, step), slope(to, -step));
-                Some([1.0 / 3.0, from.value + third * begin, 2.0 / 3.0, to.value - third * end])
+                let [first, second] = [1.0, 2.0].map(|third| curve.at(from.frame + long * third / 3.0));
+                let control = |near: f64, first: f64, second: f64, far: f64| {
+                    (-5.0 * near + 18.0 * first - 9.0 * second + 2.0 * far) / 6.0
+                };
+                let begin = control(from.value, first, second, to.value);
+                Some([1.0 / 3.0, begin, 2.0 / 3.0, control(to.value, second, first, from.value)])
             }
             Mode::Bezier([a, b, c, d]) => Some([a, from.value + b * high, c, from.value + d * high]),
             _ => None,
@@ -464,8 +465,11 @@ mod tests {
     #[test]
     fn tracks_are_told_by_what_they_are() {
         let found = tracks(&lines(TEXT));
-        let labels: Vec<_> =
-            found.tracks.iter().map(|t| (t.line, t.number, t.label.as_str(), t.mode.as_str(), t.cycle)).collect();
+        let labels: Vec<_> = found
+            .tracks
+            .iter()
+            .map(|t| (t.line, t.number, t.label.as_str(), t.mode.as_str(), t.cycle))
+            .collect();
         assert_eq!(
             labels,
             [
@@ -508,7 +512,7 @@ mod tests {
         assert_eq!(with("step"), "Sphere 1  (step cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball");
         assert_eq!(
             with("bezier .5 -1 1 2"),
-            "Sphere 1  (bezier .5 -1 1 2 cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball"
+            "Sphere 1  (bezier 0.5 -1 1 2 cycle 1:0 9:2) 0 (smooth cycle 1:0 5:1 9:0)  red # ball"
         );
         for wrong in ["no", "bezier 1", "bezier 2 0 0 0", "bezier 0 0 0 x", "smooth) (step", "cycle 1:0"] {
             assert_eq!(eased(&lines, &keys, wrong, false), [], "{wrong}");
@@ -521,14 +525,17 @@ mod tests {
         assert_eq!(of("(1:0 4:3 7:3)"), "M1e0 0e0L4e0 3e0L7e0 3e0");
         assert_eq!(of("(step 1:0 4:3)"), "M1e0 0e0H4e0V3e0");
         assert_eq!(of("(bezier .25 .1 .5 2 1:0 5:10)"), "M1e0 0e0C2e0 1e0 3e0 2e1 5e0 1e1");
-        // The slope at the middle key is the harmonic mean of 2 and 1, weighted alike: 4/3.
-        assert!(of("(smooth 1:0 4:6 7:9)").contains("C2e0 0e0 3e0 4.667"), "{}", of("(smooth 1:0 4:6 7:9)"));
+        // The slope at the middle key is the harmonic mean of 2 and 1, 4/3.
+        let smooth = "M1e0 0e0C2e0 0e0 3e0 4.666666667e0 4e0 6e0C5e0 7.333333333e0 6e0 9e0 7e0 9e0";
+        assert_eq!(of("(smooth 1:0 4:6 7:9)"), smooth);
         for mode in ["in", "out", "inout", "back", "elastic", "bounce cycle"] {
             let curve = parse_curve(&format!("({mode} 3:-1 11:4)")).unwrap();
             let path = of(&curve.to_string());
             let points: Vec<(f64, f64)> = path[1..]
                 .split('L')
-                .map(|point| point.split_once(' ').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap())).unwrap())
+                .map(|point| {
+                    point.split_once(' ').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap())).unwrap()
+                })
                 .collect();
             assert_eq!((points.len(), points[0], points[32]), (33, (3.0, -1.0), (11.0, 4.0)), "{mode}");
             for &(frame, value) in &points[..32] {

@@ -67,7 +67,11 @@ fn wish() -> impl Strategy<Value = ClientMessage> {
         keys().prop_map(|keys| TimelineEdit::Remove { keys }),
         keys().prop_map(|keys| TimelineEdit::Copy { keys }),
         Just(TimelineEdit::Paste),
-        (keys(), prop::sample::select(vec!["linear", "smooth", "step", "bounce", "bezier .1 -1 .9 2", "no"]), any::<bool>())
+        (
+            keys(),
+            prop::sample::select(vec!["linear", "smooth", "step", "bounce", "bezier .1 -1 .9 2", "no"]),
+            any::<bool>()
+        )
             .prop_map(|(keys, mode, cycle)| TimelineEdit::Ease { keys, mode: mode.into(), cycle }),
         (0..12u32).prop_map(|count| TimelineEdit::Frames { count }),
         prop::sample::select(vec![0.0, 5.0, 24.0, 1e9]).prop_map(|fps| TimelineEdit::Pace { fps }),

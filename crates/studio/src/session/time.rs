@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rayfold_scene::{Mode, Quotes, Subject, unquoted_word};
+use rayfold_scene::{Quotes, Subject, unquoted_word};
 
 use super::fields::subject_word;
 use super::held_keys::HeldKeys;

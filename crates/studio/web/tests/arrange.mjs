@@ -160,7 +160,7 @@ test("every easing of the language is chosen, and the tangents of a bezier are d
     await until(async () => (await page.locator(".tangent").count()) === (name === "bezier" ? 2 : 0));
     await shot(page, `curves-${name}`);
   }
-  assert.equal(await curve(), "bezier .25 .1 .25 1");
+  assert.equal(await curve(), "bezier 0.25 0.1 0.25 1");
   const [from, to] = await page.locator(".curves .key:not(.tangent)").evaluateAll((all) => all.map((one) => one.getBoundingClientRect()).map(({ x, y }) => [x + 12, y + 12]));
   // To the middle in time, and three quarters of the way.
   const at = ([x, y]) => [from[0] + x * (to[0] - from[0]), from[1] + y * (to[1] - from[1])];
