@@ -240,6 +240,7 @@ test("a number and a colour are set in all that are selected, as one step", asyn
   for (const name of ["one", "two", "three"]) await page.locator(".item", { hasText: name }).click({ modifiers: ["Control"] });
   await page.locator(".item", { hasText: "one" }).click({ modifiers: ["Control"] });
   await page.locator(".item", { hasText: "one" }).click({ modifiers: ["Control"] });
+  await studio.settled();
   const radius = page.getByRole("spinbutton", { name: "radius" });
   await radius.fill("1.5");
   await radius.press("Enter");

@@ -8,7 +8,7 @@ import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { open, program, until } from "./stage.mjs";
+import { half, open, program, until } from "./stage.mjs";
 
 const { commands, clauses } = JSON.parse(
   String(spawnSync(program, ["check", "--format", "json", "-"], { input: "Screen 4 3\nLook 0 0 9 0 0 0 40\nTrace\n" }).stdout),

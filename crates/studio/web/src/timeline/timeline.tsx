@@ -147,11 +147,14 @@ function Chosen({ chosen }: { readonly chosen: readonly Track[] }): JSX.Element 
     <div class="chosen-keys" role="group" aria-label="Selected keys">
         <select aria-label="Easing" title="How the number moves between its keys" value={mode} disabled={none} onChange={(event) => ease(event.currentTarget.value, cycle)}>
           {mode === "" && <option value="">{none ? "easing" : "several"}</option>}
-          {language.value?.curve_modes.map(({ name, about }) => (
-            <option key={name} value={mode.split(" ")[0] === name ? mode : name} title={about}>
-              {name}
-            </option>
-          ))}
+          {language.value?.curve_modes.map(
+            ({ name, about }) =>
+              name !== "cycle" && (
+                <option key={name} value={mode.split(" ")[0] === name ? mode : name} title={about}>
+                  {name}
+                </option>
+              ),
+          )}
         </select>
       <button
         type="button"
