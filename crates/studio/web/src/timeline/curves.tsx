@@ -25,11 +25,11 @@ const shown = computed((): readonly Track[] => {
   return (chosen.length > 0 ? chosen : tracks.value.tracks.filter(({ line }) => selected.value.has(line))).slice(0, SHOWN);
 });
 
-/** The least and the greatest value of some tracks, with a margin. */
+/** The least and the greatest value of some tracks, with a margin. `elastic` passes its key by 37 %. */
 export function valuesOf(of: readonly Track[]): Range {
   const values = of.flatMap(({ keys }) => keys.map(([, value]) => value));
   const [low, high] = [Math.min(...values), Math.max(...values)];
-  const margin = (high - low) * 0.12 || Math.abs(high) * 0.5 || 1;
+  const margin = (high - low) * (of.some(({ mode }) => mode === "elastic") ? 0.42 : 0.12) || Math.abs(high) * 0.5 || 1;
   return [low - margin, high + margin];
 }
 
