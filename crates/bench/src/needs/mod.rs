@@ -60,14 +60,6 @@ const MOST: f64 = 0.5;
 /// The driver's exit code for a scene that needs a part that its build lacks.
 const LEFT_OUT: i32 = 3;
 
-/// Arguments of Cargo for a slice. What is not the tracer is sooner built, and as slow in all builds.
-const SOONER: [&str; 4] = [
-    "--config",
-    "profile.release.opt-level=0",
-    "--config",
-    "profile.release.package.rayfold-tracer.opt-level=3",
-];
-
 /// The number of concurrent builds. A build of the tracer is a single unit, on one core.
 const AT_ONCE: usize = 2;
 
@@ -110,7 +102,7 @@ pub fn run(args: &Args) -> Result<()> {
     );
     let folder = tempfile::tempdir()?;
     let builds = args.builds();
-    let programs = build(&builds, folder.path(), if args.slice { &SOONER } else { &[] })?;
+    let programs = build(&builds, folder.path())?;
     let subjects = subjects()?;
     let scripts: Vec<PathBuf> = subjects
         .iter()
@@ -142,13 +134,12 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 /// Builds the driver whole and without parts.
-fn build(builds: &[Build], folder: &Path, sooner: &[&str]) -> Result<Vec<PathBuf>> {
+fn build(builds: &[Build], folder: &Path) -> Result<Vec<PathBuf>> {
     let next = AtomicUsize::new(0);
     let target =
         |place: usize| Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../target/needs-{place}"));
     // The tracer's dependencies are built once, on all cores.
-    cargo_build(&[&["--package", "rayfold-scene"], sooner].concat(), &target(0))
-        .context("the tracer's dependencies")?;
+    cargo_build(&["--package", "rayfold-scene"], &target(0)).context("the tracer's dependencies")?;
     for other in (1..AT_ONCE).map(target).filter(|target| !target.exists()) {
         let status = Command::new("cp").arg("-a").args([target(0), other]).status().context("cp")?;
         ensure!(status.success(), "cp: {status}");
@@ -165,8 +156,7 @@ fn build(builds: &[Build], folder: &Path, sooner: &[&str]) -> Result<Vec<PathBuf
                     None => return Ok(built),
                 },
             };
-            let (target, program) = (&target, folder.join(k.to_string()));
-            built.push((k, build_without(without, target, &program, sooner)?));
+            built.push((k, build_without(without, &target, &folder.join(k.to_string()))?));
         }
     };
     let built: Result<Vec<Vec<_>>> = std::thread::scope(|scope| {
@@ -182,14 +172,14 @@ fn build(builds: &[Build], folder: &Path, sooner: &[&str]) -> Result<Vec<PathBuf
     Ok(programs.into_iter().map(|(_, program)| program).collect())
 }
 
-fn build_without(without: &[&str], target: &Path, program: &Path, sooner: &[&str]) -> Result<PathBuf> {
+fn build_without(without: &[&str], target: &Path, program: &Path) -> Result<PathBuf> {
     let name = if without.is_empty() { "whole".into() } else { format!("without {}", without.join(", ")) };
     eprintln!("building the tracer, {name}");
     let with: Vec<_> = parts().map(|(part, _)| part).filter(|part| !without.contains(part)).collect();
     let with = with.join(",");
     let example =
         ["--package", "rayfold-tracer", "--example", "frames", "--no-default-features", "--features", &with];
-    cargo_build(&[&example, sooner].concat(), target).context(name)?;
+    cargo_build(&example, target).context(name)?;
     std::fs::copy(target.join("release/examples/frames"), program)?;
     Ok(program.to_owned())
 }
