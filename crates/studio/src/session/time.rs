@@ -65,6 +65,7 @@ impl Session {
         let set = |changed: Vec<(usize, Line)>| {
             changed.into_iter().map(|(at, line)| edits::set(at, line)).collect::<Vec<_>>()
         };
+        let mut gesture = None;
         let splices = match wish {
             TimelineEdit::Switch { what, on } => {
                 match what {
@@ -114,15 +115,11 @@ impl Session {
                 return self.paste_keys(project, &keys, tell);
             }
             TimelineEdit::Ease { keys, mode, cycle } => {
-                let splices = set(tracks::eased(lines, &keys, &mode, cycle));
                 // While a tangent is dragged, all is one step.
-                let gesture = match &self.held {
-                    Some(Held::Keys(held)) => held.gesture,
-                    _ => self.next_gesture(),
-                };
-                self.edit(project, splices, Some(gesture), tell);
-                self.outline(project, tell);
-                return Change::Still;
+                if let Some(Held::Keys(held)) = &self.held {
+                    gesture = Some(held.gesture);
+                }
+                set(tracks::eased(lines, &keys, &mode, cycle))
             }
             TimelineEdit::Pace { fps } => {
                 let file = self.place(project).file;
@@ -135,11 +132,11 @@ impl Session {
                 edits::set_frames(lines, &self.shown(project).source_map, count.clamp(1, FRAMES))
             }
         };
-        self.edit(project, splices, None, tell);
+        self.edit(project, splices, gesture, tell);
         // There may be fewer frames now.
         self.show(project, self.frame, tell);
         self.outline(project, tell);
-        Change::Still
+        if gesture.is_some() { Change::Moving } else { Change::Still }
     }
 
     /// Pastes the keys of a text. The text of the keys that were copied last stands for those, whose lines may have moved
