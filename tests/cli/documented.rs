@@ -85,9 +85,9 @@ fn documented_pictures_are_what_their_commands_write() {
     assert_eq!(documented.len(), 19, "{documented:?}");
     let mut stale = Vec::new();
     let is_overwriting = std::env::var_os("RAYFOLD_PICTURES").is_some();
-    let are_all = is_overwriting || std::env::var_os("RAYFOLD_TESTS").is_some_and(|tests| tests == "all");
-    let third = std::time::UNIX_EPOCH.elapsed().unwrap().as_secs() as usize % 3;
-    for (_, (file, flags)) in documented.into_iter().enumerate().filter(|(k, _)| are_all || k % 3 == third) {
+    let is_taken = crate::one_in::one_in(3);
+    let taken = documented.into_iter().enumerate().filter(|&(k, _)| is_overwriting || is_taken(k));
+    for (_, (file, flags)) in taken {
         println!("{file}");
         let (name, ending) = file.split_once('.').unwrap();
         let path = root().join("docs/images").join(&file);

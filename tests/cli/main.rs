@@ -20,6 +20,8 @@ mod interrupted;
 mod models;
 mod movies;
 mod newcomer;
+#[path = "../stage/one_in.rs"]
+mod one_in;
 mod pages;
 mod passes;
 mod render;

@@ -141,7 +141,7 @@ fn hits_of_the_examples_are_the_references() {
         fs::read_dir(root().join("scenes")).unwrap().map(|entry| entry.unwrap()).collect();
     folders.retain(|entry| entry.file_type().unwrap().is_dir());
     assert_eq!(folders.len(), 19);
-    let is_taken = super::one_in(3);
+    let is_taken = super::one_in::one_in(3);
     for (_, folder) in folders.into_iter().enumerate().filter(|(k, _)| is_taken(*k)) {
         let name = folder.file_name().into_string().unwrap();
         let mut scripts: Vec<_> = fs::read_dir(folder.path())

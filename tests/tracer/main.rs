@@ -14,14 +14,8 @@ mod hold;
 mod images;
 mod light;
 mod meshes;
+#[path = "../stage/one_in.rs"]
+mod one_in;
 mod sampled;
 mod sampled_small;
 mod skies;
-
-/// Returns whether a run tries a case, for a test that takes long: it takes one in `of`, another one each second.
-/// `RAYFOLD_TESTS=all` takes all.
-fn one_in(of: usize) -> impl Fn(usize) -> bool {
-    let now = std::time::UNIX_EPOCH.elapsed().unwrap().as_secs() as usize;
-    let are_all = std::env::var_os("RAYFOLD_TESTS").is_some_and(|tests| tests == "all");
-    move |case| are_all || case % of == now % of
-}

@@ -617,7 +617,7 @@ fn a_model_that_is_used_often_is_drawn_as_written_out() {
     let (usual, by_tree) =
         (RenderOptions::default(), RenderOptions { models: Some(true), ..Default::default() });
     let written = RenderOptions { models: Some(false), ..Default::default() };
-    let is_taken = super::one_in(2);
+    let is_taken = super::one_in::one_in(2);
     for (_, smooth) in ["", "flat"].into_iter().enumerate().filter(|(k, _)| is_taken(*k)) {
         println!("{smooth}");
         let picture = drawn(fine, smooth, &usual);
