@@ -128,7 +128,7 @@ pub(crate) fn tracks(lines: &[Line]) -> Tracks {
                 line: at,
                 number: slot.number,
                 label: label(&slot),
-                mode: words_of(curve.mode()),
+                mode: curve.mode().to_string(),
                 cycle: curve.is_cycle(),
                 keys: curve.keys().iter().map(|key| (key.frame, key.value)).collect(),
                 path: path(&curve, keys <= FINE_KEYS),
@@ -136,14 +136,6 @@ pub(crate) fn tracks(lines: &[Line]) -> Tracks {
         }
     }
     found
-}
-
-/// Returns a mode as it stands in a script.
-fn words_of(mode: Mode) -> String {
-    match mode {
-        Mode::Bezier([a, b, c, d]) => format!("{} {a} {b} {c} {d}", mode.name()),
-        _ => mode.name().to_owned(),
-    }
 }
 
 /// Returns the mode with this name, or with these words of a script.

@@ -328,13 +328,7 @@ impl Display for Curve {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str("(")?;
         if self.mode != Mode::Linear {
-            write!(f, "{} ", self.mode.name())?;
-        }
-        if let Mode::Bezier(points) = self.mode {
-            for point in points {
-                write_number(f, point)?;
-                f.write_str(" ")?;
-            }
+            write!(f, "{} ", self.mode)?;
         }
         if self.cycle {
             write!(f, "{CYCLE} ")?;

@@ -5,6 +5,9 @@
 //! on all machines.
 
 use std::f64::consts::{LN_2, PI};
+use std::fmt::{self, Display, Formatter};
+
+use crate::form::write_number;
 
 /// The interpolation between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +49,20 @@ const FALLS: f64 = 2.75;
 /// The arcs of `bounce`: where each ends, the time of its lowest point, both as multiples of `1 / FALLS`, and its height.
 const ARCS: [(f64, f64, f64); 4] =
     [(1.0, 0.0, 0.0), (2.0, 1.5, 0.75), (2.5, 2.25, 0.9375), (f64::INFINITY, 2.625, 0.984_375)];
+
+/// Writes the mode as a curve of a script has it: `smooth`, or `bezier 0.25 0.1 0.25 1`.
+impl Display for Mode {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        if let Self::Bezier(points) = self {
+            for &point in points {
+                f.write_str(" ")?;
+                write_number(f, point)?;
+            }
+        }
+        Ok(())
+    }
+}
 
 impl Mode {
     /// All modes, in the order of the documentation; `bezier` with the control points of CSS's `ease`.
