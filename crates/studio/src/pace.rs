@@ -40,10 +40,11 @@ const RESERVE: f64 = 0.75;
 
 /// The shares of width and height that are drawn while something moves. Steps, because the page gets a picture of
 /// another size as a whole.
-const SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.375, 0.25];
+const SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.375, LEAST];
 
-/// The smallest share of width and height of the first sketch at rest.
-const LEAST: f64 = 0.125;
+/// The smallest share of width and height, while something moves and of the first sketch at rest: a hand that holds still
+/// for a moment must not make the picture coarser.
+const LEAST: f64 = 0.25;
 
 /// The weight of the last picture in the mean of those before it, if it was faster than these and if it was slower: a
 /// processor that does something else makes single pictures slow, and none fast.
@@ -108,13 +109,12 @@ impl Pace {
         if matches!(scene.camera, Camera::Orthographic) {
             return Effort { share: 1.0, bounces: None };
         }
-        let least = SHARES[SHARES.len() - 1];
         let pixels = scene.screen.pixels() as f64;
         let fewest = fewest(scene);
         let costs = std::iter::once((None, self.per_pixel))
             .chain(BOUNCES.into_iter().map(Some).zip(self.fewer))
             .filter(|&(bounces, _)| bounces.is_none_or(|few| few < scene.depth.bounces() && few >= fewest));
-        let mut effort = Effort { share: least, bounces: None };
+        let mut effort = Effort { share: LEAST, bounces: None };
         for (bounces, per_pixel) in costs {
             effort.bounces = bounces;
             // What is not known yet is tried with the smallest picture.

@@ -351,7 +351,7 @@ mod tests {
         assert_ne!(expected, render_picture(still, &RenderOptions::default()).unwrap(), "it moves");
         let seen = drawn(&painter, &pictures, request);
         let sizes: Vec<_> = seen.iter().map(|picture| [4, 8].map(|at| number_at(picture, at))).collect();
-        assert_eq!(sizes[0], [12, 8], "the first one has few pixels, whatever the rest takes");
+        assert_eq!(sizes[0], [24, 16], "the first one has few pixels, whatever the rest takes");
         assert!(sizes.is_sorted() && seen.len() > 2, "{sizes:?}");
         assert!(seen.iter().all(|picture| number(picture) == 9));
         let mut shown = Shown::default();
