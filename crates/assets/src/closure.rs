@@ -7,9 +7,9 @@ use glam::DVec3;
 /// Whether the triangles of a model close a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Closure {
-    /// Every edge is as often in one direction as in the other, and there is a volume inside.
+    /// Every edge occurs as often in one direction as in the other, and the triangles enclose a volume.
     Closed,
-    /// An edge is oftener in one direction than in the other: from here to there.
+    /// An edge occurs more often in one direction than in the other; the points are its start and its end.
     Open([DVec3; 2]),
     /// The faces are seen clockwise from outside.
     InsideOut,
@@ -30,7 +30,7 @@ pub(crate) fn joined(positions: &[DVec3]) -> Vec<u32> {
         .collect()
 }
 
-/// Decides it for triangles that all have an area.
+/// Returns whether triangles, all of which have an area, close a body.
 pub(crate) fn closure(positions: &[DVec3], triangles: &[[u32; 3]]) -> Closure {
     let joined = joined(positions);
     let mut edges: HashMap<(u32, u32), i32> = HashMap::with_capacity(2 * triangles.len());

@@ -8,7 +8,7 @@ use crate::{gltf, obj, ply, stl};
 /// Makes a model of the bytes of the file with this name, with the normals of the file.
 ///
 /// # Errors
-/// If the content is faulty, or a file that it cannot do without.
+/// Fails if the content of the file, or of a file that it requires, is faulty.
 pub fn decode(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Model, AssetError> {
     let parts = read(name, bytes, referred);
     let parts = parts.map_err(|fault| referred.error.take().unwrap_or_else(|| fault.of(name)))?;

@@ -53,7 +53,7 @@ pub enum AssetError {
         /// The description of the fault.
         what: String,
     },
-    /// The content of a picture is faulty, or not read.
+    /// The content of a picture is faulty, or of a kind that is not read.
     #[error("`{name}`: {what}")]
     Picture {
         /// The name of the file.
@@ -61,7 +61,7 @@ pub enum AssetError {
         /// The description of the fault.
         what: String,
     },
-    /// The picture is light without bound, where levels from 0 to 1 are wanted.
+    /// The picture holds light without an upper bound, but levels from 0 to 1 are required.
     #[error("`{name}` is a picture of light (HDR or EXR), which only a `Sky` takes")]
     Light {
         /// The name of the file.
@@ -120,7 +120,7 @@ fn at(line: Option<usize>) -> String {
     line.map(|line| format!(", line {line}")).unwrap_or_default()
 }
 
-/// The most characters of a file that a message quotes, and those of a message.
+/// The maximum number of characters of a file that a message quotes, and of a message.
 const QUOTED: usize = 60;
 const MESSAGE: usize = 400;
 

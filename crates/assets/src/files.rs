@@ -12,13 +12,13 @@ pub trait Files: Send + Sync {
     /// Returns the size and the tag of a file, or `None` if there is no file of this name.
     ///
     /// # Errors
-    /// If it is unknown whether there is one, with the reason.
+    /// Returns the reason if it is unknown whether the file exists.
     fn look(&self, name: &str) -> Result<Option<FileInfo>, String>;
 
     /// Returns the content of a file.
     ///
     /// # Errors
-    /// If it cannot be read, with the reason.
+    /// Returns the reason if the file cannot be read.
     fn read(&self, name: &str) -> Result<Vec<u8>, String>;
 
     /// Returns whether files can be read at all.

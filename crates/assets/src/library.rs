@@ -170,8 +170,9 @@ impl Library {
         Ok(model)
     }
 
-    /// Locks the models, after all threads that make the one of this name have made it. A thread that makes a model does
-    /// not wait: while others work for it, it may take up work that asks for a model, and two would wait for each other.
+    /// Waits until no other thread is making the model of this name, then locks the models. A thread that makes a model
+    /// itself does not wait: while others work for it, it may take up work that needs another model, and two threads
+    /// would wait for each other.
     fn made(&self, name: &str) -> MutexGuard<'_, Models> {
         let models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
         let waits = |models: &mut Models| MAKING.get() == 0 && models.making.iter().any(|of| of == name);
@@ -248,9 +249,9 @@ impl Library {
         Ok(font)
     }
 
-    /// Returns the names of the files that a model was made of, or lacks, with their paths in it: after itself those that it
-    /// refers to. Of a faulty model they are those that it refers to before the fault. There are none for a model that was not
-    /// asked for.
+    /// Returns the names of the files that a model was made of, or lacks, with their paths in the model: the model's
+    /// own first, then those to which it refers. For a faulty model these are the files to which it refers before the
+    /// fault. There are none for a model that no caller has requested.
     pub fn sources(&self, name: &str) -> Vec<(String, String)> {
         let models = self.made(name);
         match models.kept.iter().find(|kept| kept.name == name) {

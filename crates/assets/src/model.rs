@@ -13,7 +13,7 @@ use crate::normals::smoothed;
 use crate::srgb::{decoded, encoded};
 use crate::texture::{Slot, Texture};
 
-/// An estimate of the bytes for each triangle of what a renderer makes of a model.
+/// An estimate of the bytes per triangle of the data that a renderer derives from a model.
 const DERIVED_BYTES: usize = 512;
 
 /// The index of a normal or of texture coordinates that a corner does not have.
@@ -48,7 +48,7 @@ pub struct Look {
     pub factor: Option<DVec3>,
     /// The picture that multiplies the colour.
     pub texture: Option<Texture>,
-    /// Whether the colour is that of what has none, because a file with it is missing.
+    /// Whether the faces have the neutral colour because a file with their colour is missing.
     pub is_missing: bool,
     /// The light that the faces give off, linear.
     pub glow: DVec3,
@@ -89,7 +89,7 @@ impl Look {
     }
 }
 
-/// The colour of what has none of its own.
+/// The colour of faces that have none of their own.
 const NEUTRAL: DVec3 = DVec3::splat(0.8);
 
 /// Triangles with normals and colours. Every index is in range, and every number finite.
@@ -278,9 +278,9 @@ impl Model {
         })
     }
 
-    /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is kept, and dropped with
-    /// the model. Calls before the first has ended make it too, and the first to end counts. If the model holds data of
-    /// another type, it is made anew and not kept.
+    /// Returns data that a renderer makes of this model, such as a tree of its triangles. The data is kept, and dropped
+    /// with the model. Concurrent calls may each make the data; the result of the call that ends first is kept. If the
+    /// model holds data of another type, the data is made again and not kept.
     pub fn derived<T: Any + Send + Sync>(&self, make: impl Fn() -> T) -> Arc<T> {
         let kept = match self.derived.0.get() {
             Some(kept) => kept.clone(),

@@ -6,9 +6,10 @@ use glam::{DVec3, Vec3};
 
 use crate::closure::joined;
 
-/// Returns normals, and those of the corners of each triangle: at a corner the sum of the unit normals, each times its
-/// angle there, of the faces that are reached from its face around the point over edges where two faces meet at less than
-/// an angle in degrees. Equal normals at one point are shared.
+/// Returns normals, and their indices at the corners of each triangle. A normal at a corner is the sum of the unit
+/// normals of faces, each times the face's angle there. These are the faces that are reached from the corner's own face
+/// around the point, over edges where two faces meet at less than an angle in degrees. Equal normals at one point are
+/// shared.
 pub(crate) fn smoothed(
     positions: &[DVec3],
     triangles: &[[u32; 3]],

@@ -318,8 +318,8 @@ fn vertices(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> Re
     Ok(())
 }
 
-/// Takes the triangles with which the faces of a binary file begin, as nearly all programs write them, and returns their
-/// number. What is another face, or faulty, is left.
+/// Takes the triangles with which the faces of a binary file begin, as nearly all programs write them, and returns
+/// their number. It stops before the first other or faulty face.
 fn triangles(element: &Element, values: &mut Values<'_>, parts: &mut Parts) -> u64 {
     const ROW: usize = 13;
     let is_plain = values.format != Format::Text

@@ -31,12 +31,12 @@ pub struct Referred<'a> {
     /// All files that were looked for, whether the model then referred to them or not, each with its number in the order of
     /// the first looks.
     looked: BTreeMap<String, (usize, Option<FileInfo>)>,
-    /// An error that a decoder is to pass on as it is.
+    /// An error that a decoder passes on unchanged.
     pub(crate) error: Option<AssetError>,
 }
 
 impl<'a> Referred<'a> {
-    /// Starts without any.
+    /// Starts without any files.
     pub fn new(files: &'a dyn Files) -> Self {
         Self {
             files,
@@ -49,7 +49,7 @@ impl<'a> Referred<'a> {
         }
     }
 
-    /// Starts without any. Pictures are those that `pictures` makes.
+    /// Starts without any files. Pictures are those that `pictures` makes.
     pub(crate) fn with_pictures(files: &'a dyn Files, pictures: Pictures<'a>) -> Self {
         Self { pictures: Some(pictures), ..Self::new(files) }
     }
@@ -120,7 +120,7 @@ impl<'a> Referred<'a> {
         Ok(Some(picture))
     }
 
-    /// Returns the picture that a part of the file `name` is. `what` names the part.
+    /// Returns the picture in a part of the file `name`. `what` names the part.
     pub(crate) fn embedded(&mut self, name: &str, what: &str, bytes: &[u8]) -> Result<Arc<Picture>, Fault> {
         let picture = picture::decode(name, bytes).and_then(|picture| picture::surface(name, picture));
         let picture = picture.map_err(|error| {
@@ -166,7 +166,7 @@ impl<'a> Referred<'a> {
         Ok(self.look(name)?.map(|_| name.into()))
     }
 
-    /// Returns the warning of a model that does without a file, and the effect of that.
+    /// Returns the warning that a model lacks an optional file, with the effect of that.
     pub(crate) fn absence(&self, path: &str, effect: &str) -> String {
         let similar = similar(self.files, last_part(path));
         let similar = similar.map(|other| format!(" (there is `{other}`: names are compared byte for byte)"));
@@ -179,7 +179,7 @@ impl<'a> Referred<'a> {
         self.give_up(error)
     }
 
-    /// Keeps an error that is to be passed on as it is.
+    /// Keeps an error that is passed on unchanged.
     fn give_up(&mut self, error: AssetError) -> Fault {
         let fault = Fault::new(error.to_string());
         self.error = Some(error);

@@ -39,7 +39,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Makes a picture that repeats, by the texture coordinates as they stand.
+    /// Makes a picture that repeats, with the texture coordinates unchanged.
     pub(crate) fn new(picture: Arc<Picture>) -> Self {
         Self { picture, wraps: [Wrap::Repeat; 2], has_own_uvs: false, transform: None }
     }
@@ -49,7 +49,7 @@ impl Texture {
         &self.picture
     }
 
-    /// Returns how the picture goes on across and down.
+    /// Returns how the picture continues across and down.
     pub fn wraps(&self) -> [Wrap; 2] {
         self.wraps
     }

@@ -1,5 +1,5 @@
-//! Reads accessors: numbers in views of buffers, some of which sparse ones replace. Every range is checked before it is
-//! read.
+//! Reads accessors: numbers in views of buffers, of which a sparse accessor replaces some. Every range is checked
+//! before it is read.
 
 use super::document::{Accessor, Document};
 use crate::error::{Fault, shortened};
@@ -42,7 +42,8 @@ impl Component {
         }
     }
 
-    /// Returns the number that starts the bytes, of which there are enough. `normalized` whole numbers are shares.
+    /// Returns the number at the start of the bytes, which must be enough. A `normalized` whole number is a share of
+    /// the largest one.
     fn read(self, b: &[u8], normalized: bool) -> f64 {
         let (number, largest) = match self {
             Self::I8 => (f64::from(b[0].cast_signed()), 127.0),

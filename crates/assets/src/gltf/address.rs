@@ -1,8 +1,8 @@
-//! The addresses of buffers and pictures: paths, and data.
+//! The addresses of buffers and pictures: paths and `data:`.
 
 use crate::error::{Fault, shortened};
 
-/// Returns the path that a percent-encoded address is.
+/// Returns the path in a percent-encoded address.
 pub(super) fn decoded_path(uri: &str) -> Result<String, Fault> {
     let path = percent_encoding::percent_decode_str(uri).decode_utf8();
     Ok(path.map_err(|_| Fault::new(format!("`{}` is not UTF-8", shortened(uri))))?.into_owned())

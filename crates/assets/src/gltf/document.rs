@@ -1,4 +1,4 @@
-//! The JSON of a glTF file, as far as it is drawn. Fields without meaning here are skipped.
+//! The fields of a glTF file's JSON that are used here. All others are skipped.
 
 use std::collections::BTreeMap;
 

@@ -107,7 +107,7 @@ fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<
     Ok(parts)
 }
 
-/// The most objects and values of a JSON. What is read of them takes up to some hundred bytes each.
+/// The maximum number of objects and values of a JSON. Each takes up to some hundred bytes once it is read.
 const OBJECTS: usize = 1 << 21;
 const VALUES: usize = 1 << 25;
 
@@ -184,7 +184,7 @@ fn texture(material: &Material, slot: Slot) -> Option<&TextureInfo> {
     }
 }
 
-/// Gives the looks that faces have their pictures.
+/// Sets the pictures of the looks that faces use.
 fn paint(
     name: &str,
     (document, buffers): (&Document, &Buffers),
@@ -252,7 +252,7 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Adds the default scene; without one the first, without any all root nodes.
+    /// Adds the default scene. Without a default it adds the first scene, and without any scene all root nodes.
     fn scene(&mut self) -> Result<(), Fault> {
         let document = self.document;
         let roots = match document.scene {

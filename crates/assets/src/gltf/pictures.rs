@@ -39,7 +39,8 @@ impl<'a, 'b> Pictures<'a, 'b> {
         self.warnings
     }
 
-    /// Returns a texture of a material, or `None` if its picture is missing. `effect` is what follows from that.
+    /// Returns a texture of a material, or `None` if its picture is missing. `effect` describes the consequence, for
+    /// the warning.
     pub(super) fn texture(&mut self, info: &TextureInfo, effect: &str) -> Result<Option<Texture>, Fault> {
         let number = info.index;
         let texture = self.document.textures.get(number);

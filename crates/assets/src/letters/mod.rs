@@ -19,15 +19,15 @@ use crate::model::{Model, NONE, Parts, too_many_triangles};
 use plate::Plate;
 use shaping::Glyph;
 
-/// The end of a line at which each line of letters lies at x = 0.
+/// The point of each line of letters that is at x = 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Align {
-    /// Lines begin there.
+    /// The beginning of the line.
     #[default]
     Left,
-    /// Lines have their middles there.
+    /// The middle of the line.
     Center,
-    /// Lines end there.
+    /// The end of the line.
     Right,
 }
 
@@ -60,7 +60,7 @@ pub enum LetterError {
         /// The file of the font; `None` for the one that comes with the program.
         font: Option<String>,
     },
-    /// A character that is no letter but an order.
+    /// A control character.
     #[error("the control character U+{:04X} cannot be drawn", u32::from(*.0))]
     Control(char),
     /// More code points than the limit, as many as this.
@@ -95,14 +95,14 @@ fn named(letter: char) -> String {
     }
 }
 
-/// The font of letters that name none.
+/// Returns the font of letters that name no font.
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 #[expect(clippy::unnecessary_wraps, reason = "a page may lack it")]
 fn bold() -> Option<&'static [u8]> {
     Some(notosans::BOLD_TTF)
 }
 
-/// A page loads it beside the module, which is a tenth smaller without.
+/// A page loads the font beside the module, which is a tenth smaller without it.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 static BOLD: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
 
@@ -111,7 +111,7 @@ fn bold() -> Option<&'static [u8]> {
     BOLD.get().map(Vec::as_slice)
 }
 
-/// Provides the font of letters that name none, once: in a browser it is no part of the program.
+/// Provides the font of letters that name no font, once. In a browser this font is no part of the program.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub fn provide_font(bytes: Vec<u8>) {
     let _ = BOLD.set(bytes);
@@ -121,13 +121,13 @@ pub fn provide_font(bytes: Vec<u8>) {
 #[derive(Clone)]
 pub(crate) struct Font {
     font: harfrust::Font,
-    /// The number of grid units of the em.
+    /// The number of grid units per em.
     em: i64,
-    /// The number of grid units of a unit of the font.
+    /// The number of grid units per unit of the font.
     unit: i64,
 }
 
-/// The fewest units that an em has on the grid. A rounded point is off by less than an em / 2¹⁵.
+/// The minimum number of grid units per em. A rounded point is off by less than an em / 2¹⁵.
 const FINENESS: i64 = 1 << 15;
 
 impl Font {
@@ -170,7 +170,7 @@ impl Font {
     }
 }
 
-/// Returns the name of a table of the first face that is not whole.
+/// Returns the name of a truncated table of the first face, if there is one.
 fn cut_table(bytes: &[u8]) -> Option<String> {
     let number = |at: usize| {
         let four = bytes.get(at..at.checked_add(4)?)?;
@@ -186,7 +186,7 @@ fn cut_table(bytes: &[u8]) -> Option<String> {
     Some(String::from_utf8_lossy(name).trim_end().into())
 }
 
-/// The most pairs of glyphs that are looked at for those that touch.
+/// The maximum number of pairs of glyphs that are tested for contact.
 const PAIRS: usize = 300_000_000;
 
 /// A glyph at its place on the grid.

@@ -24,7 +24,7 @@ const CLOSENESS: f64 = 2500.0;
 /// The largest turn of an outline along a chord, in degrees.
 const TURN: f64 = 15.0;
 
-/// The most corners of a glyph, curves written out.
+/// The maximum number of corners of a glyph whose curves are written as chords.
 pub(super) const CORNERS: usize = 200_000;
 
 /// Returns the contours of a glyph.
@@ -54,7 +54,7 @@ pub(super) fn contours(font: &Font, glyph: u32) -> Result<Vec<Contour>, Fault> {
 
 /// Writes down the path of a glyph. Coordinates are in units of the font.
 struct Pen {
-    /// The number of grid units of a unit of the font.
+    /// The number of grid units per unit of the font.
     unit: f64,
     tolerance: f64,
     contours: Vec<Contour>,

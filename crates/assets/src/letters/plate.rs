@@ -19,12 +19,13 @@ const REACH: i64 = 1 << 29;
 /// The most corners that are joined at once.
 const CORNERS: usize = 1_000_000;
 
-/// The most crossings of outlines that are joined at once, and the most pairs of chords that are looked at for them.
+/// The maximum number of crossings of outlines that are joined at once, and of pairs of chords that are compared to
+/// find them.
 const CROSSINGS: usize = 1_000_000;
 const PAIRS: usize = 1_000_000_000;
 
-/// The cosine of the angle below which a corner of the outline is smooth, and that up to which a chord's direction is that
-/// of the outline at its end.
+/// The cosine of two angles: a corner of the outline below the first is smooth; a chord that turns by less than the
+/// second takes the direction of the outline at its end.
 const SMOOTH: f64 = 0.866_025_403_784_438_6;
 const SAME: f64 = 0.906_307_787_036_65;
 

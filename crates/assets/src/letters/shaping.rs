@@ -48,8 +48,8 @@ pub(super) fn line(text: &str, font: &Font, lettering: &Lettering) -> Result<Lin
     }
 }
 
-/// Returns the script of the letter at each byte at which one starts. Letters of no script have that of those before, at the
-/// start that of the first with one.
+/// Returns the script of the letter at each byte at which one starts. A letter without a script has that of the letter
+/// before it; at the start, that of the first letter with a script.
 fn scripts(text: &str) -> Vec<Option<Script>> {
     let own = |c: char| match script(u32::from(c)) {
         Script::COMMON | Script::INHERITED | Script::UNKNOWN => None,

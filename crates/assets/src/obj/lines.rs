@@ -2,8 +2,8 @@
 
 use crate::error::{Fault, shortened};
 
-/// The lines of a text, each with its number and with those that a backslash at its end joins to it. A comment goes on
-/// nowhere: it often ends in the path of a folder.
+/// The lines of a text with their numbers. A backslash at the end of a line joins the next line to it. A comment is not
+/// continued, because it often ends with the path of a folder.
 pub(super) struct Lines<'a> {
     pub(super) rest: &'a [u8],
     pub(super) number: usize,
@@ -66,8 +66,8 @@ fn number(word: &[u8]) -> Option<f64> {
     text.parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-/// Returns the number of a word of a sign, digits and a point, if they are few. The digits and the power of ten are then exact,
-/// so that the quotient is rounded once, to the number that the word is nearest to (Clinger, 1990).
+/// Returns the number in a word that consists of a sign, a few digits and a point. The digits and the power of ten are
+/// then exact, so the quotient is rounded once, to the number nearest to the word (Clinger, 1990).
 fn short_number(word: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1., 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];

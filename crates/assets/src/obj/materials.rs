@@ -73,7 +73,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Gives the looks that faces have their pictures, and the colour of what has none to those whose file is missing.
+    /// Sets the pictures of the looks that faces use. A look whose picture is missing gets the neutral colour.
     pub(super) fn paint(&mut self, refer: &mut Referred<'_>) -> Result<(), Fault> {
         let mut is_used = vec![false; self.parts.looks.len()];
         self.parts.look_of.iter().for_each(|look| is_used[*look as usize] = true);
@@ -186,8 +186,9 @@ impl Reader {
 /// The most materials that a warning names.
 const NAMED: usize = 5;
 
-/// Returns the paths of the libraries in a line. The rest of the line is one path, unless there is no such file: then its words
-/// are. It is also its words if all of them are files and the last part of the whole is but the last of these.
+/// Returns the paths of the libraries in a line. The rest of the line is one path, if there is such a file. Otherwise
+/// each of its words is a path. Its words are also the paths if each of them is a file and the last part of the whole
+/// is only the last of them.
 fn libraries(line: usize, text: &[u8], refer: &mut Referred<'_>) -> Result<Vec<String>, Fault> {
     let rest = rest_of(text, b"mtllib");
     let words: Vec<String> = rest.split_whitespace().map(Into::into).collect();

@@ -1,8 +1,8 @@
 //! Wavefront OBJ, and the colours and pictures of its MTL files.
 //!
-//! A long text is cut into chunks at ends of lines, which are read side by side. The lines of each chunk are counted first, so that
-//! indices and the lines of faults are the same for any number of chunks. What a line about materials means depends on
-//! all such lines before it: these are kept, and read in order after the chunks.
+//! A long text is cut into chunks at ends of lines, which are read side by side. The lines of each chunk are counted
+//! first, so that indices and the lines of faults are the same for any number of chunks. The meaning of a line about
+//! materials depends on all such lines before it, so these lines are kept, and read in order after the chunks.
 
 mod lines;
 mod materials;
@@ -28,7 +28,7 @@ fn place(line: usize, index: i64, count: usize, what: &str) -> Result<u32, Fault
     }
 }
 
-/// The counts of what stands before a place in the text.
+/// The counts of the items before a place in the text.
 #[derive(Clone, Copy, Default)]
 struct Counts {
     lines: usize,
@@ -334,7 +334,8 @@ impl Reader {
     }
 }
 
-/// Adds the last of `count` values. As long as all are missing there are none; later a missing one is the `usual` one.
+/// Adds the last of `count` values to a list. The list stays empty as long as all values are missing; later, a missing
+/// value is `usual`.
 #[inline]
 fn push_late<T: Copy>(all: &mut Vec<T>, count: usize, value: T, (usual, is_missing): (T, bool)) {
     if all.is_empty() {
@@ -355,8 +356,8 @@ fn joined<T: Copy>(mut lists: Vec<Vec<T>>) -> Vec<T> {
     if lists.len() == 1 { lists.swap_remove(0) } else { lists.concat() }
 }
 
-/// Joins lists that are each empty or as long as one of `others`. If all are empty the result is, too; otherwise what is missing
-/// is the `usual` value.
+/// Joins lists, each of which is empty or as long as its counterpart in `others`. If all are empty, so is the result;
+/// otherwise a missing value is `usual`.
 fn joined_late<T: Copy, U>(mut lists: Vec<Vec<T>>, others: &[Vec<U>], usual: T) -> Vec<T> {
     if lists.iter().any(|list| !list.is_empty()) {
         lists.iter_mut().zip(others).for_each(|(list, other)| list.resize(other.len(), usual));

@@ -33,7 +33,7 @@ const PNG_EXTRAS: u64 = 64 << 20;
 /// Makes a picture of the bytes of the file with this name.
 ///
 /// # Errors
-/// If the content is faulty, or no picture that is read.
+/// Fails if the content is faulty, or is no picture of a known kind.
 pub(crate) fn decode(name: &str, bytes: &[u8]) -> Result<Picture, AssetError> {
     read(bytes).map_err(|fault| AssetError::Picture { name: name.into(), what: fault.what })
 }
@@ -78,7 +78,7 @@ fn read_png(bytes: &[u8]) -> Result<Picture, Fault> {
     read_encoded(decoder, bytes, png_turn(bytes))
 }
 
-/// Returns the turn of a PNG, whose EXIF may stand behind its pixels.
+/// Returns the orientation of a PNG. Its EXIF data may come after its pixels.
 fn png_turn(bytes: &[u8]) -> Option<Orientation> {
     let mut rest = bytes.get(PNG.len()..)?;
     loop {

@@ -79,7 +79,7 @@ impl Picture {
         self.stored[usize::from(!self.is_on_its_side())]
     }
 
-    /// Returns whether the levels are light as they stand (HDR, EXR), and not encoded.
+    /// Returns whether the levels are linear light (HDR, EXR), and not encoded.
     pub fn is_light(&self) -> bool {
         matches!(self.levels, Levels::Shared(_) | Levels::Floats(_))
     }
@@ -204,13 +204,14 @@ impl Picture {
     }
 }
 
-/// Returns the light of 1 in a pixel with a common exponent: the power of two of the exponent less 136.
+/// Returns the light that the number 1 stands for in a pixel with a common exponent: two to the power of the exponent
+/// less 136.
 fn unit(exponent: u8) -> f64 {
     f64::from_bits((u64::from(exponent) + 1023 - 136) << 52)
 }
 
-/// Returns colour and alpha of a pixel's 1 to 4 numbers, of which the largest times `unit` is 1. `light` has the linear light
-/// of each number.
+/// Returns colour and alpha from a pixel's 1 to 4 numbers. The largest possible number times `unit` is 1. `light` has
+/// the linear light of each number.
 fn mixed<T: Copy + Into<u32>>(numbers: &[T], unit: f64, light: Option<&[f64]>) -> (DVec3, f64) {
     let share = |number: T| f64::from(number.into()) * unit;
     let level = |number: T| light.map_or_else(|| share(number), |light| light[number.into() as usize]);
