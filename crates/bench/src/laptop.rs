@@ -1,7 +1,7 @@
 //! `rayfold-bench laptop`: small animations on few places, by the real programs, as `rayfold dev FOLDER` makes them.
 //!
-//! Seconds from the first upload to the GIF, with new processes, and the requests that each function sends. Frames of 8 x 8
-//! pixels take no time to draw, so what is left is the pipeline's.
+//! Measures the seconds from the first upload to the GIF, with new processes, and the requests that each function
+//! sends. Frames of 8 x 8 pixels take no time to draw, so the rest is the pipeline's time.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ struct Row {
 /// Measures and writes the report.
 ///
 /// # Errors
-/// When the functions cannot be started, an animation fails, or the report cannot be written.
+/// Fails if the functions cannot be started, an animation fails, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     args.output.prepare()?;
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
@@ -78,7 +78,7 @@ fn write_trivial(folder: &Path, frames: u32) -> Result<()> {
     Ok(())
 }
 
-/// In a bucket of its own, with new processes.
+/// Makes an animation in a bucket of its own, with new processes.
 async fn make_on(places: usize, folder: &Folder) -> Result<Run> {
     let data = tempfile::tempdir()?;
     let plan =

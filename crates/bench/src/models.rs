@@ -36,7 +36,7 @@ struct Plan {
     /// The triangles of the model that is drawn.
     drawn: usize,
     side: u32,
-    /// The triangles of the model that is drawn many times, and the times.
+    /// The number of triangles of the model that is drawn many times, and how many times it is drawn.
     used: usize,
     times: usize,
     /// The triangles of the wine glass.
@@ -135,8 +135,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// Makes a surface of about `count` triangles. `point` returns the place at an angle around y and a share of the way
-    /// from bottom to top.
+    /// Makes a surface of about `count` triangles. `point` returns the place for an angle around y and a height, as a
+    /// share of the way from bottom to top.
     fn new(count: usize, point: impl Fn(f64, f64) -> DVec3) -> Self {
         let rows = ((count / 4) as f64).sqrt().max(3.0) as u32;
         let columns = 2 * rows;
@@ -158,7 +158,7 @@ impl Surface {
         Self { positions: positions.collect(), triangles: triangles.collect() }
     }
 
-    /// A ball with waves.
+    /// Makes a ball with waves.
     fn ball(count: usize) -> Self {
         Self::new(count, |around, share| {
             let height = std::f64::consts::PI * (share - 0.5);
@@ -167,7 +167,7 @@ impl Surface {
         })
     }
 
-    /// A wine glass: foot, stem and bowl, with a wall of even thickness.
+    /// Makes a wine glass: foot, stem and bowl, with a wall of even thickness.
     fn wine_glass(count: usize) -> Self {
         // Radius and height, from the foot's middle outside up to the rim and inside down to the bowl's bottom.
         const PROFILE: [[f64; 2]; 14] = [

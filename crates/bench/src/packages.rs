@@ -1,7 +1,7 @@
 //! `rayfold-bench packages`: the packages for Lambda make the GIF that this machine's functions make, byte for byte.
 //!
-//! Each program answers the local invoker, and a small animation goes from the store built in to its GIF. Programs for
-//! another kind of machine are emulated by qemu.
+//! Each program answers the local invoker, and a small animation is made from the built-in store to its GIF. Programs
+//! for another kind of machine are emulated by qemu.
 
 use std::fs;
 use std::io::Read as _;
@@ -77,8 +77,8 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Writes the program of each package into a folder, by the names that the invoker expects. Where they are for another
-/// kind of machine, those are scripts that emulate it.
+/// Writes the program of each package into a folder, with the names that the invoker expects. Programs for another kind
+/// of machine are wrapped in scripts that emulate it.
 fn unpack(packages: &Path, machine: &str, into: &Path) -> Result<()> {
     for function in Function::ALL {
         let zip = packages.join(function.binary()).with_extension("zip");

@@ -1,8 +1,8 @@
-//! `rayfold-bench paths`: checks that pictures in which light goes round are the expectation that the language defines.
+//! `rayfold-bench paths`: checks that pictures with indirect light have the expectation that the language defines.
 //!
-//! The pixels of a picture are averaged over blocks. The oracle estimates the same means by independent paths, in the most
-//! direct way: each ray that a hit sends on is followed, however faint, and directions are drawn by other formulas than the
-//! tracer's. A mean that differs by more than chance allows is a bias.
+//! The pixels of a picture are averaged over blocks. The oracle estimates the same means by independent paths, in the
+//! most direct way: it follows each ray that a hit spawns, however faint, and draws directions by other formulas than
+//! the tracer's. A mean that differs by more than chance allows is a bias.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -38,7 +38,7 @@ pub struct Args {
 const SIZE: (u32, u32) = (64, 48);
 const BLOCKS: (u32, u32) = (4, 3);
 
-/// A mean is dark enough if its pixels are not clamped.
+/// The brightness below which a mean has no clamped pixels.
 const CLAMPED: f64 = 0.8;
 
 const ROOM: &str = "Look 0 1 3.4 0 1 0 50
@@ -67,8 +67,8 @@ const WINDOW: &str = "Look 0 1 3.4 0 1 0 50\nMaterial white diffuse .75 .75 .75\
      Box -1.1 2 -1.1 1.1 2.1 3.6 white\nBox -1.1 0 3.5 1.1 2 3.6 white\nBox -1.1 0 -1.1 -1 .6 3.6 red\n\
      Box -1.1 1.5 -1.1 -1 2 3.6 red\nBox -1.1 .6 -1.1 -1 1.5 -.6 red\nBox -1.1 .6 .3 -1 1.5 3.6 red\n";
 
-/// Names, settings, and objects after those of a room or of an open place. Nothing in them is brighter than 1: a picture clamps
-/// its pixels, and the oracle its paths not.
+/// Names, settings, and objects after those of a room or of an open place. Nothing in them is brighter than 1, because
+/// a picture clamps its pixels, but the oracle does not clamp its paths.
 const SCENES: [(&str, &str, &str, &str); 12] = [
     ("a room under a hole", "Indirect 3\nBackground .9 1 1", ROOM, "Sphere .35 -.4 .35 -.3 white"),
     (
@@ -126,12 +126,12 @@ const SCENES: [(&str, &str, &str, &str); 12] = [
     ),
 ];
 
-/// The means of a block, by the oracle.
+/// The means of a block, estimated by the oracle.
 struct Block {
     mean: DVec3,
     /// The standard deviation of one path.
     deviation: DVec3,
-    /// That of the mean of its three channels, which vary together.
+    /// The standard deviation of the mean of its three channels, which vary together.
     deviation_of_mean: f64,
 }
 
@@ -143,7 +143,7 @@ fn scene(settings: &str, before: &str, things: &str) -> Result<Scene> {
     scene.with_context(|| format!("{:?}", parsed.diagnostics))
 }
 
-/// Estimates the mean of a block by so many paths.
+/// Estimates the mean of a block by this many paths.
 fn by_paths(scene: &Scene, (column, row): (u32, u32), paths: u32) -> Block {
     let dice = RefCell::new(Rng::with_seed(u64::from(1 + column + BLOCKS.0 * row)));
     let (width, height) = (f64::from(SIZE.0 / BLOCKS.0), f64::from(SIZE.1 / BLOCKS.1));
@@ -167,7 +167,7 @@ fn by_paths(scene: &Scene, (column, row): (u32, u32), paths: u32) -> Block {
     Block { mean, deviation: variance.map(f64::sqrt), deviation_of_mean: variance_of_mean.max(0.0).sqrt() }
 }
 
-/// Returns the means of all blocks of a picture with so many samples.
+/// Returns the means of all blocks of a picture with these samples.
 fn drawn(scene: &Scene, samples: Samples) -> Result<Vec<DVec3>> {
     let scene = Scene { samples, ..scene.clone() };
     let options = RenderOptions::default();
@@ -191,7 +191,7 @@ struct Compared {
     squares: f64,
     /// The largest of them.
     worst: f64,
-    /// The mean difference in levels of the blocks of which all channels count, and its standard error.
+    /// The mean difference in levels over the blocks whose channels all count, and its standard error.
     bias: f64,
     error: f64,
 }
@@ -258,7 +258,8 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 impl Compared {
-    /// Compares a scene's picture with so many paths of the oracle a block. Returns also the oracle's means.
+    /// Compares a scene's picture with the oracle, which uses this many paths per block. Also returns the oracle's
+    /// means.
     fn of(scene: &Scene, samples: Samples, paths: u32) -> Result<(Self, Vec<Block>)> {
         let blocks: Vec<Block> = (0..BLOCKS.0 * BLOCKS.1)
             .into_par_iter()

@@ -53,7 +53,7 @@ pub(crate) fn columns(
     draw_columns(path, labels, names, lines, series).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// Draws courses of shares in percent over a linear axis from 0 to `end`, and the points that they should be left of.
+/// Draws cumulative shares in percent over a linear axis from 0 to `end`, and the points that should be to their right.
 pub(crate) fn shares(
     path: &Path,
     labels: &Labels,

@@ -57,7 +57,7 @@ const SIZES: [(u64, u64, Duration); 10] = [
 /// The rows by places: frames, and places for both functions.
 const BY_PLACES: ([u64; 4], [usize; 6]) = ([10, 50, 300, 1_000], [1, 2, 4, 10, 100, 1_000]);
 
-/// Worlds of which each of these rows is the mean.
+/// The number of worlds over which each of these rows is a mean.
 const WORLDS: u64 = 5;
 
 /// Options of `rayfold-bench scale`.

@@ -58,7 +58,7 @@ const HELLO: Subject = Subject {
     is_static: false,
 };
 
-/// The most milliseconds from the pointer to the canvas for 95 % of the moves.
+/// The maximum milliseconds from the pointer to the canvas for 95 % of the moves.
 const LATE: f64 = 25.0;
 
 /// The goals of the program's page.
@@ -78,7 +78,7 @@ impl Subject {
 struct Goals {
     /// The least number of pictures per second.
     rate: f64,
-    /// The most milliseconds from the pointer to the canvas for 95 % of the moves.
+    /// The maximum milliseconds from the pointer to the canvas for 95 % of the moves.
     late: Option<f64>,
     /// The most milliseconds to the first picture.
     first: f64,
@@ -152,7 +152,7 @@ impl Run {
         f64::from(self.pictures) / self.seconds
     }
 
-    /// Returns the latency that this share of all latencies is below.
+    /// Returns the latency below which this share of all latencies is.
     fn quantile(&self, share: f64) -> f64 {
         let mut waits = self.waits.clone();
         waits.sort_by(f64::total_cmp);

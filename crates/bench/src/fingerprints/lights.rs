@@ -1,5 +1,5 @@
-//! Scripts for each way in which indirect light is guided: to what glows, to windows, and to the sun of a sky's picture.
-//! Few random scripts have such light.
+//! Scripts for each way in which indirect light is guided: towards glowing objects, windows, and the sun in a sky's
+//! picture. Few random scripts have such light.
 
 /// Walls and the ceiling of a room with a window, of this material.
 macro_rules! walls {

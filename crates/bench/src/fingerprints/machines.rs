@@ -31,7 +31,7 @@ pub(super) const IN_A_LINE: u64 = 100;
 /// The scripts that a process draws.
 const IN_A_PROCESS: usize = 25;
 
-/// Arguments of Cargo for a program that is sooner built.
+/// Arguments of Cargo for a program that is built sooner.
 const SOONER: [&str; 4] = [
     "--config",
     "profile.release.opt-level=0",
@@ -62,9 +62,9 @@ struct Batch {
     scripts: Vec<(String, String)>,
 }
 
-/// Draws the examples, guided light and the random scripts of these seeds, and compares them with the table. From another
-/// seed than 1 on it draws random scripts alone. A slice is what takes other machines little time: all but the examples, and
-/// not on this machine.
+/// Draws the examples, guided light and the random scripts of these seeds, and compares them with the table. If the
+/// seeds do not begin at 1, it draws only random scripts. A slice omits the examples and this machine, so it takes
+/// little time.
 ///
 /// # Errors
 /// Fails if a picture differs, or if a script cannot be drawn.
@@ -87,7 +87,7 @@ pub(super) fn check(seeds: Range<u64>, machines: &[Machine], is_slice: bool) -> 
     Ok(())
 }
 
-/// Writes the table anew.
+/// Rewrites the table.
 ///
 /// # Errors
 /// Fails if a script cannot be drawn, or the file cannot be written.
@@ -223,8 +223,8 @@ impl Machine {
         }
     }
 
-    /// Returns the target of the compiler, and its flags. WebAssembly begins with a gibibyte: where its memory grew while it drew, Node
-    /// 20 crashed.
+    /// Returns the target of the compiler, and its flags. WebAssembly begins with a gibibyte of memory, because Node 20
+    /// crashed when the memory grew during drawing.
     const fn target(self) -> (&'static str, &'static str) {
         match self {
             Self::Aarch64 => ("aarch64-unknown-linux-gnu", ""),
@@ -306,7 +306,7 @@ impl Machine {
         Ok(drawn)
     }
 
-    /// Builds the program. Optimised less it draws the same, and is sooner built.
+    /// Builds the program. With less optimisation it draws the same pictures and is built sooner.
     fn build(self, is_slice: bool) -> Result<PathBuf> {
         let (target, flags) = self.target();
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target").join(self.name());

@@ -1,9 +1,9 @@
-//! `rayfold-bench metamorphic`: random scenes of all kinds, each against what must show the same.
+//! `rayfold-bench metamorphic`: random scenes of all kinds, each compared with scenes that must show the same picture.
 //!
-//! A scene is drawn as users get it (`auto`), and so is what a relation makes of it: scaled by a power of two,
-//! turned by right angles, its objects in another order, taken apart, put into groups. Where two pixels differ, the oracle says
-//! of both whether they are right in their scene: what is right to a sixteenth of a pixel in both is explained. The plain
-//! tracer is one relation more. Everything random comes from the seed of the scene.
+//! A scene is drawn as users get it (`auto`). So is each variant that a relation makes of it: scaled by a power of two,
+//! turned by right angles, its objects in another order, taken apart, or put into groups. Where two pixels differ, the
+//! oracle checks both, each in its own scene. The difference is explained if both are right to a sixteenth of a pixel.
+//! The plain tracer is one more relation. Everything random comes from the seed of the scene.
 
 mod placed;
 mod relations;
@@ -37,28 +37,28 @@ pub struct Args {
     check: bool,
 }
 
-/// Seeds of a relation that are told one by one.
+/// The number of seeds that are listed one by one for each relation.
 const TOLD: usize = 10;
 
-/// What a relation found.
+/// The findings of a relation.
 #[derive(Clone, Debug, Default)]
 struct Found {
     scenes: usize,
     pixels: usize,
-    /// Pixels that are not the same.
+    /// The number of pixels that are not the same.
     different: usize,
-    /// Pixels off by more than 2 levels.
+    /// The number of pixels off by more than 2 levels.
     off: usize,
-    /// Those of them that are wrong in one of the scenes.
+    /// The number of those pixels that are wrong in one of the scenes.
     unexplained: usize,
-    /// Where these are.
+    /// The seeds of the scenes with such pixels.
     seeds: Vec<u64>,
 }
 
-/// Draws all, prints the table and writes the report.
+/// Draws all scenes, prints the table and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be drawn, a pixel is not explained, or the report cannot be written.
+/// Fails if a scene cannot be drawn, a pixel is not explained, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     if !args.check {
         args.output.prepare()?;
@@ -97,7 +97,7 @@ fn add(sum: &mut [Found], found: Vec<Found>) {
     }
 }
 
-/// The scene of a seed in all relations that it can be in.
+/// Compares the scene of a seed in all relations that apply to it.
 fn compare(seed: u64) -> Result<Vec<Found>> {
     let (kind, scene) = random_scene(seed)?;
     let draw = |scene: &Scene| Ok::<_, anyhow::Error>(render(scene, &RenderOptions::default())?);
@@ -198,7 +198,8 @@ fn report(args: &Args, found: &[Found]) -> Result<String> {
 mod tests {
     use super::*;
 
-    /// The scene of a seed, in the relation of groups: of how many it is one, and pixels that differ.
+    /// Compares the scene of a seed in the relation of groups. Returns the number of scenes (0 or 1), and that of
+    /// unexplained pixels.
     fn in_groups(seed: u64) -> (usize, usize) {
         let found = compare_all(seed..seed + 1).unwrap();
         let groups = RELATIONS.iter().position(|relation| relation.name == "groups").unwrap();
@@ -217,13 +218,13 @@ mod tests {
         }
     }
 
-    /// The eye was put on the other side of a body of a group by the roundings of the group's place.
+    /// Rounding the place of a group put the eye on the other side of a body in the group.
     #[test]
     fn an_eye_in_the_last_bit_of_a_surface_of_a_group_is_on_the_right_side() {
         assert_eq!(in_groups(5_000_003), (1, 0));
     }
 
-    /// A triangle of size 1e-20 at the eye lost its area where the place of its group was added to its corners.
+    /// A triangle of size 1e-20 at the eye lost its area when the place of its group was added to its corners.
     #[test]
     fn a_tiny_triangle_of_a_group_at_the_eye_is_seen() {
         assert_eq!(in_groups(20_240_977), (1, 0));

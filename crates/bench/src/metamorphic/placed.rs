@@ -1,6 +1,7 @@
-//! Objects moved, turned by right angles and scaled, their numbers worked out here: what groups are compared with.
+//! Objects that are moved, turned by right angles and scaled, with numbers that are computed here. Groups are compared
+//! with them.
 //!
-//! It knows nothing of how the tracer writes groups out.
+//! This module does not know how the tracer expands groups.
 
 use anyhow::{Result, ensure};
 use glam::{DMat3, DVec3};
@@ -23,7 +24,7 @@ fn signed_axes() -> [DVec3; 6] {
     [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z]
 }
 
-/// t + s·R·p, written out.
+/// Returns t + s·R·p.
 pub(super) fn place(placement: &Placement, p: DVec3) -> DVec3 {
     placement.translation() + placement.scale() * turn(placement, p)
 }
@@ -35,16 +36,16 @@ pub(super) fn turn(placement: &Placement, p: DVec3) -> DVec3 {
     rotation.x_axis * p.x + rotation.y_axis * p.y + rotation.z_axis * p.z
 }
 
-/// The object where a placement by right angles puts it.
+/// Returns an object after a placement by right angles.
 ///
 /// # Errors
-/// When it is an instance, or a number leaves its range.
+/// Fails for an instance, or if a number leaves its range.
 pub(super) fn written_out(object: &Object, by: &Placement) -> Result<Object> {
     ensure!(!matches!(object, Object::Instance(_)), "an object of a group");
     Ok(object.moved(&WrittenOut(by), object.material().clone())?)
 }
 
-/// A placement by right angles, its numbers worked out here.
+/// A placement by right angles that is applied to the numbers of an object.
 struct WrittenOut<'a>(&'a Placement);
 
 impl Motion for WrittenOut<'_> {

@@ -1,4 +1,4 @@
-//! What shows the same picture as a scene: one function a relation.
+//! Scenes that show the same picture as a given scene: one function per relation.
 
 use std::sync::Arc;
 
@@ -16,23 +16,23 @@ use crate::hard_cases::{fog_scaled, scaled};
 /// A relation between scenes.
 pub(super) struct Relation {
     pub(super) name: &'static str,
-    /// What it does, as the report tells it.
+    /// Its description in the report.
     pub(super) about: &'static str,
     /// Whether pictures are the same bit for bit.
     pub(super) is_exact: bool,
     pub(super) other: Other,
 }
 
-/// A scene that must show the same; none if the relation says nothing of the scene.
+/// A scene that must show the same picture; `None` if the relation does not apply.
 type Related = Result<Option<Scene>>;
 
-/// What a scene is compared with.
+/// The scenes that a relation compares.
 pub(super) enum Other {
     /// The scene itself, drawn by the plain tracer.
     Plain,
     /// Another scene.
     Made(fn(&Scene, &mut Rng) -> Related),
-    /// Two others, with each other.
+    /// Two other scenes, with each other.
     Both(fn(&Scene, &mut Rng) -> Result<Option<[Scene; 2]>>),
 }
 
@@ -94,7 +94,8 @@ fn scaled_by_two(scene: &Scene, rng: &mut Rng) -> Related {
     scaled(scene, 2f64.powi(rng.i32(-60..=60))).map(Some)
 }
 
-/// The coordinates of boxes around the objects are not all of a scene's lengths, but are of about their size.
+/// Returns lengths of the scene: the coordinates of boxes around the objects. They are not all of its lengths, but have
+/// about their size.
 fn lengths(scene: &Scene) -> Vec<f64> {
     let eye = match &scene.camera {
         Camera::Look(look) => look.eye(),
@@ -122,7 +123,7 @@ fn lengths(scene: &Scene) -> Vec<f64> {
     std::iter::once(eye).chain(lamps).chain(of_objects).flat_map(|v| v.to_array()).collect()
 }
 
-/// A rotation that leaves the height alone if the sky depends on that.
+/// Returns a rotation, which keeps the height if the sky depends on it.
 fn right_turn(scene: &Scene, rng: &mut Rng) -> DMat3 {
     let mut turns = right_turns();
     if scene.one_color().is_none() {
@@ -141,7 +142,7 @@ fn turned(scene: &Scene, rng: &mut Rng) -> Related {
     Ok(Some(turned))
 }
 
-/// All objects as those of a group.
+/// Returns the scene with all its objects in one group.
 fn in_group(scene: &Scene, placement: &Placement) -> Result<Vec<Object>> {
     let own = Arc::new(*placement);
     scene
@@ -159,7 +160,7 @@ fn in_group(scene: &Scene, placement: &Placement) -> Result<Vec<Object>> {
         .collect()
 }
 
-/// The scene without its objects, camera and lights moved along.
+/// Returns the scene without its objects, with camera and lights moved.
 fn seen_along(scene: &Scene, by: &Placement) -> Result<Scene> {
     let mut moved = scene.clone();
     moved.objects = Vec::new().into();
@@ -236,7 +237,7 @@ fn taken_apart(scene: &Scene, _: &mut Rng) -> Related {
     Ok(Some(apart))
 }
 
-/// The scene as a frame among others, and that frame alone.
+/// Returns the scene as a frame among others, and that frame alone.
 fn split(scene: &Scene, _: &mut Rng) -> Related {
     // What is turned is written as angles, which round.
     if scene.objects.iter().any(|object| matches!(object, Object::Instance(_))) {
@@ -249,7 +250,8 @@ fn split(scene: &Scene, _: &mut Rng) -> Related {
     Ok(Some(frame))
 }
 
-/// The script with three frames, in which lights, background and balls change; the second is the script's own.
+/// Returns the script with three frames, in which lights, background and balls change. The second frame is the script's
+/// own.
 fn moving(text: &str) -> Result<Script> {
     let mut moving = String::new();
     for line in text.lines() {

@@ -1,8 +1,8 @@
 //! The parts of the tracer that a build can be without, and which builds are made.
 //!
-//! A part of version 1 has a build of its own, without it. Those of version 2 are left out several at a time, in such a way that
-//! for each scene and each part that it does not use there is a build without the part that draws the scene: a build for each
-//! of so many parts would take too long for what every change must pass.
+//! Each part of version 1 has a build without it. Parts of version 2 are left out several at a time, because a build
+//! for each would take too long for a check that every change must pass. Still, for each scene and each part that it
+//! does not use, one of these builds lacks the part and draws the scene.
 
 use glam::DVec3;
 use rayfold_scene::{Light, Object, Scene};
@@ -11,7 +11,8 @@ use rayfold_tracer::parts::{PARTS, is_turned_box};
 /// Returns whether a scene uses a part.
 type IsUsed = fn(&Scene) -> bool;
 
-/// The parts of version 1, and those that all shapes of version 2 share: cargo features, and the scenes that use them.
+/// The parts of version 1, and those that all shapes of version 2 share: their cargo features, and the scenes that use
+/// them.
 const OF_VERSION_1: [(&str, IsUsed); 7] = [
     ("boxes", |scene| has(scene, |o| matches!(o, Object::Cuboid(_)))),
     ("triangles", |scene| has(scene, |o| matches!(o, Object::Triangle(_) | Object::Mesh(_)))),
@@ -29,7 +30,7 @@ pub(crate) fn parts() -> impl Iterator<Item = (&'static str, IsUsed)> {
     OF_VERSION_1.into_iter().chain(PARTS.iter().map(|part| (part.feature, part.is_used)))
 }
 
-/// All of version 2.
+/// All parts of version 2.
 pub(super) const VERSION_2: &[&str] = &[
     "beyond",
     "planes",
@@ -58,9 +59,10 @@ pub(super) const VERSION_2: &[&str] = &[
     "paths",
 ];
 
-/// Halves of version 2, or less: whichever two of its parts are taken, there is one that has the first and not the second.
-/// Six are enough for 20 parts, and five are not for 16 (Spencer, "Minimal completely separating systems", 1970). Some of the six are
-/// here in parts: `planes` and `highlights` together cost discs 0.82 % and lamplight 0.57 %, where a part may cost 0.5 %.
+/// Sets of parts of version 2, each with at most half of them. For any two parts, one of the sets has the first and not
+/// the second. Six sets are enough for 20 parts, and five are not enough for 16 (Spencer, "Minimal completely
+/// separating systems", 1970). Some of the six are split further: leaving out `planes` and `highlights` together would
+/// cost discs 0.82 % and lamplight 0.57 %, where a part may cost 0.5 %.
 const OF_VERSION_2: [&[&str]; 10] = [
     &["planes", "groups", "meshes", "pictures"],
     &["planes", "discs", "capsules", "lenses"],
@@ -102,14 +104,14 @@ const OF_VERSION_2: [&[&str]; 10] = [
 
 /// A build of the tracer.
 pub(super) struct Build {
-    /// What it is without, for people.
+    /// The parts that it lacks, for people.
     pub(super) name: String,
     pub(super) without: Vec<&'static str>,
-    /// Whether it is there for scenes of version 2, and not for those of version 1.
+    /// Whether it is built for scenes of version 2, and not for those of version 1.
     pub(super) is_of_version_2: bool,
 }
 
-/// All builds but the whole one.
+/// Returns all builds but the whole one.
 pub(super) fn builds() -> Vec<Build> {
     // They are compiled in half the time without version 2, which the scenes that they draw do not use either.
     let of_version_1 = ["boxes", "triangles", "mirrors", "shadows", "tree"].map(|part| Build {
@@ -126,7 +128,7 @@ pub(super) fn builds() -> Vec<Build> {
     of_version_1.into_iter().chain([all]).chain(of_version_2).collect()
 }
 
-/// Whether a scene uses the part of this name.
+/// Returns whether a scene uses the part of this name.
 pub(super) fn uses(feature: &str, scene: &Scene) -> bool {
     parts().any(|(part, is_used)| part == feature && is_used(scene))
 }
@@ -144,7 +146,7 @@ pub(super) fn is_mirror(object: &Object) -> bool {
     object.material().mirror() != DVec3::ZERO || pattern.is_some_and(|p| p.other.mirror() != DVec3::ZERO)
 }
 
-/// Skies, lamps, finishes, and shapes with axes of their own.
+/// Returns whether a scene has skies, lamps, finishes, or shapes with axes of their own.
 fn has_more_than_version_1(scene: &Scene) -> bool {
     let is_old = |object: &Object| match object {
         Object::Sphere(_) | Object::Cuboid(_) | Object::Triangle(_) => true,
@@ -160,7 +162,7 @@ fn has_more_than_version_1(scene: &Scene) -> bool {
         || scene.objects.iter().any(|object| !is_old(object) || object.material().finish().is_some())
 }
 
-/// Nothing is in the light of a ball alone.
+/// Returns whether a scene is a single ball, which has nothing in its light.
 fn is_one_ball(scene: &Scene) -> bool {
     matches!(scene.objects[..], [Object::Sphere(_)])
 }

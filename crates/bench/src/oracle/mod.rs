@@ -63,7 +63,7 @@ pub fn cover(scene: &Scene, i: u32, j: u32) -> f64 {
     1.0 - seen_along(scene, &line, &Path::of_camera(scene, None)).clear
 }
 
-/// Returns the colour of a path of light through fractional pixel indices, unclamped: one sample, by the dice, of the
+/// Returns the colour of a path of light through fractional pixel indices, unclamped. It is one random sample of the
 /// expectation that the language defines. Lights are points.
 pub fn path_at(scene: &Scene, x: f64, y: f64, dice: &RefCell<Rng>) -> DVec3 {
     let line = Line::of_pixel(&scene.camera, scene.screen, x, y);
@@ -113,7 +113,7 @@ struct Path<'a> {
     /// The product of the absolute values of all factors.
     weight: Vector,
     has_met_glass: bool,
-    /// The share of the pixel that stays clear if the ray hits nothing; `None` for rays that see what is around.
+    /// The share of the pixel that stays clear if the ray hits nothing; `None` for rays that see the surroundings.
     clear: Option<f64>,
 }
 
@@ -162,7 +162,7 @@ fn seen_along(scene: &Scene, line: &Line, path: &Path<'_>) -> Seen {
     Seen { color, clear }
 }
 
-/// Returns what a hit sends back along the line.
+/// Returns the light that a hit sends back along the line.
 fn seen_at_hit(scene: &Scene, line: &Line, path: &Path<'_>, hit: &Hit) -> Seen {
     let object = &scene.objects[hit.object];
     let material = object.material();
@@ -257,10 +257,10 @@ fn seen_at_hit(scene: &Scene, line: &Line, path: &Path<'_>, hit: &Hit) -> Seen {
     Seen { color, clear: left_clear }
 }
 
-/// The rays that go on from a hit: their factors and directions, and the shares of the pixel that they leave clear.
+/// The rays that a hit spawns: their factors and directions, and the shares of the pixel that they leave clear.
 type Onwards = [Option<(Vector, Vector, Option<f64>)>; 2];
 
-/// Returns the rays that go on from a smooth surface.
+/// Returns the rays that a smooth surface spawns.
 fn from_surface(
     line: &Line,
     hit: &Hit,
@@ -291,7 +291,8 @@ fn from_surface(
     [Some((mirrored, reflected(&line.direction, &normal).unit(), None)), through]
 }
 
-/// Returns the rays that go on from a microfacet of a surface with this normal, which has been drawn with this weight.
+/// Returns the rays that a microfacet spawns, on a surface with this normal. The microfacet has been drawn with this
+/// weight.
 fn from_facet(
     line: &Line,
     hit: &Hit,
@@ -344,7 +345,8 @@ fn scattered(normal: &Vector, face: &Vector, dice: &RefCell<Rng>) -> Vector {
     Vector::from(direction - 2.0 * below * face).unit()
 }
 
-/// Returns the normal at which a ray goes on: that of the face if a ray would leave on the wrong side of it.
+/// Returns the normal at which a ray continues: that of the face if a ray would otherwise leave on the wrong side of
+/// it.
 fn onward_normal(line: &Line, normal: &Vector, hit: &Hit, object: &Object) -> Vector {
     if reflected(&line.direction, normal).dot(&hit.normal).sign() <= 0 {
         return hit.normal.clone();

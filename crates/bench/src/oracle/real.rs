@@ -34,7 +34,7 @@ impl Real {
         Self(self.0.sqrt(BITS, ROUNDING))
     }
 
-    /// Returns the real roots of a·t² + 2·b·t + c, of which one is exact where c is 0; a is greater than 0.
+    /// Returns the real roots of a·t² + 2·b·t + c, for a greater than 0. If c is 0, one root is exact.
     pub(super) fn roots(a: &Self, b: &Self, c: &Self) -> Vec<Self> {
         let discriminant = &(b * b) - &(a * c);
         if discriminant.sign() < 0 {

@@ -1,7 +1,7 @@
 //! Rough mirrors and rough glass, by other formulas than the tracer's.
 //!
-//! Normals of microfacets are drawn with the density of GGX times the cosine to the surface, and weighed by how visible they are.
-//! The numbers have the precision of `f64`: what is random has larger errors.
+//! Normals of microfacets are drawn with the density of GGX times the cosine to the surface, and weighed by how visible
+//! they are. The numbers have the precision of `f64`: the random parts have larger errors.
 
 use std::cell::RefCell;
 use std::f64::consts::TAU;

@@ -47,12 +47,12 @@ impl Family {
         }
     }
 
-    /// Returns whether the count is of pixels that are off, and not of dots at outlines.
+    /// Returns whether wrong pixels are counted, and not dots at outlines.
     pub(super) fn is_of_needles(self) -> bool {
         matches!(self, Self::Fan | Self::Grazing)
     }
 
-    /// A scene of the family.
+    /// Returns a scene of the family.
     pub(super) fn scene(self, rng: &mut Rng, (width, height): (u32, u32)) -> Result<Scene> {
         let mut objects = Vec::new();
         let mut eye = DVec3::new(within(rng, -2.0, 2.0), within(rng, 1.0, 3.0), 7.0);
@@ -139,7 +139,7 @@ fn matt(color: DVec3) -> Result<Material> {
 
 type Face = [DVec3; 3];
 
-/// A tetrahedron, a cube, an octahedron or an icosahedron.
+/// Returns a tetrahedron, a cube, an octahedron or an icosahedron.
 fn solid(rng: &mut Rng) -> Vec<Face> {
     match rng.u32(0..4) {
         0 => tetrahedron(),
@@ -189,7 +189,7 @@ fn add(objects: &mut Vec<Object>, faces: &[Face], rng: &mut Rng, at: DVec3, size
     Ok(())
 }
 
-/// Two triangles that send on a part of the light.
+/// Adds two triangles that may mirror a part of the light.
 fn floor(objects: &mut Vec<Object>, mirror: f64) -> Result<()> {
     let corner = |x: f64, z: f64| DVec3::new(9.0 * x, -1.7, 9.0 * z);
     let material = Material::new(DVec3::splat(0.4), DVec3::splat(0.3), DVec3::splat(mirror))?;
@@ -199,7 +199,7 @@ fn floor(objects: &mut Vec<Object>, mirror: f64) -> Result<()> {
     Ok(())
 }
 
-/// No floor, one, or one that mirrors.
+/// Adds no floor, a floor, or one that mirrors.
 fn some_floor(objects: &mut Vec<Object>, rng: &mut Rng) -> Result<()> {
     match rng.u32(0..3) {
         0 => Ok(()),
@@ -208,7 +208,7 @@ fn some_floor(objects: &mut Vec<Object>, rng: &mut Rng) -> Result<()> {
     }
 }
 
-/// Needles around a hub, each of a colour of its own: flat, or as the spokes of a shallow cone.
+/// Adds needles around a hub, each with its own colour: flat, or as the spokes of a shallow cone.
 fn fan(objects: &mut Vec<Object>, rng: &mut Rng) -> Result<()> {
     let count = (30.0 * 10f64.powf(within(rng, 0.0, 3.5))) as u32;
     let (radius, depth) = (within(rng, 0.5, 3.0), if rng.bool() { 0.0 } else { within(rng, 0.1, 1.0) });
@@ -225,7 +225,8 @@ fn fan(objects: &mut Vec<Object>, rng: &mut Rng) -> Result<()> {
     Ok(())
 }
 
-/// A plane of triangles or the top of a box with bodies on it, and an eye so far above; the gaze is level, or nearly.
+/// Makes a plane of triangles, or the top of a box, with bodies on it. The eye is only a little above it, and looks
+/// horizontally or nearly so.
 fn grazing(objects: &mut Vec<Object>, rng: &mut Rng, above: f64) -> Result<(DVec3, DVec3)> {
     if rng.bool() {
         for x in -4..4 {

@@ -1,9 +1,8 @@
-//! `rayfold-bench outlines`: dots at the outlines of bodies, as a person sees them, and pixels off at needles.
+//! `rayfold-bench outlines`: counts dots that people would see at the outlines of bodies, and wrong pixels at needles.
 //!
-//! `f32` places an outline some 0.0002 pixels off, which is invisible. What is visible is a dot: a pixel that has
-//! nothing to do with any pixel around it in the exact picture. So the count is of pixels of `auto` that are more
-//! than `SEEN` levels from each of the nine pixels that the `f64` kernels draw around them. Everything random comes
-//! from the seed of the scene.
+//! `f32` places an outline some 0.0002 pixels off, which is invisible. A dot is visible: a pixel that resembles no
+//! pixel around it in the exact picture. So a dot is a pixel of `auto` that is more than `SEEN` levels from each of the
+//! nine pixels that the `f64` kernels draw around it. Everything random comes from the seed of the scene.
 
 mod families;
 
@@ -42,34 +41,34 @@ pub struct Args {
 /// Columns and rows of a picture.
 const SIZE: (u32, u32) = (320, 240);
 
-/// Levels of a channel that are seen in a single pixel.
+/// The difference in levels of a channel that is visible in a single pixel.
 const SEEN: u8 = 16;
 
-/// Share of pixels off by more than 2 levels that is asked for, in percent: of all pictures, and of the worst.
+/// The goal: at most this share of pixels off by more than 2 levels, in percent: of all pictures, and of the worst.
 const MOST: (f64, f64) = (0.01, 1.0);
 
-/// Dots of a family that are listed individually.
+/// The maximum number of dots of a family that are listed individually.
 const MAX_LISTED: usize = 5;
 
 /// The findings in some scenes of a family.
 #[derive(Clone, Debug, Default)]
 struct Found {
     pictures: u64,
-    /// Pictures that `auto` draws in `f32`.
+    /// The number of pictures that `auto` draws in `f32`.
     single: u64,
     pixels: u64,
-    /// Pixels off by more than 2 levels.
+    /// The number of pixels off by more than 2 levels.
     off: u64,
-    /// The largest share of them in a picture.
+    /// The largest share of such pixels in a picture.
     worst: f64,
     /// The seed of the scene, column and row of each dot.
     dots: Vec<(u64, u32, u32)>,
 }
 
-/// Draws all, prints the table and writes the report.
+/// Draws all scenes, prints the table and writes the report.
 ///
 /// # Errors
-/// When a scene cannot be drawn, there is a dot, or the report cannot be written.
+/// Fails if a scene cannot be drawn, there is a dot, or the report cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     if !args.check {
         args.output.prepare()?;
@@ -114,7 +113,7 @@ fn replay(seed: u64) -> Result<()> {
     Ok(())
 }
 
-/// The family of a seed.
+/// Returns the family of a seed.
 fn family(seed: u64) -> usize {
     (seed % FAMILIES.len() as u64) as usize
 }
@@ -177,7 +176,8 @@ fn are_apart(a: &Rgb<u8>, b: &Rgb<u8>, levels: u8) -> bool {
     (0..3).any(|channel| a[channel].abs_diff(b[channel]) > levels)
 }
 
-/// Pixels that are more than [`SEEN`] levels from each of the nine around them in the exact picture: columns and rows from the top.
+/// Returns the pixels that are more than [`SEEN`] levels from each of the nine around them in the exact picture, as
+/// columns and rows from the top.
 pub(crate) fn dots(image: &RgbImage, exact: &RgbImage) -> Vec<(u32, u32)> {
     let (width, height) = exact.dimensions();
     let is_dot = |x: u32, y: u32| {
@@ -236,8 +236,8 @@ mod tests {
         assert_eq!(dots(&image, &exact), [(4, 3), (0, 5)]);
     }
 
-    /// A ray in a mirror or in the light passed another side of an outline than the exact one, because `f32`
-    /// had rounded its start.
+    /// A mirrored ray or a shadow ray passed an outline on the other side than the exact ray, because `f32` had rounded
+    /// its start.
     #[test]
     fn where_dots_were_there_are_none() {
         let crowds = [1_000_602, 1_001_490, 1_001_914, 1_002_074, 1_002_530];
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    /// A short slice of the command; `RAYFOLD_SEED` draws others.
+    /// Runs a short slice of the command; `RAYFOLD_SEED` chooses another.
     #[test]
     fn no_outline_of_a_body_has_a_dot_and_few_pixels_are_off() {
         let seed = std::env::var("RAYFOLD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(35);

@@ -1,27 +1,28 @@
-//! Times and errors of a way to draw a work.
+//! Times and errors of one way to draw a picture.
 
-/// A picture that was measured.
+/// A measured picture.
 #[derive(Clone, Copy)]
 pub(super) struct Point {
     pub(super) ms: f64,
-    /// Rays a pixel, where they are known.
+    /// Rays per pixel, if known.
     pub(super) rays: f64,
     pub(super) error: f64,
     /// The share of pixels off by more than 4 levels.
     pub(super) off: f64,
 }
 
-/// The time and the error of a way to draw a work.
+/// The times and errors of one way to draw a picture.
 pub(super) struct Curve {
     pub(super) work: &'static str,
-    /// Whose way it is, where it is not ours: of all its ways the best counts.
+    /// The peer whose way this is; `None` for ours. Of all ways of a peer the best counts.
     pub(super) peer: Option<&'static str>,
     pub(super) way: String,
     pub(super) points: Vec<Point>,
 }
 
 impl Curve {
-    /// The least time for an error, between neighbours on the curve by powers; none where it does not reach there.
+    /// Returns the least time for an error, interpolated between neighbouring points on logarithmic scales; `None` if
+    /// the curve does not reach the error.
     pub(super) fn time(&self, error: f64) -> Option<f64> {
         let mut points: Vec<(f64, f64)> = self.points.iter().map(|point| (point.ms, point.error)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -38,7 +39,7 @@ impl Curve {
     }
 }
 
-/// Our ways one by one, and each peer's all together.
+/// Returns our curves one by one, and those of each peer together.
 pub(super) fn gathered(curves: &[Curve], work: &str) -> Vec<Curve> {
     let mut gathered: Vec<Curve> = vec![];
     for Curve { work, peer, way, points } in curves.iter().filter(|curve| curve.work == work) {

@@ -1,4 +1,4 @@
-//! Patterned floors and scenes of all that the language has, drawn at random.
+//! Random patterned floors, and random scenes with all features of the language.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,8 @@ fn color(dice: &mut Rng, from: f64, to: f64) -> String {
     format!("{r:.3} {g:.3} {b:.3}")
 }
 
-/// A checkered or striped floor to the horizon, often seen by a lens, lit by a sun with an extent or without, with balls or not.
+/// Returns a checkered or striped floor to the horizon, often seen through a lens, lit by a sun with or without an
+/// extent, with or without balls.
 pub(super) fn floor(dice: &mut Rng, (width, height): (u32, u32)) -> String {
     let mut text = format!("Screen {width} {height}\nTone srgb\nBackground {}\n", color(dice, 0.2, 0.9));
     let (up, x, y, angle) =
@@ -41,7 +42,7 @@ const MATERIALS: &str = "Material dark ambient .05 .05 .1 diffuse .1 .1 .2\nMate
                          Material tile ambient .1 .1 .1 diffuse .7 .7 .7 checker .25 dark\n\
                          Material wood ambient .1 .05 0 diffuse .6 .4 .2 noise .15 dark\n";
 
-/// Objects of all shapes and materials on a floor, with any of lens, soft sun, lamp and `Tone srgb`.
+/// Returns objects of all shapes and materials on a floor, with any of lens, soft sun, lamp and `Tone srgb`.
 pub(super) fn scene(dice: &mut Rng, (width, height): (u32, u32)) -> String {
     let mut text = format!("Screen {width} {height}\n{MATERIALS}");
     if dice.bool() {

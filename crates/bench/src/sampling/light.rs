@@ -1,4 +1,4 @@
-//! `rayfold-bench sampling --light`: pictures in which light goes round, beside Mitsuba: the time to an error.
+//! `rayfold-bench sampling --light`: the time to an error of pictures with indirect light, compared with Mitsuba.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -20,10 +20,10 @@ use crate::speed;
 struct Work {
     name: &'static str,
     about: &'static str,
-    /// The errors in levels at which times are compared, and how many times Mitsuba's speed is asked for.
+    /// The errors in levels at which times are compared, and the goal for each as a multiple of Mitsuba's speed.
     errors: &'static [f64],
     asked: f64,
-    /// Differences of Mitsuba's picture.
+    /// The differences of Mitsuba's picture from ours.
     differs: &'static str,
     script: fn() -> String,
 }
@@ -119,7 +119,7 @@ const WORKS: [Work; 5] = [
 
 const FLOOR: &str = "Box -30 -1 -30 30 0 30 0 0 0 .6 .6 .55\n";
 
-/// A room of 36 and more objects with a camera inside.
+/// Returns a room of 36 or more objects with a camera inside.
 fn room(lights: &str, wall: &str) -> String {
     let mut text = format!(
         "Indirect 4\n{lights}Look .9 1.5 2.8 -.3 1 -1 62\nMaterial white diffuse .75 .75 .75\n\
@@ -176,7 +176,7 @@ impl Work {
     }
 }
 
-/// The most samples of a pixel, and an error, which also depends on the work.
+/// Returns the maximum number of samples of a pixel, and an error, which also depends on the work.
 fn limits(work: &Work) -> Vec<(&'static str, (u32, f64))> {
     let mut limits: Vec<_> = [4, 16, 64, 256].map(|count| ("uniform", (count, 0.0))).into();
     let least = work.errors.iter().copied().fold(f64::INFINITY, f64::min);
@@ -184,19 +184,19 @@ fn limits(work: &Work) -> Vec<(&'static str, (u32, f64))> {
     limits
 }
 
-/// A work that was drawn by us and, where it is here, by Mitsuba.
+/// A work that we have drawn, and Mitsuba if it is installed.
 struct Compared {
     work: &'static Work,
     curves: Vec<Curve>,
     peer: Option<Truth>,
-    /// The mean level of the picture, by us.
+    /// The mean level of our picture.
     level: f64,
 }
 
-/// Measures, and writes the report.
+/// Measures and writes the report.
 ///
 /// # Errors
-/// When a picture cannot be drawn or a file not written.
+/// Fails if a picture cannot be drawn, or a file cannot be written.
 pub(super) fn run(args: &Args) -> Result<()> {
     let size = (args.width, args.width * 3 / 4);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

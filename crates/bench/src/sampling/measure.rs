@@ -1,4 +1,4 @@
-//! A picture of means, measured: its time, its rays, its error.
+//! The measurements of a picture with several samples per pixel: its time, rays and error.
 
 use anyhow::{Context, Result};
 use glam::DVec3;
@@ -49,20 +49,20 @@ pub struct Args {
 /// The number of times that a picture is drawn; the shortest time counts.
 pub(super) const ROUNDS: u32 = 3;
 
-/// A picture that was drawn.
+/// The measurements of a drawn picture.
 pub(super) struct Drawn {
     pub(super) effect: &'static str,
     pub(super) way: &'static str,
     pub(super) asked: Samples,
-    /// Processor time, of preparing and drawing.
+    /// The processor time of preparing and drawing, in seconds.
     pub(super) seconds: f64,
-    /// From the camera, a pixel.
+    /// The number of camera rays per pixel.
     pub(super) rays: f64,
-    /// Root mean square over pixels and channels, in levels before rounding.
+    /// The root mean square error over pixels and channels, in levels before rounding.
     pub(super) error: f64,
-    /// The share of pixels of which a channel is off by more than 4 levels.
+    /// The share of pixels with a channel off by more than 4 levels.
     pub(super) off: f64,
-    /// The root mean square of errors of blocks of 4 x 4 pixels, which noise leaves small and bias does not.
+    /// The root mean square error of means over blocks of 4 x 4 pixels. Noise makes it small; bias does not.
     pub(super) of_blocks: f64,
 }
 
@@ -73,12 +73,12 @@ pub(super) struct Agreement {
     pub(super) mean_square: f64,
     /// The largest difference in standard errors.
     pub(super) largest: f64,
-    /// Root mean squares in levels, of the difference and of the standard errors.
+    /// The root mean squares, in levels, of the difference and of the standard errors.
     pub(super) difference: f64,
     pub(super) standard_error: f64,
 }
 
-/// The picture of a scene, before it becomes levels.
+/// Returns the picture of a scene before it is converted to levels.
 pub(super) fn means(picture: &Picture, samples: Samples, options: &RenderOptions) -> Result<Means> {
     let scene = Scene { samples, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
@@ -92,7 +92,7 @@ pub(super) fn truth(picture: &Picture, samples: u32) -> Result<Means> {
     means(picture, Samples::new(samples, 0.0)?, &options)
 }
 
-/// Processor time of preparing and drawing, in seconds: the shortest of several.
+/// Returns the processor time of preparing and drawing, in seconds: the shortest of several.
 pub(super) fn shortest(picture: &Picture, asked: Samples, options: &RenderOptions) -> Result<f64> {
     let scene = Scene { samples: asked, ..picture.scene.clone() };
     let after = |frames| picture.after(frames);
@@ -135,7 +135,7 @@ pub(super) fn root_mean_square(errors: &[DVec3]) -> f64 {
     (errors.iter().map(|e| e.length_squared()).sum::<f64>() / (3 * errors.len()) as f64).sqrt()
 }
 
-/// The means of blocks of 4 x 4 pixels.
+/// Returns the means of blocks of 4 x 4 pixels.
 pub(super) fn blocks(errors: &[DVec3], width: usize) -> Vec<DVec3> {
     let rows: Vec<&[DVec3]> = errors.chunks_exact(width).collect();
     let mut blocks = vec![];

@@ -1,7 +1,7 @@
-//! Mitsuba 3 as a peer, where Python has it: the scene for its path tracer, and the time and the
-//! error of its pictures.
+//! Mitsuba 3 as a peer, if Python has it: the scene for its path tracer, and the time and the error of its pictures.
 //!
-//! Its kernels need a newer LLVM than some systems have: 19 does, 15 lacks an instruction. `DRJIT_LIBLLVM_PATH` says where.
+//! Its kernels need a newer LLVM than some systems have: 19 is enough, 15 lacks an instruction. `DRJIT_LIBLLVM_PATH`
+//! names the library.
 
 use std::f64::consts::PI;
 
@@ -20,28 +20,28 @@ pub(super) const NAME: &str = "Mitsuba";
 
 const PROGRAM: &str = include_str!("mitsuba_peer.py");
 
-/// Samples of its truth.
+/// The number of samples of its truth.
 const TRUTH: u32 = 2048;
 
 /// The results of Mitsuba's samplers.
 pub(super) struct Drawn {
-    /// One of each sampler.
+    /// One curve per sampler.
     pub(super) curves: Vec<Curve>,
     pub(super) truth: Truth,
 }
 
-/// The picture that its errors are from.
+/// The picture from which its errors are measured.
 pub(super) struct Truth {
     pub(super) version: String,
     pub(super) samples: u32,
-    /// Half of the root mean square by which its halves differ.
+    /// Half of the root mean square difference of its two halves.
     pub(super) error: f64,
     /// Its mean level.
     pub(super) level: f64,
 }
 
-/// Draws the scene with each of its samplers until one has an error of `enough` levels. With `pairs` its errors are from
-/// pairs of pictures, without from a truth with many samples.
+/// Draws the scene with each of its samplers until one has an error of `enough` levels. With `pairs`, errors are
+/// computed from pairs of pictures; without, from a truth with many samples.
 pub(super) fn draw(work: &'static str, scene: &Scene, enough: f64, pairs: bool) -> Result<Drawn> {
     let answer = ask(PROGRAM, &describe(scene, enough, pairs)?)?;
     eprint!("{answer}");
@@ -73,8 +73,8 @@ fn read(work: &'static str, answer: &str) -> Option<Drawn> {
     Some(Drawn { curves, truth })
 }
 
-/// The scene in numbers: light, matter and camera as they are here. Pixels are square there; they are higher by a
-/// thousandth here.
+/// Describes the scene in numbers: light, material and camera as in this project. Mitsuba's pixels are square; ours are
+/// higher by a thousandth.
 pub(super) fn describe(scene: &Scene, enough: f64, pairs: bool) -> Result<Value> {
     let seen = seen(scene)?;
     let bounces = match scene.indirect.bounces() {
@@ -104,12 +104,12 @@ pub(super) fn describe(scene: &Scene, enough: f64, pairs: bool) -> Result<Value>
     }))
 }
 
-/// A camera there.
+/// Mitsuba's camera.
 struct Seen {
     eye: DVec3,
     target: DVec3,
     up: DVec3,
-    /// Half of what it sees from side to side, for each unit of distance.
+    /// Half of the width that it sees, per unit of distance.
     half: f64,
 }
 
@@ -132,7 +132,7 @@ fn seen(scene: &Scene) -> Result<Seen> {
     }
 }
 
-/// A colour, or the colours of a panorama.
+/// Returns a colour, or the colours of a panorama.
 fn sky(scene: &Scene) -> Value {
     if let Some(color) = scene.one_color() {
         return json!(color.to_array());

@@ -1,7 +1,9 @@
-//! `rayfold-bench sampling`: the error of pictures whose pixels are means, against the time and the rays that they take.
+//! `rayfold-bench sampling`: the error of pictures with several samples per pixel, by the time and the rays that they
+//! take.
 //!
-//! The truth of each picture is computed by the same kernels in `f64` with many samples, and held against independent random
-//! samples of the plain tracer, which share nothing with them but the words of the language.
+//! The truth of each picture is computed by the same kernels in `f64` with many samples. It is compared with
+//! independent random samples of the plain tracer, which shares nothing with the kernels but the definition of the
+//! language.
 
 mod curve;
 mod drawn_at_random;
@@ -25,16 +27,16 @@ pub use self::measure::Args;
 use self::measure::{Agreement, measure, root_mean_square, truth};
 use self::scenes::{EFFECTS, Effect};
 
-/// Rays a pixel of pictures that are not adaptive.
+/// The rays per pixel of pictures that are not adaptive.
 const COUNTS: [u32; 7] = [2, 4, 8, 16, 32, 64, 256];
 
-/// Errors that adaptive pictures are asked for, with the most rays per pixel.
+/// The errors requested of adaptive pictures, with the maximum number of rays per pixel.
 const ERRORS: [(u32, f64); 6] = [(16, 4.0), (64, 2.0), (64, 1.0), (256, 1.0), (256, 0.5), (1024, 0.25)];
 
-/// Measures, and writes the report.
+/// Measures and writes the report.
 ///
 /// # Errors
-/// When a picture cannot be drawn or a file not written.
+/// Fails if a picture cannot be drawn, or a file cannot be written.
 pub fn run(args: &Args) -> Result<()> {
     if !args.check {
         args.output.prepare()?;
@@ -85,10 +87,10 @@ pub fn run(args: &Args) -> Result<()> {
     if args.check { Ok(()) } else { report::write(args, size, &drawn, &agreements) }
 }
 
-/// The parts of a channel that the kernels sum up.
+/// The kernels sum a channel in units of 1 divided by this.
 const PARTS: f64 = 65535.0;
 
-/// A small picture by the plain tracer, beside the kernels' truth at that size.
+/// Compares a small picture by the plain tracer with the kernels' truth at that size.
 fn agreement(effect: &Effect, args: &Args) -> Result<Agreement> {
     let picture = effect.picture((48, 36))?;
     // As many samples, so that the rest is the error of the independent ones.

@@ -99,7 +99,7 @@ fn rows<'a>(drawn: &'a [Drawn], effect: &'a str, way: &'a str) -> impl Iterator<
     drawn.iter().filter(move |row| row.effect == effect && row.way == way)
 }
 
-/// The exponents of error over samples, between 4 and 64 a pixel.
+/// Returns the exponents of the error by samples, between 4 and 64 per pixel.
 fn slopes(drawn: &[Drawn]) -> String {
     let mut text = "## Slopes\n\nError over samples a pixel, between 4 and 64, as an exponent: independent samples have -0.5.\n\n\
                     | effect | all dimensions | pairs of dimensions | independent |\n| ------ | ------ | ------ | ------ |\n"
@@ -120,7 +120,7 @@ fn slopes(drawn: &[Drawn]) -> String {
     text
 }
 
-/// Returns the section on the rays of adaptive pictures, beside pictures of as many samples everywhere.
+/// Returns the section on the rays of adaptive pictures, compared with pictures that have as many samples everywhere.
 fn rays_saved(drawn: &[Drawn]) -> String {
     let mut text = "## What adaptive pictures take\n\nAsked for at most *n* rays a pixel and an error of *e* levels. *Blocks* is the \
                     error of means of 4 x 4 pixels: noise leaves it a quarter of the error, bias more.\n\n\
@@ -151,7 +151,7 @@ fn rays_saved(drawn: &[Drawn]) -> String {
     text
 }
 
-/// The check of the truth itself.
+/// Returns the section that checks the truth itself.
 fn agreement(agreements: &[Agreement], args: &Args) -> String {
     let mut text = format!(
         "## Against independent samples of the plain tracer\n\nWhether the truth is one: small pictures (48 x 36) by the kernels with \

@@ -1,4 +1,4 @@
-//! The pictures that sampling is measured on: each effect alone, and all together.
+//! The pictures for which sampling is measured: each effect alone, and all together.
 
 use anyhow::{Context, Result};
 use rayfold_scene::assets::Library;
@@ -11,19 +11,19 @@ pub(super) struct Effect {
     text: &'static str,
 }
 
-/// A picture, and the same at other moments.
+/// A picture, and its scene at other moments.
 pub(super) struct Picture {
     script: Script,
     pub(super) scene: Scene,
 }
 
 impl Picture {
-    /// The first frame of a script.
+    /// Returns the first frame of a script.
     pub(super) fn new(name: &str, text: &str) -> Result<Self> {
         Self::with_files(name, text, &Library::none())
     }
 
-    /// The first frame of a script that names files.
+    /// Returns the first frame of a script that names files.
     pub(super) fn with_files(name: &str, text: &str, library: &Library) -> Result<Self> {
         let parsed = parse_with_files(name, text.as_bytes(), &Limits::default(), library);
         let script = parsed.script.with_context(|| format!("{name}: {:?}", parsed.diagnostics))?;
@@ -31,7 +31,7 @@ impl Picture {
         Ok(Self { script, scene })
     }
 
-    /// So many frames after the middle of the exposure.
+    /// Returns the scene this many frames after the middle of the exposure.
     pub(super) fn after(&self, frames: f64) -> Scene {
         let moment = self.script.frame_after(0, frames).unwrap_or_else(|| self.scene.clone());
         Scene { screen: self.scene.screen, ..moment }
@@ -44,7 +44,7 @@ impl Effect {
     }
 }
 
-/// Balls, bricks and a tent on a floor, two lights, a mirror: the scene for edges, and for everything together.
+/// Balls, bricks and a tent on a floor, two lights, a mirror: the scene for edges, and for all effects together.
 macro_rules! table {
     ($sun:literal, $lamp:literal, $camera:literal, $ball:literal) => {
         concat!(

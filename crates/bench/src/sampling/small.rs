@@ -1,4 +1,4 @@
-//! Objects smaller than a pixel, and patterned floors and random scenes: the light and the error of adaptive pictures.
+//! Objects smaller than a pixel, patterned floors and random scenes: the light and the error of adaptive pictures.
 
 use std::fmt::Write as _;
 
@@ -10,20 +10,20 @@ use rayfold_tracer::{Drawing, Exposure, Means, RenderOptions, Sampler};
 use super::drawn_at_random::{floor, scene};
 use super::measure::Args;
 
-/// Widths of a wire, in pixels.
+/// The widths of a wire, in pixels.
 const WIDTHS: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 
 const COUNTS: [u32; 3] = [64, 256, 1024];
 const ERRORS: [f64; 4] = [4.0, 1.0, 0.5, 0.25];
 
-/// Columns and rows of pictures that are drawn at random.
+/// The columns and rows of random pictures.
 const SIZE: (u32, u32) = (120, 90);
 
-/// The most samples per pixel of those pictures, and the errors that they are asked for.
+/// The maximum number of samples per pixel of random pictures, and the errors that are requested of them.
 const MOST: u32 = 1024;
 const ASKED: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 
-/// Measures, and writes sampling-small.md.
+/// Measures and writes sampling-small.md.
 pub(super) fn run(args: &Args) -> Result<()> {
     let mut page = "# Sampling: what is small\n\n\
                     Written by `rayfold-bench sampling --small`. An adaptive picture asks few samples who needs more. What is \
@@ -43,7 +43,7 @@ fn script(text: &str) -> Result<Script> {
     parsed.script.with_context(|| format!("{:?} in\n{text}", parsed.diagnostics))
 }
 
-/// Frame `k` of a script before it becomes levels.
+/// Returns frame `k` of a script before it is converted to levels.
 fn means(script: &Script, k: usize, samples: Samples) -> Result<Means> {
     means_by(Sampler::default(), script, k, samples)
 }
@@ -64,7 +64,7 @@ fn rays(means: &Means) -> f64 {
     means.counts.iter().map(|&count| f64::from(count)).sum::<f64>() / means.counts.len() as f64
 }
 
-/// A wire across the picture.
+/// Measures a wire across the picture.
 fn wires(page: &mut String, truth: u32) -> Result<()> {
     write!(
         page,
@@ -103,7 +103,7 @@ fn wires(page: &mut String, truth: u32) -> Result<()> {
     Ok(())
 }
 
-/// A picture of something small, by its name.
+/// Returns pictures of something small, with their names.
 fn pictures() -> Vec<(&'static str, String)> {
     let mut fence =
         "Screen 320 200\nBackground .7 .8 .9\nLook 0 1.6 6 0 .9 0 40\nIlight .8 .8 .8 -.4 -1 -.5\n\
@@ -189,17 +189,18 @@ fn others(page: &mut String, truth: u32) -> Result<()> {
     Ok(())
 }
 
-/// A picture beside the truth.
+/// A picture compared with the truth.
 struct Compared {
     error: f64,
     mean: f64,
-    /// The root mean square of blocks of 10 x 10 pixels; `worst` is that of the worst channel.
+    /// The root mean square error of blocks of 10 x 10 pixels; `worst` is that of the worst channel.
     of_blocks: f64,
     worst: f64,
 }
 
 impl Compared {
-    /// Of two truths that share no points, the product of the distances from both has a mean without their own errors.
+    /// Compares with two truths that share no points. The mean product of the distances from both does not contain the
+    /// errors of the truths.
     fn new(script: &Script, drawn: &Means, truths: [&Means; 2]) -> Result<Self> {
         let scene = script.frame(0).context("no frame")?;
         let shown = |mean: DVec3| match scene.tone {
@@ -246,15 +247,15 @@ fn encoded(light: f64) -> f64 {
 
 pub(super) const HEADING: &str = "## Patterned floors and random scenes";
 
-/// A script of a seed, in a size.
+/// A function that makes the script of a seed, in a size.
 type Draw = fn(&mut fastrand::Rng, (u32, u32)) -> String;
 
-/// The pictures that are too far off.
+/// The ratio to the requested error above which a picture is too far off.
 const OVER: f64 = 1.15;
 const MEAN: f64 = 0.05;
 const BLOCKS: f64 = 0.25;
 
-/// Measures floors and scenes whose numbers come from seeds; returns the part of the report on them.
+/// Measures floors and scenes that are made from seeds. Returns the section of the report on them.
 pub(super) fn at_random(args: &Args) -> Result<String> {
     let (width, height) = SIZE;
     let truth = args.truth / 2;
@@ -324,7 +325,8 @@ pub(super) fn at_random(args: &Args) -> Result<String> {
 mod tests {
     use super::*;
 
-    /// Pictures of the seeds that missed it when variation was counted in 32 columns and 33 rows, from three times the error on.
+    /// Draws the seeds whose pictures missed the error when variation was counted in 32 columns and 33 rows, from three
+    /// times the error on.
     #[test]
     fn the_error_that_is_asked_for_is_held() {
         for (draw, seed, asked) in

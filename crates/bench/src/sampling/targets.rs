@@ -1,4 +1,5 @@
-//! The scene of the report on speed as pictures whose pixels are means: the time to an error, beside other renderers.
+//! The scene of the report on speed, with several samples per pixel: the time to an error, compared with other
+//! renderers.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -84,7 +85,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.check { Ok(()) } else { targets_page::write(args, &curves, &singles, &truths) }
 }
 
-/// POV-Ray's times, without those of starting and reading the scene, and its errors.
+/// Measures POV-Ray's times, without those of starting and reading the scene, and its errors.
 fn peer(work: &Work, truth: &[DVec3]) -> Result<Curve> {
     let folder = tempfile::tempdir()?;
     let scene = work.scene()?;

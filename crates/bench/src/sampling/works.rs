@@ -1,5 +1,5 @@
-//! The works on which the times to an error are measured: the scene of the report on speed with more and more in its
-//! pixels, and the ways in which POV-Ray is asked for it.
+//! The works for which the times to an error are measured: the scene of the report on speed with more and more effects,
+//! and the options with which POV-Ray draws it.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ pub(super) struct Work {
     pub(super) name: &'static str,
     pub(super) about: &'static str,
     pub(super) size: (u32, u32),
-    /// Degrees across the suns.
+    /// The apparent diameter of the suns in degrees.
     pub(super) sun: f64,
     pub(super) lens: f64,
     pub(super) moves: bool,
@@ -56,12 +56,12 @@ pub(super) const WORKS: [Work; 4] = [
 ];
 
 impl Work {
-    /// The scene at rest, for renderers that share no language with us.
+    /// Returns the scene at rest, for renderers that do not read our language.
     pub(super) fn scene(&self) -> Result<Scene> {
         table(self.size.0, self.size.1)
     }
 
-    /// The scene with all that the work has.
+    /// Returns the scene with all effects of the work.
     pub(super) fn picture(&self) -> Result<Picture> {
         let mut text = String::new();
         let mut balls = 0;
@@ -95,7 +95,7 @@ impl Work {
     }
 }
 
-/// The ways of POV-Ray to smooth edges.
+/// The options of POV-Ray that smooth edges.
 pub(super) const PEER: [&[&str]; 8] = [
     &["+A0.3", "+AM1", "+R2", "-J"],
     &["+A0.1", "+AM1", "+R2", "-J"],

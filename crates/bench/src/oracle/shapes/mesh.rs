@@ -110,7 +110,8 @@ fn mesh_of<'a>(object: &'a Object, line: &Line) -> Option<(&'a Mesh, Line, Optio
     }
 }
 
-/// Returns what a mesh, also in a group, adds to the surface of a hit. `linear` is whether colours are linear light.
+/// Returns the contribution of a mesh, also in a group, to the surface of a hit. `linear` is whether colours are linear
+/// light.
 pub(in crate::oracle) fn shaded(object: &Object, line: &Line, hit: &Hit, linear: bool) -> Option<Shaded> {
     let (mesh, local, placement) = mesh_of(object, line)?;
     let (model, k) = (mesh.model(), hit_at(mesh, &local, &hit.t));

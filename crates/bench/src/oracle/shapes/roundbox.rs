@@ -62,7 +62,7 @@ fn core(roundbox: &Roundbox, axis: usize) -> (Real, Real) {
     ((&low + &high).shifted(-1), if half.sign() < 0 { Real::zero() } else { half })
 }
 
-/// Returns the places where the line is as far from the faces of the core on which the part is as the radius.
+/// Returns the distances at which the line is as far from the part's faces of the core as the radius.
 fn roots(roundbox: &Roundbox, line: &Line, part: Part) -> Vec<Real> {
     let beyond: Vec<Beyond> = (0..3)
         .filter(|&axis| part[axis] != 0)
@@ -87,7 +87,8 @@ fn roots(roundbox: &Roundbox, line: &Line, part: Part) -> Vec<Real> {
     Real::roots(&a, &b, &c)
 }
 
-/// Returns whether the place at `t` is beside the core as the part is. A seam belongs to the parts on both sides.
+/// Returns whether the point at `t` is on the same sides of the core as the part. A seam belongs to the parts on both
+/// sides.
 fn part_at(roundbox: &Roundbox, line: &Line, t: &Real, part: Part) -> bool {
     let point = line.at(t);
     (0..3).all(|axis| {
