@@ -1,9 +1,8 @@
 //! Makes frames ahead of their consumer, which takes them in order.
 //!
-//! Frames are made side by side on the rayon pool, while the caller's thread takes the finished ones in order.
-//! If that thread is one of the pool, it makes frames as well while it has none to take. The number of frames
-//! that are being made or waiting is bounded, so that memory does not grow with the number of frames, however
-//! slow the taker is.
+//! Frames are made side by side on the rayon pool, while the caller's thread takes the finished ones in order. If that
+//! thread belongs to the pool, it also makes frames while there is none to take. The number of frames that are being
+//! made or waiting is bounded, so that memory does not grow with the number of frames, however slow the taker is.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,13 +13,13 @@ use rayon::Yield;
 
 use crate::interrupt;
 
-/// The time that a thread of the pool sleeps when there is nothing to do: meanwhile others may bring work.
+/// The time that a thread of the pool sleeps when it has nothing to do. Other threads may create work meanwhile.
 const NAP: Duration = Duration::from_millis(1);
 
-/// Has `work` done on every item of `items`, at most `window` at once, and gives the results to `take` in order.
+/// Runs `work` on every item of `items`, at most `window` at once, and passes the results to `take` in order.
 ///
-/// The first error, of an item, of its work or of taking it, ends the whole: everything under way is
-/// stopped ([`interrupt::stop`]) and awaited.
+/// The first error, of an item, of its work or of taking it, ends everything: work in progress is stopped
+/// ([`interrupt::stop`]) and awaited.
 ///
 /// # Errors
 /// The first error, as above.
@@ -70,7 +69,7 @@ pub(crate) fn in_order<I: Send, T: Send>(
     })
 }
 
-/// Waits for the next item, and works meanwhile on the tasks of the pool, if this is a thread of it.
+/// Waits for the next item. A thread of the pool works on other tasks of the pool meanwhile.
 fn next<T>(receiver: &Receiver<T>) -> anyhow::Result<T> {
     loop {
         match receiver.try_recv() {

@@ -1,4 +1,4 @@
-//! The command line: its flags, and which module answers which subcommand.
+//! The command line: its flags, and the module that runs each subcommand.
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -80,7 +80,7 @@ impl Command {
     }
 }
 
-/// Replaces a tip that misleads: no argument is meant to begin with a dash.
+/// Replaces a misleading tip: no argument may begin with a dash.
 fn correct(error: &mut clap::Error) {
     if error.kind() != ErrorKind::UnknownArgument {
         return;
@@ -94,7 +94,7 @@ fn correct(error: &mut clap::Error) {
     }
 }
 
-/// Parses, runs, and says what went wrong.
+/// Parses the arguments, runs the subcommand, and reports errors.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let mut args: Vec<OsString> = args.into_iter().collect();
     if args.get(1).is_some_and(|command| command == "help") {

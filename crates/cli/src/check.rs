@@ -128,8 +128,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     Ok(if faults.errors() > 0 { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The endings of models, of the files that they refer to, of fonts, and of skies. Other pictures may be those that were
-/// rendered.
+/// The endings of models, of the files that they refer to, of fonts, and of skies. Other pictures are left out, because
+/// they may be renderings.
 const NAMED: [&str; 10] = ["obj", "mtl", "ply", "stl", "gltf", "glb", "ttf", "otf", "hdr", "exr"];
 
 /// Returns the models, fonts and skies in a folder that no script names, in order.

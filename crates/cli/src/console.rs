@@ -1,7 +1,7 @@
 //! The program's output: standard output for data, standard error for people.
 //!
-//! It knows what the global flags and the environment say about colour, progress and silence, so that no subcommand
-//! asks again. Errors are never silenced.
+//! It resolves colour, progress and silence from the global flags and the environment, so no subcommand needs to.
+//! Errors are never silenced.
 
 use std::io::{IsTerminal, Write};
 
@@ -26,19 +26,19 @@ pub(crate) enum Format {
     Json,
 }
 
-/// Resolved once from the flags, the environment and the kinds of the streams.
+/// The console, resolved once from the flags, the environment and the kinds of the streams.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Console {
-    /// No progress and no remarks.
+    /// Whether progress and remarks are hidden.
     pub(crate) quiet: bool,
-    /// Standard error takes colour.
+    /// Whether standard error may have colour.
     pub(crate) color: bool,
-    /// Standard error is a terminal that shows a moving bar.
+    /// Whether standard error is a terminal that can show a moving bar.
     pub(crate) animate: bool,
 }
 
 impl Console {
-    /// Looks at the environment; the only place that does.
+    /// Reads the environment; no other code does.
     pub(crate) fn resolve(quiet: bool, color: Color) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
@@ -54,7 +54,7 @@ impl Console {
     /// Writes data to standard output. A reader that has had enough (`| head`) is no error.
     ///
     /// # Errors
-    /// When standard output cannot be written to.
+    /// Fails if standard output cannot be written.
     pub(crate) fn print(&self, data: impl AsRef<[u8]>) -> anyhow::Result<()> {
         let mut out = std::io::stdout().lock();
         match out.write_all(data.as_ref()).and_then(|()| out.flush()) {
@@ -65,19 +65,19 @@ impl Console {
         }
     }
 
-    /// A remark for people, unless they asked for quiet. Names in it may be anybody's.
+    /// Prints a remark for people, unless they asked for quiet. It may contain names that others have chosen.
     pub(crate) fn note(&self, text: impl std::fmt::Display) {
         if !self.quiet {
             self.say(visible(&text.to_string()));
         }
     }
 
-    /// An error and its causes, on one line: `error: cannot read a.txt: permission denied`.
+    /// Prints an error and its causes on one line: `error: cannot read a.txt: permission denied`.
     pub(crate) fn error(&self, error: &anyhow::Error) {
         self.say(format_args!("{}: {}", self.label(), visible(&describe(error))));
     }
 
-    /// An error that was found elsewhere: `error: <what>: <why>`.
+    /// Prints an error that was found elsewhere: `error: <what>: <why>`.
     pub(crate) fn fault(&self, what: &str, why: &str) {
         self.say(format_args!("{}: {}: {}", self.label(), visible(what), visible(why)));
     }
@@ -94,27 +94,28 @@ impl Console {
         if self.color { "\x1b[1;31merror\x1b[0m" } else { "error" }
     }
 
-    /// Returns whether a user sits at a terminal who sees the output and can answer.
+    /// Returns whether there is a user at a terminal who sees the output and can answer.
     #[cfg(feature = "network")]
     pub(crate) fn can_ask(&self) -> bool {
         std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
     }
 
-    /// A question, which the cursor stays behind.
+    /// Prints a question. The cursor stays behind it.
     #[cfg(feature = "network")]
     pub(crate) fn ask(&self, question: &str) {
         let mut err = std::io::stderr().lock();
         let _ = write!(err, "{question} ").and_then(|()| err.flush());
     }
 
-    /// Diagnostics and other text that must be seen. There is nowhere left to report that standard error is gone.
+    /// Prints diagnostics and other text that must be seen. If standard error is closed, the failure cannot be
+    /// reported, so it is ignored.
     pub(crate) fn say(&self, text: impl std::fmt::Display) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
-/// Returns the text with control characters written as escapes, so that no name can command a
-/// terminal. Lines stay lines.
+/// Returns the text with control characters written as escapes, so that no name can command a terminal. Ends of lines
+/// are kept.
 pub(crate) fn visible(text: &str) -> String {
     let is_command = |c: char| (c.is_control() && c != '\n') || is_formatting(c);
     let mut shown = String::with_capacity(text.len());
@@ -128,18 +129,18 @@ pub(crate) fn visible(text: &str) -> String {
     shown
 }
 
-/// Characters that turn the direction of text, which is how a name looks like another one.
+/// Returns whether a character changes the direction of text, which can make a name look like another one.
 fn is_formatting(c: char) -> bool {
     matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// An error and its causes.
+/// Returns an error and its causes as text.
 pub(crate) fn describe(error: &anyhow::Error) -> String {
     let causes: Vec<String> = error.chain().map(without_number).collect();
     causes.join(": ")
 }
 
-/// Returns the message of an error, without the number that the system has for it.
+/// Returns the message of an error without the system's error number.
 fn without_number(error: &(dyn std::error::Error + 'static)) -> String {
     let mut text = error.to_string();
     if text.ends_with(')')

@@ -36,8 +36,8 @@ use stop::interrupted;
 /// The time for which the first lines wait for events that were missed since the last run.
 const CATCH_UP: Duration = Duration::from_secs(3);
 
-/// The variables from which the functions take the limits on the largest script and animation; the
-/// stack sets the same.
+/// The variables from which the functions take the limits on the largest script and animation; Terraform sets the same
+/// ones.
 const LIMITS: [&str; 7] = [
     "RAYFOLD_MAX_SCRIPT_BYTES",
     "RAYFOLD_MAX_OBJECTS",
@@ -172,7 +172,7 @@ fn order(folder: &PathBuf, args: &Args, console: &Console) -> anyhow::Result<Ord
     Order::new(folder, None, args.output.as_deref(), true, &Limits::default(), console)
 }
 
-/// A folder that goes with the run, also when a second signal ends that at once.
+/// A folder that is removed at the end of the run, also if a second signal ends the run at once.
 struct Scratch {
     folder: TempDir,
     _protected: interrupt::Protected,
@@ -225,7 +225,7 @@ async fn serve(args: &Args, order: Option<&Order>, console: &Console) -> anyhow:
     ended
 }
 
-/// Does the work that is due on a running platform, until it is stopped.
+/// Does the pending work of a running platform until it is stopped.
 async fn attend(
     args: &Args,
     order: Option<&Order>,
@@ -292,7 +292,7 @@ async fn attend(
     Ok(Outcome::Done)
 }
 
-/// Says that the objects that the other store keeps in the same data folder are not shown now.
+/// Prints that objects of the other store in the same data folder are not shown now.
 fn left_alone(other: StoreKind, data: &Path) -> String {
     let flag = match other {
         StoreKind::BuiltIn => "without --store".to_owned(),
@@ -302,7 +302,7 @@ fn left_alone(other: StoreKind, data: &Path) -> String {
     format!("{} has objects of {other}, which stay there; they are shown {flag}", objects.display())
 }
 
-/// Returns the variables with which every AWS tool uses this S3; `eval`-able.
+/// Returns the environment variables with which every AWS tool uses this S3, as lines for `eval`.
 fn exports(platform: &Platform) -> String {
     let mut text = String::new();
     for (name, value) in platform.server().environment() {
@@ -321,19 +321,19 @@ fn default_data() -> anyhow::Result<PathBuf> {
     Ok(base.context("no home folder: say where the data goes by --data")?.join("rayfold/dev"))
 }
 
-/// A drawing takes all the time of a core: more processes than cores only make each other late.
+/// A drawing uses a core fully, so more processes than cores only slow each other down.
 fn usual_concurrency() -> usize {
     std::thread::available_parallelism().map_or(2, usize::from).max(2)
 }
 
-/// An animation in which nothing has happened for so long has lost an event: longer than a frame may be drawn, so that
-/// none is drawn twice at once.
+/// An animation in which nothing has happened for this long has lost an event. It is longer than a frame may be drawn,
+/// so that no frame is drawn twice at the same time.
 fn stuck_after(timeout: Duration) -> Duration {
     timeout + timeout / 10
 }
 
-/// Returns MinIO's usual port, for either store, so that the variables that another terminal has exported stay right
-/// from run to run.
+/// Returns MinIO's usual port, for either store, so that variables exported in another terminal stay valid from run to
+/// run.
 fn usual_address() -> SocketAddr {
     let usual = SocketAddr::from(([127, 0, 0, 1], 9000));
     if std::net::TcpListener::bind(usual).is_ok() { usual } else { rayfold_local::any_port() }
@@ -343,7 +343,8 @@ fn usual_address() -> SocketAddr {
 mod tests {
     use super::*;
 
-    /// Frames that were drawn for more than a minute were woken, and drawn twice at once; ten at a time, on two cores.
+    /// Frames that took more than a minute to draw were triggered again and drawn twice at once, ten at a time on two
+    /// cores.
     #[test]
     fn frames_are_not_woken_while_they_may_be_drawn() {
         for seconds in [1, 300, 900] {

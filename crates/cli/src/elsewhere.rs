@@ -5,7 +5,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 /// The subcommands of the feature `network`.
 const SUBCOMMANDS: [&str; 8] = ["studio", "cost", "submit", "status", "fetch", "retry", "remove", "dev"];
 
-/// Ends the page of help.
+/// The text at the end of the help page.
 pub(crate) const HELP: &str = "\
 Examples:
   rayfold render scenes/hello -o hello.gif
@@ -18,7 +18,7 @@ whole program: `cargo install --path crates/cli`, or `cargo rayfold` in place of
 
 Exit codes: 0 done, 1 the input or the rendering failed, 2 wrong usage, 130 interrupted.";
 
-/// Returns a message that says where the requested subcommand is, if it is one that this program could have.
+/// Returns a message that says which program has the requested subcommand, if rayfold has such a subcommand.
 pub(crate) fn missing(error: &clap::Error) -> Option<String> {
     let name = match error.get(ContextKind::InvalidSubcommand) {
         Some(ContextValue::String(name)) if error.kind() == ErrorKind::InvalidSubcommand => name,

@@ -180,7 +180,7 @@ fn plays_of(pictures: &[&Picture]) -> Plays {
     }
 }
 
-/// Returns the container to write, and its place.
+/// Returns the container to write, and the destination.
 fn target(args: &Args) -> Result<(Container, Place), Usage> {
     let shown = args.output.display();
     let format = args.format.or_else(|| is_stdin(&args.output).then_some(Container::Gif));
@@ -203,7 +203,7 @@ fn target(args: &Args) -> Result<(Container, Place), Usage> {
     Ok((container, place))
 }
 
-/// Reports an animation.json beside the images, which is for scripts and not read here.
+/// Reports an animation.json beside the images, which is for scripts and is not read here.
 fn tell_of_settings(args: &Args, console: &Console) {
     let folders: BTreeSet<&Path> = args.frames.iter().filter_map(|file| file.parent()).collect();
     for folder in folders {
@@ -254,7 +254,7 @@ fn explain(error: MovieError, name: &str) -> anyhow::Error {
 /// Examines all files before any is encoded: the kind of each, and its number of frames.
 ///
 /// # Errors
-/// When a file cannot be shown; each such file is reported.
+/// Fails if a file cannot be shown; each such file is reported.
 fn pictures(files: &[PathBuf], console: &Console) -> anyhow::Result<HashMap<PathBuf, Vec<Picture>>> {
     let mut pictures = HashMap::new();
     let mut faults = Vec::new();

@@ -1,8 +1,8 @@
 //! The INPUT that the user named, as a list of scripts.
 //!
-//! A folder stands for its scripts (`*.txt`) in natural order and for the settings beside them; a file is a script
-//! whatever its name; `-` is a script on standard input. Reading and parsing are apart from listing, so that many or
-//! large scripts need not be in memory at once.
+//! A folder stands for its scripts (`*.txt`) in natural order, and for the settings beside them. A file is a script
+//! whatever its name, and `-` is a script on standard input. Listing is separate from reading and parsing, so that many
+//! or large scripts need not be in memory at once.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -20,18 +20,18 @@ use crate::outcome::Usage;
 /// Scripts in the order of their frames.
 #[derive(Debug, Default)]
 pub(crate) struct Input {
-    /// At least one script, in the order of the frames.
+    /// The scripts, at least one, in the order of the frames.
     pub(crate) scripts: Vec<ScriptFile>,
     /// The path of a folder's settings, if it has any.
     pub(crate) settings: Option<PathBuf>,
-    /// Files in a folder that look like a part of the animation and are not read.
+    /// The files in a folder that look like a part of the animation but are not read.
     pub(crate) not_read: Vec<NotRead>,
 }
 
-/// A script that can be read, also more than once.
+/// A script that can be read, even more than once.
 #[derive(Clone, Debug)]
 pub(crate) struct ScriptFile {
-    /// As messages name it.
+    /// The name of the script in messages.
     pub(crate) name: String,
     place: Place,
 }
@@ -39,7 +39,7 @@ pub(crate) struct ScriptFile {
 #[derive(Clone, Debug)]
 enum Place {
     File(PathBuf),
-    /// Standard input gives its text only once.
+    /// Standard input, which gives its text only once.
     Read(Arc<[u8]>),
 }
 
@@ -52,7 +52,7 @@ impl Input {
     /// Lists the scripts of an animation: of one folder, or the named ones.
     ///
     /// # Errors
-    /// When something is not there or not readable, a folder holds no script, or folders are mixed with others.
+    /// Fails if a path does not exist or cannot be read, a folder holds no script, or folders are mixed with files.
     pub(crate) fn animation(inputs: &[PathBuf], limits: &Limits) -> anyhow::Result<Self> {
         stdin_once(inputs)?;
         if let ([_, _, ..], Some(folder)) = (inputs, inputs.iter().find(|input| input.is_dir())) {
@@ -69,7 +69,7 @@ impl Input {
         Ok(Self::of(parts.into_iter().flat_map(|part| part.scripts).collect()))
     }
 
-    /// Every input by itself; an error in place of one that is a folder which cannot be listed or holds no script.
+    /// Lists every input by itself. A folder that cannot be listed or holds no script becomes an error in its place.
     pub(crate) fn each(inputs: &[PathBuf], limits: &Limits) -> impl Iterator<Item = anyhow::Result<Self>> {
         inputs.iter().map(|input| Self::one(input, limits))
     }
@@ -106,7 +106,7 @@ impl ScriptFile {
         Self { name: path.display().to_string(), place: Place::File(path) }
     }
 
-    /// Its file; standard input has none.
+    /// Returns its file; standard input has none.
     pub(crate) fn path(&self) -> Option<&Path> {
         match &self.place {
             Place::File(path) => Some(path),
@@ -114,7 +114,7 @@ impl ScriptFile {
         }
     }
 
-    /// Its text, cut off just beyond the size limit.
+    /// Reads its text, cut off just beyond the size limit.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -142,13 +142,13 @@ impl ScriptFile {
     }
 }
 
-/// One byte more than the limit is enough for the parser to refuse the text.
+/// One byte more than the limit, so that the parser refuses the text.
 fn read_limited(from: impl Read, into: &mut Vec<u8>, limits: &Limits) -> std::io::Result<()> {
     from.take(limits.max_script_bytes as u64 + 1).read_to_end(into).map(drop)
 }
 
 /// # Errors
-/// When standard input is named twice: the second reading would find nothing.
+/// Fails if standard input is named twice, because the second reading would find nothing.
 pub(crate) fn stdin_once(inputs: &[PathBuf]) -> Result<(), Usage> {
     match inputs.iter().filter(|input| is_stdin(input)).count() {
         0 | 1 => Ok(()),
@@ -156,7 +156,7 @@ pub(crate) fn stdin_once(inputs: &[PathBuf]) -> Result<(), Usage> {
     }
 }
 
-/// Reads the output of another program or of a person, and comes back when a signal asks to stop.
+/// Reads the output of another program or the input of a user. Returns early if a signal asks to stop.
 fn read_patiently<R: Read>(
     open: impl FnOnce() -> std::io::Result<R> + Send + 'static,
     limits: &Limits,
@@ -169,7 +169,7 @@ fn read_patiently<R: Read>(
     Ok(text?)
 }
 
-/// A pipe that a shell has made for this run, such as that of `<(generate)`: no folder holds it.
+/// A pipe that a shell made for this run, such as `<(generate)`: it is in no folder.
 #[cfg(unix)]
 fn is_nameless_pipe(input: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
@@ -178,7 +178,7 @@ fn is_nameless_pipe(input: &Path) -> bool {
 }
 
 /// # Errors
-/// When there is a file of this name.
+/// Fails if there is a file of this name.
 pub(crate) fn must_be_new(output: &Path) -> anyhow::Result<()> {
     let is_there = output.symlink_metadata().is_ok();
     anyhow::ensure!(!is_there, "{} exists already, and --no-clobber keeps it", output.display());
@@ -186,7 +186,7 @@ pub(crate) fn must_be_new(output: &Path) -> anyhow::Result<()> {
 }
 
 /// # Errors
-/// When the file that is to be written is one of those that are read.
+/// Fails if the output file is one of the files that are read.
 pub(crate) fn must_not_replace<'a>(
     output: &Path,
     mut inputs: impl Iterator<Item = &'a Path>,
@@ -205,12 +205,12 @@ pub(crate) fn must_not_replace<'a>(
     }
 }
 
-/// It is `-`, which is no file.
+/// The path is `-`, which is no file.
 pub(crate) fn is_stdin(input: &Path) -> bool {
     input.as_os_str() == "-"
 }
 
-/// By its name, something in a folder is a script or the settings.
+/// A file in a folder is a script or the settings because of its name.
 pub(crate) fn is_part_of_animation(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     matches!(Name::of(&name), Name::Script(_) | Name::Settings)

@@ -1,10 +1,10 @@
 //! Stops a run on a signal (Ctrl-C, SIGTERM, SIGHUP): in order at the first one, at once at the second. A run that
 //! has not stopped in order after [`GRACE`] is ended at once, too, unless it has asked for [`patience`].
 //!
-//! In order means that long work polls [`flag`] (or asks [`stopping`]), comes back early, and drops its temporary
-//! files on the way out. At once means that only those files are removed. A call in which the system may wait without
-//! end (for a terminal, a pipe) is made by [`wait_for`], which comes back at the first signal.
-//! Signals that were ignored when the program started stay ignored: `nohup`, and `&` in a script, ask for that.
+//! *In order* means that long work polls [`flag`] (or calls [`stopping`]), returns early, and drops its temporary
+//! files. *At once* means that only those files are removed. A call that may block without end (on a terminal, a pipe)
+//! is made by [`wait_for`], which returns at the first signal. Signals that were ignored when the program started stay
+//! ignored: `nohup`, and `&` in a script, ask for that.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -23,13 +23,13 @@ const GRACE: Duration = Duration::from_millis(700);
 
 static PATIENT: AtomicBool = AtomicBool::new(false);
 
-/// Between two looks at whether a signal has come.
+/// The time between two checks for a signal.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Starts listening. A write beyond a file size limit becomes an error instead of the program's death.
 ///
 /// # Errors
-/// When the system refuses a handler.
+/// Fails if the system refuses a handler.
 #[cfg(unix)]
 pub(crate) fn listen(console: &Console) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
@@ -66,20 +66,20 @@ fn end_at_once() -> ! {
     std::process::exit(exit_code());
 }
 
-/// Lets the run take its time to stop in order: it has other programs to stop, or others to answer.
+/// Lets the run take its time to stop in order, because it must stop other programs or answer their requests.
 #[cfg(feature = "network")]
 pub(crate) fn patience() {
     PATIENT.store(true, Ordering::SeqCst);
 }
 
-/// Elsewhere Ctrl-C keeps its default, which ends the program at once.
+/// On other systems Ctrl-C keeps its default effect, which ends the program at once.
 #[cfg(not(unix))]
 pub(crate) fn listen(_: &Console) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Says whether a signal was ignored at the start, by Linux's `/proc/self/status`: bits counted from 1, in hexadecimal.
-/// A system without that file gives SIGHUP its default, so that `nohup` works.
+/// Returns whether a signal was ignored at the start, from Linux's `/proc/self/status`: bits counted from 1, in
+/// hexadecimal. A system without that file gives SIGHUP its default, so that `nohup` works.
 #[cfg(unix)]
 fn is_ignored(signal: i32, status: &str) -> bool {
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -89,12 +89,12 @@ fn is_ignored(signal: i32, status: &str) -> bool {
     }
 }
 
-/// Has all work come back early: the run has failed.
+/// Makes all work return early, because the run has failed.
 pub(crate) fn stop() {
     STOPPING.store(true, Ordering::SeqCst);
 }
 
-/// Lets work begin again after a failure that was reported; not after a signal.
+/// Lets work begin again after a failure was reported, but not after a signal.
 pub(crate) fn go_on() {
     STOPPING.store(false, Ordering::SeqCst);
     if signalled() {
@@ -102,7 +102,7 @@ pub(crate) fn go_on() {
     }
 }
 
-/// Work is to come back early, because of a signal or of a failure elsewhere.
+/// Returns whether work should return early, because of a signal or of a failure elsewhere.
 pub(crate) fn stopping() -> bool {
     STOPPING.load(Ordering::SeqCst)
 }
@@ -117,7 +117,7 @@ pub(crate) fn signalled() -> bool {
     SIGNAL.load(Ordering::SeqCst) != 0
 }
 
-/// As shells count: 128 and the signal's number.
+/// Returns the exit code as shells count it: 128 plus the signal's number.
 pub(crate) fn exit_code() -> i32 {
     128 + SIGNAL.load(Ordering::SeqCst)
 }
@@ -127,7 +127,7 @@ pub(crate) fn exit_code() -> i32 {
 #[cfg(all(unix, feature = "network"))]
 pub(crate) struct Protected(PathBuf);
 
-/// Has a second signal remove `folder`.
+/// Makes a second signal remove `folder`.
 #[cfg(all(unix, feature = "network"))]
 pub(crate) fn protect(folder: &std::path::Path) -> Protected {
     folders().push(folder.to_path_buf());
@@ -145,11 +145,11 @@ impl Drop for Protected {
     }
 }
 
-/// Does work that may wait for another program or a user on a thread of its own, which is left alone when a signal
-/// comes: nothing else ends the reading of a terminal.
+/// Runs work that may wait for another program or a user on a separate thread. At a signal that thread is abandoned,
+/// because nothing else can end a read from a terminal.
 ///
 /// # Errors
-/// When a signal came first, or the system refuses a thread.
+/// Fails if a signal came first, or the system refuses a thread.
 pub(crate) fn wait_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> anyhow::Result<T> {
     let (sender, receiver) = mpsc::channel();
     std::thread::Builder::new().name("waiting".into()).spawn(move || {
@@ -164,7 +164,7 @@ pub(crate) fn wait_for<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'sta
     }
 }
 
-/// Does work that polls a flag, which is set at a signal and when the time is over.
+/// Runs work that polls a flag. The flag is set at a signal, and when the time is over.
 pub(crate) fn within<T>(time: Duration, work: impl FnOnce(&AtomicBool) -> T) -> T {
     let is_over = AtomicBool::new(false);
     let (done, watched) = mpsc::channel::<()>();

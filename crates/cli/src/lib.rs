@@ -1,8 +1,8 @@
 //! The `rayfold` command, as a library for its `main` alone.
 //!
-//! One module a subcommand, each with its flags (`Args`) and a `run` that takes them together with the `Console`,
-//! which holds what the global flags and the environment resolved to. Data goes to standard output, everything for
-//! people to standard error. Exit codes: see `outcome`.
+//! Each subcommand is a module with its flags (`Args`) and a function `run`. `run` takes the flags and the `Console`,
+//! which holds the resolved global flags and environment. Data goes to standard output, everything for people to
+//! standard error. Exit codes: see `outcome`.
 
 mod ahead;
 mod app;

@@ -1,6 +1,6 @@
-//! The `rayfold` command: all of it is in the library beside this file.
+//! The `rayfold` command: all of its code is in the library beside this file.
 //!
-//! So it is compiled while the tracer still is; only linking waits for the tracer.
+//! So the command is compiled while the tracer still is; only linking waits for the tracer.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! The subcommands that serve, that talk to a bucket, or that estimate the cost of one: the feature `network`.
+//! The subcommands that serve, use a bucket, or estimate its cost: the feature `network`.
 //!
 //! They take most of the time of a first build, so the renderer can be built without them.
 

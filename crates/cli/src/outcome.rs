@@ -7,12 +7,12 @@ use std::process::ExitCode;
 
 use crate::interrupt;
 
-/// The end of a subcommand that has reported everything; it returns an unreported error as an error.
+/// The end of a subcommand that has reported all of its errors. An unreported error is returned as an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// It did its work.
+    /// The subcommand did its work.
     Done,
-    /// It could not, and has reported the reason.
+    /// The subcommand failed, and has reported the reason.
     Failed,
     /// The run was asked to stop.
     Interrupted,
@@ -28,7 +28,7 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// A combination of flags that clap cannot rule out by itself; ends the run with exit code 2.
+/// A combination of flags that clap itself cannot rule out. It ends the run with exit code 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct Usage(pub(crate) String);

@@ -1,7 +1,7 @@
 //! The plan of the frames, made before the first is drawn.
 //!
-//! Every script is parsed once to learn its faults and the shape of its frames. Small scripts are kept; beyond
-//! [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
+//! Every script is parsed once for its faults, its number of frames and their properties. Small scripts are kept;
+//! beyond [`KEPT_TEXT`] they are parsed again when their turn comes, so that memory does not grow with their number.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -21,28 +21,28 @@ use crate::interrupt;
 use crate::survey::{Faults, parse_all};
 use crate::wording::number;
 
-/// Bytes of text of which the parsed scripts are kept; they take about as much again.
+/// The number of bytes of text up to which parsed scripts are kept; they take about as much again.
 const KEPT_TEXT: usize = 64 << 20;
 
-/// Memory that frames ahead of the encoder may take, in bytes: two images of 1920 x 1080 while they are drawn.
+/// The memory in bytes for frames that are ahead of the encoder: two images of 1920 x 1080 while they are drawn.
 const AHEAD: u64 = 192 << 20;
 
-/// The longest time for a look at the light that a depth cuts off.
+/// The time limit of the search for light that a depth cuts off.
 const LOOKING: Duration = Duration::from_secs(3);
 
-/// Bytes of a pixel while it is drawn: its samples, its levels, and its share of the encoded file.
+/// The bytes per pixel while a frame is drawn: its samples, its levels, and its share of the encoded file.
 const OF_PIXEL: u64 = 48;
 
-/// Bytes of a pixel while its passes are made: its hit, and the numbers of four passes twice.
+/// The bytes per pixel while passes are made: its hit, and the numbers of four passes twice.
 const OF_PASSES: u64 = 96;
 
-/// The fewest frames at once: one is drawn while another is encoded.
+/// The minimum number of frames at once: one is drawn while another is encoded.
 const FEWEST: usize = 2;
 
-/// Pixels of a side that a GIF has room for.
+/// The maximum width and height of a GIF.
 const LONGEST_SIDE: u32 = 65_535;
 
-/// Frames in order, and the options that they are drawn with.
+/// Frames in order, and the options for drawing them.
 #[derive(Debug)]
 pub(crate) struct Plan {
     parts: Vec<Part>,
@@ -63,7 +63,7 @@ pub(crate) struct Plan {
 /// A frame to draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job {
-    /// Counted from 1 over all scripts.
+    /// The number of the frame, counted from 1 over all scripts.
     pub(crate) number: u64,
     part: usize,
     index: usize,
@@ -72,7 +72,7 @@ pub(crate) struct Job {
 #[derive(Debug)]
 struct Part {
     file: ScriptFile,
-    /// Neighbouring frames of one shape are counted together.
+    /// Neighbouring frames of the same shape are counted together.
     runs: Vec<(usize, Shape)>,
     frames: usize,
     kept: Option<Arc<Script>>,
@@ -85,14 +85,14 @@ struct Shape {
     orthographic: bool,
     /// Without background.
     clear: bool,
-    /// Rounded up to a power of two, so that a growing scene is few runs.
+    /// The value is rounded up to a power of two, so that a growing scene has few runs.
     objects: usize,
 }
 
 /// The frames that the user wants, and their options.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Wishes {
-    /// Draw them in this size.
+    /// The size of the pictures, in place of the scripts' own.
     pub(crate) size: Option<Screen>,
     /// The number of rays per pixel, in place of the scripts' own.
     pub(crate) samples: Option<Samples>,
@@ -106,7 +106,7 @@ pub(crate) struct Wishes {
     pub(crate) has_passes: bool,
 }
 
-/// Why the frames cannot be drawn although each script is fine by itself.
+/// The reason why the frames cannot be drawn although each script is correct.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlanError {
     #[error("the input has {}: there is no frame {wanted}", number(*.frames, "frame"))]
@@ -129,10 +129,10 @@ pub(crate) enum PlanError {
 }
 
 impl Plan {
-    /// Parses everything and shows the faults. Returns the faults when a script has an error.
+    /// Parses everything and shows the faults. Returns the faults if a script has an error.
     ///
     /// # Errors
-    /// When the scripts are fine but the wishes cannot be fulfilled.
+    /// Fails if the scripts are correct but the options cannot be satisfied.
     pub(crate) fn new(
         input: &Input,
         limits: &Limits,
@@ -147,7 +147,7 @@ impl Plan {
         })
     }
 
-    /// Parses everything, and returns the faults. There is a plan, or the reason why there is none, exactly if no
+    /// Parses everything, and returns the faults. Returns a plan, or the reason why there is none, if and only if no
     /// script has an error.
     ///
     /// # Errors
@@ -285,7 +285,8 @@ impl Plan {
             .take(self.len() as usize)
     }
 
-    /// The frames to draw in the order in which an animation shows them, which may run back after the last.
+    /// Returns the frames to draw, in the order in which an animation shows them. With `bounce` it runs back after the
+    /// last frame.
     pub(crate) fn shown(&self) -> impl Iterator<Item = Job> + '_ {
         let back = if self.settings.bounces() {
             let inner = usize::try_from(self.len().saturating_sub(2)).unwrap_or(usize::MAX);
@@ -301,10 +302,10 @@ impl Plan {
         self.settings.shown_count(self.len())
     }
 
-    /// Returns the durations of frames in seconds, by their index among the frames that an animation shows, from 0.
+    /// Returns the durations of frames in seconds. Frames are counted from 0 among those that an animation shows.
     ///
     /// # Errors
-    /// None: the times were checked before.
+    /// Cannot fail: the times were checked before.
     pub(crate) fn durations(&self) -> anyhow::Result<BTreeMap<u64, f64>> {
         let selected = self.settings.durations().range(self.selected.clone());
         let own = selected.map(|(frame, seconds)| (frame + 1 - self.selected.start(), *seconds)).collect();
@@ -314,7 +315,7 @@ impl Plan {
     /// Returns the scene that a frame is drawn from.
     ///
     /// # Errors
-    /// When the script cannot be read again, or has changed for the worse since it was checked.
+    /// Fails if the script cannot be read again, or if it has an error that it did not have when it was checked.
     pub(crate) fn scene(&self, job: &Job) -> anyhow::Result<Scene> {
         let part = &self.parts[job.part];
         let script = part.script(&self.limits)?;
@@ -340,12 +341,12 @@ impl Plan {
     /// Returns the text of the script of a frame.
     ///
     /// # Errors
-    /// When it cannot be read again.
+    /// Fails if the script cannot be read again.
     pub(crate) fn text(&self, job: &Job) -> anyhow::Result<Cow<'_, [u8]>> {
         self.parts[job.part].file.read(&self.limits)
     }
 
-    /// Draws a frame with `draw`, which gets it as it is in the middle of its exposure, and at other moments.
+    /// Draws a frame with `draw`, which gets the scene in the middle of its exposure and at other moments.
     ///
     /// # Errors
     /// The errors of [`Self::scene`].
@@ -359,11 +360,12 @@ impl Plan {
         Ok(draw(Exposure::moving(&scene, &after)))
     }
 
-    /// Looks at the first, the middle and the last frame for light that their depth cuts off, and says which
-    /// depth would show it. Gives up after some seconds: glass that mirrors, too, takes for ever at great depths.
+    /// Checks in the first, the middle and the last frame whether their depth cuts off light, and reports the depth
+    /// that would show it. Gives up after some seconds, because glass that also mirrors takes very long at great
+    /// depths.
     ///
     /// # Errors
-    /// The errors of [`Self::scene`], or a signal came.
+    /// The errors of [`Self::scene`], and an error if a signal came.
     pub(crate) fn light_cut_off(&self) -> anyhow::Result<Option<String>> {
         let warning = interrupt::within(LOOKING, |flag| self.light_cut_off_until(flag))?;
         anyhow::ensure!(!interrupt::signalled(), "interrupted");
@@ -399,7 +401,7 @@ impl Plan {
         Ok(None)
     }
 
-    /// The script of a frame, as messages name it.
+    /// The name of the frame's script in messages.
     pub(crate) fn name(&self, job: &Job) -> &str {
         &self.parts[job.part].file.name
     }

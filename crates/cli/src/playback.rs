@@ -25,12 +25,12 @@ impl Playback {
         self.once || self.loops.is_some() || self.final_delay.is_some()
     }
 
-    /// Returns the number of repetitions; `usual` where no flag says so.
+    /// Returns the number of repetitions, or `usual` if no flag sets it.
     pub(crate) fn plays(&self, usual: Plays) -> Plays {
         if self.once { Plays::Once } else { self.loops.map_or(usual, Plays::repeated) }
     }
 
-    /// In hundredths of a second.
+    /// The frame rate or time in hundredths of a second.
     pub(crate) fn last_delay_cs(&self) -> Option<u16> {
         self.final_delay
     }

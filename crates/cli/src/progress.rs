@@ -12,31 +12,31 @@ use rayfold_tracer::Progress as Drawn;
 
 use crate::console::Console;
 
-/// Between two plain lines.
+/// The time between two plain lines.
 const LINES_APART: Duration = Duration::from_secs(5);
 
-/// The pace is measured over this time, and over a least number of things: a stall is soon forgotten, and one slow
-/// frame is not the pace of all.
+/// The rate is measured over this time, and over a minimum number of things. So a stall is soon forgotten, and one slow
+/// frame does not determine the rate.
 const RECENT: Duration = Duration::from_secs(15);
 const RECENT_COUNT: u64 = 8;
 
-/// Between two moments that are remembered.
+/// The time between two moments that are recorded.
 const MARKS_APART: Duration = Duration::from_millis(100);
 
-/// Between two looks at a frame that is being drawn.
+/// The time between two looks at a frame that is being drawn.
 const LOOKS_APART: Duration = Duration::from_millis(100);
 
-/// Columns of a terminal that does not say how many it has.
+/// The number of columns of a terminal that does not report it.
 const USUAL_COLUMNS: usize = 80;
 
-/// Columns of the bar where there is room, and the fewest that show anything.
+/// The number of columns of the bar if there is room, and the minimum that shows anything.
 const BAR: usize = 40;
 const SHORTEST_BAR: usize = 8;
 
 /// The unit that is counted.
 #[derive(Clone, Copy, Debug)]
 enum Unit {
-    /// Things of a name in the plural.
+    /// Things with a name in the plural.
     Each(&'static str),
     /// The work of one frame, shown in percent.
     Frame,
@@ -89,7 +89,7 @@ impl Progress {
         Self { unit, total: AtomicU64::new(total), drawn, start, recent, shown }
     }
 
-    /// There turn out to be more, or fewer.
+    /// Sets another total.
     pub(crate) fn resize(&self, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         if let Shown::Bar(bar) = &self.shown {
@@ -97,7 +97,7 @@ impl Progress {
         }
     }
 
-    /// Sets how many are done. The work of a single frame is set by [`Self::watch`] alone.
+    /// Sets the number of things that are done. The work of a single frame is set by [`Self::watch`] alone.
     pub(crate) fn set(&self, console: &Console, done: u64) {
         if self.drawn.is_none() {
             self.show(console, done);
@@ -109,7 +109,7 @@ impl Progress {
         self.drawn.as_ref()
     }
 
-    /// Does `work`, and shows how much of a single frame is drawn meanwhile.
+    /// Runs `work`, and shows meanwhile how much of a single frame is drawn.
     pub(crate) fn watch<T>(&self, console: &Console, work: impl FnOnce() -> T) -> T {
         let Some(drawn) = self.drawn() else { return work() };
         let (working, ended) = mpsc::channel::<()>();
@@ -152,7 +152,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away and returns how long it took.
+    /// Removes the bar and returns the time since the start.
     pub(crate) fn finish(self) -> Duration {
         if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
@@ -169,7 +169,7 @@ impl Drop for Progress {
     }
 }
 
-/// When how many were done.
+/// The number of things that were done, and when.
 #[derive(Debug)]
 struct Recent(VecDeque<(Instant, u64)>);
 
@@ -219,10 +219,10 @@ fn bar(unit: Unit, total: u64, color: bool, recent: Arc<Mutex<Recent>>) -> Progr
     bar
 }
 
-/// The rate, in things a second, and the time that is left.
+/// The rate, in things per second, and the remaining time.
 type Pace = Option<(f64, Duration)>;
 
-/// `None` as long as nothing is done. `left` is the number of things that are not done.
+/// Returns `None` as long as nothing is done. `left` is the number of things that are not done.
 fn pace(rate: f64, left: u64) -> Pace {
     let is_known = rate.is_finite() && rate > 0.0;
     is_known.then(|| (rate, Duration::try_from_secs_f64(left as f64 / rate).unwrap_or_default()))
@@ -257,7 +257,7 @@ fn line(columns: usize, unit: Unit, done: u64, total: u64, pace: Pace, color: bo
     }
 }
 
-/// `12 of 30 frames`, or `40 % of the frame`; a total of 0 is not known.
+/// Returns `12 of 30 frames`, or `40 % of the frame`; a total of 0 is unknown.
 fn count(unit: Unit, done: u64, total: u64) -> String {
     match unit {
         Unit::Each(of) if total == 0 => format!("{done} {of}"),
@@ -266,12 +266,12 @@ fn count(unit: Unit, done: u64, total: u64) -> String {
     }
 }
 
-/// Rounded down: 100 % is the end.
+/// Returns percent, rounded down: 100 % is the end.
 fn percent(done: u64, total: u64) -> String {
     format!("{} %", (u128::from(done) * 100).checked_div(u128::from(total)).unwrap_or(0))
 }
 
-/// `12 of 30 frames, 8.7 a second, 3 s left`, or `40 % of the frame, 3 s left`.
+/// Returns `12 of 30 frames, 8.7 a second, 3 s left`, or `40 % of the frame, 3 s left`.
 fn words(unit: Unit, done: u64, total: u64, pace: Pace) -> String {
     let mut text = count(unit, done, total);
     let Some((rate, left)) = pace else { return text };

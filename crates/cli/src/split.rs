@@ -1,4 +1,4 @@
-//! `rayfold split`: a script with many Traces becomes a folder with a script a frame.
+//! `rayfold split`: a script with many frames becomes a folder with one script per frame.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -78,8 +78,8 @@ pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Returns the text of a part. One with curves says that it is a single frame, so that nobody takes it for a script whose frames
-/// were forgotten.
+/// Returns the text of a part. A part with curves says that it is a single frame, so that it is not mistaken for a
+/// script without its `Frames`.
 fn part(text: &str) -> Cow<'_, str> {
     if text.contains('(') && !text.contains("\nFrames ") {
         return text.replacen("\nTrace", "\nFrames 1\nTrace", 1).into();
@@ -87,7 +87,7 @@ fn part(text: &str) -> Cow<'_, str> {
     text.into()
 }
 
-/// Copies the files that a script names into the folder, as far as they are there.
+/// Copies the files that a script names into the folder, if they exist.
 fn copy_files(names: &[String], script: Option<&Path>, folder: &Path) -> anyhow::Result<()> {
     let beside = script.and_then(Path::parent).filter(|beside| *beside != Path::new(""));
     let beside = beside.unwrap_or(Path::new("."));

@@ -12,7 +12,7 @@ use crate::interrupt;
 use crate::outcome::Outcome;
 use crate::threads::Threads;
 
-/// Between two looks at whether to stop.
+/// The time between two checks whether to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Design scenes in a browser, in the final picture

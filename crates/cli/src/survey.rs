@@ -1,4 +1,4 @@
-//! Looks at all scripts before anything is done with any of them, so that all faults are reported in one go.
+//! Examines all scripts before anything is done with any of them, so that all faults are reported at once.
 
 use std::fmt::Display;
 use std::io::Read;
@@ -21,18 +21,18 @@ pub(crate) struct Faults {
     pub(crate) diagnostics: Vec<Diagnostic>,
     /// Files that could not be read.
     pub(crate) unreadable: Vec<anyhow::Error>,
-    /// Why scripts that are fine by themselves are no animation together, and files that are not read.
+    /// The reasons why correct scripts form no animation together, and the files that are not read.
     pub(crate) conflicts: Vec<Conflict>,
     /// The number of files that have an error.
     pub(crate) bad: usize,
-    /// The number of files that were looked at.
+    /// The number of files that were examined.
     pub(crate) files: usize,
 }
 
-/// Why scripts are no animation together, or a file is not read.
+/// The reason why scripts form no animation together, or why a file is not read.
 #[derive(Debug, Serialize)]
 pub(crate) struct Conflict {
-    /// As the user named them.
+    /// The name that the user gave.
     input: String,
     severity: Severity,
     message: String,
@@ -57,19 +57,19 @@ impl Faults {
         self.conflicts.iter().filter(|conflict| conflict.severity == severity).count()
     }
 
-    /// Notes why the scripts of an input, which are fine by themselves, are no animation together.
+    /// Records why the scripts of an input, which are correct by themselves, form no animation together.
     pub(crate) fn conflict(&mut self, input: &Path, severity: Severity, why: &impl Display) {
         let (input, message) = (input.display().to_string(), why.to_string());
         self.conflicts.push(Conflict { input, severity, message });
     }
 
-    /// Notes the faults of the next script, which is `None` when it is of no use.
+    /// Records the faults of the next script, which is `None` if it cannot be used.
     pub(crate) fn script(&mut self, parsed: anyhow::Result<Parsed>) -> Option<Script> {
         let parsed = parsed.map(|parsed| (parsed.script, parsed.diagnostics));
         self.sort_out(parsed)
     }
 
-    /// Reads a folder's settings and notes their faults; they are `None` when they are of no use.
+    /// Reads a folder's settings and records their faults. Returns `None` if they cannot be used.
     pub(crate) fn settings(&mut self, path: &Path) -> Option<AnimationSettings> {
         let name = path.display().to_string();
         let mut text = Vec::new();
@@ -81,12 +81,12 @@ impl Faults {
         self.sort_out(parsed)
     }
 
-    /// Forgets the advice to use several rays a pixel, because the command line asks for them.
+    /// Drops the advice to use several rays per pixel, because the command line requests them.
     pub(crate) fn samples_are_asked_for(&mut self) {
         self.diagnostics.retain(|diagnostic| diagnostic.code != Code::NeedsSamples);
     }
 
-    /// Notes an input that could not even be listed.
+    /// Records an input that could not even be listed.
     pub(crate) fn unusable(&mut self, error: anyhow::Error) {
         let _: Option<()> = self.sort_out(Err(error));
     }
@@ -116,7 +116,7 @@ impl Faults {
         value
     }
 
-    /// Shows everything to people; warnings only where they did not ask for quiet.
+    /// Shows everything to people, but warnings only if they did not ask for quiet.
     pub(crate) fn show(&self, console: &Console) {
         for error in &self.unreadable {
             console.error(error);
@@ -140,7 +140,7 @@ impl Faults {
         }
     }
 
-    /// `3 errors in 2 of 50 files`.
+    /// Returns `3 errors in 2 of 50 files`.
     pub(crate) fn count(&self) -> String {
         let errors = number(self.errors() as u64, "error");
         if self.files == 1 || self.bad == 0 {
@@ -151,10 +151,10 @@ impl Faults {
     }
 }
 
-/// Parses all scripts side by side and applies `map` to each, in their order.
+/// Parses all scripts in parallel and applies `map` to each, in their order.
 ///
 /// # Errors
-/// An error only if the run was asked to stop. A file that cannot be read is an error in its own place.
+/// Fails only if the run was asked to stop. A file that cannot be read is an error in its own place.
 pub(crate) fn parse_all<T: Send>(
     scripts: &[ScriptFile],
     limits: &Limits,

@@ -7,7 +7,7 @@ use anyhow::Context;
 use crate::console::Console;
 use crate::values;
 
-/// Threads for each processor, at most. More only take memory.
+/// The maximum number of threads per processor. More only take memory.
 const MAX_PER_PROCESSOR: usize = 4;
 
 /// `--threads`, for every subcommand that draws or encodes.
@@ -19,10 +19,10 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
-    /// Sets up the pool that everything in this process runs on; to be called once, before any of that.
+    /// Sets up the thread pool of this process. Call it once, before anything runs on the pool.
     ///
     /// # Errors
-    /// When the threads cannot be started.
+    /// Fails if the threads cannot be started.
     pub(crate) fn start(self) -> anyhow::Result<()> {
         rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(0, |asked| asked.min(most())))

@@ -1,4 +1,4 @@
-//! Parsers for the values of flags, whose errors say what would be right.
+//! Parsers for the values of flags. Their errors state what would be right.
 
 use std::str::FromStr;
 
@@ -40,7 +40,7 @@ pub(crate) fn rate(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number, such as 25 or 12.5, or a fraction, such as 30000/1001".into())
 }
 
-/// Seconds as hundredths of one, which is how an animation counts.
+/// Parses seconds into hundredths of a second, the unit of an animation.
 ///
 /// # Errors
 /// The message says what was expected.
@@ -51,7 +51,7 @@ pub(crate) fn hundredths(text: &str) -> Result<u16, String> {
     if (2.0..=65_535.0).contains(&value.round()) { Ok(value.round() as u16) } else { Err(expected.into()) }
 }
 
-/// Rays a pixel and the error that is aimed at, as `64` or `64,0.5`.
+/// Parses rays per pixel and the target error, such as `64` or `64,0.5`.
 ///
 /// # Errors
 /// The message says what was expected.
@@ -66,7 +66,7 @@ pub(crate) fn samples(text: &str) -> Result<Samples, String> {
     Samples::new(most, error).map_err(|_| expected.into())
 }
 
-/// A size in bytes, as `8M` or `500k`; a unit is a power of 1,000.
+/// Parses a size in bytes, such as `8M` or `500k`; a unit is a power of 1,000.
 ///
 /// # Errors
 /// The message says what was expected.
@@ -102,7 +102,7 @@ pub(crate) fn color(text: &str) -> Result<[u8; 3], String> {
     Ok([level(0)?, level(2)?, level(4)?])
 }
 
-/// Width and height, as `640x480`.
+/// Parses width and height, such as `640x480`.
 ///
 /// # Errors
 /// The message says what was expected.

@@ -1,13 +1,13 @@
-//! Numbers as people read them.
+//! Formats numbers for people.
 
 use std::fmt;
 
-/// `1 frame`, `2 frames`.
+/// Returns `1 frame` or `2 frames`.
 pub(crate) fn number(count: u64, of: &str) -> String {
     format!("{count} {of}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Bytes in the unit that leaves one to three digits before the point.
+/// Formats bytes in the unit that leaves one to three digits before the point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Size(pub(crate) u64);
 

@@ -53,7 +53,7 @@ enum Wanted {
 }
 
 /// # Errors
-/// When OUT is neither a file of an animation nor a pattern, or a flag does not go with it.
+/// Fails if OUT is neither a file of an animation nor a pattern, or if a flag does not fit it.
 fn wanted(args: &Args) -> Result<Wanted, Usage> {
     let shown = args.output.display();
     match Target::parse(&args.output, None) {
@@ -153,10 +153,10 @@ fn not_there(
     anyhow::anyhow!("there is no {name} of {} as it is now: {why} ({count}){last}", head.animation)
 }
 
-/// Downloads a file as it is now.
+/// Downloads the current file.
 ///
 /// # Errors
-/// When there is none, it cannot be written, or it is replaced all the time.
+/// Fails if there is no file, it cannot be written, or it is replaced again and again.
 pub(crate) async fn file(
     client: Client<'_>,
     animation: &Animation,
@@ -223,7 +223,7 @@ async fn fetch_frames(
     Ok(())
 }
 
-/// Converts an image to eight bits per channel, with alpha if it has that.
+/// Converts an image to eight bits per channel, with alpha if it has any.
 fn levels(image: image::DynamicImage) -> image::DynamicImage {
     if image.color().has_alpha() { image.into_rgba8().into() } else { image.into_rgb8().into() }
 }

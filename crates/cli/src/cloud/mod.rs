@@ -24,10 +24,10 @@ pub(crate) mod retry;
 pub(crate) mod status;
 pub(crate) mod submit;
 
-/// The time between two looks at whether the run was asked to stop.
+/// The time between two checks whether the run was asked to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Scripts that are named, at most.
+/// The maximum number of scripts that a message names.
 const MAX_NAMED: usize = 20;
 
 /// `--bucket`, for every subcommand that talks to one.
@@ -44,10 +44,10 @@ pub(crate) type Client<'a> = rayfold_client::Client<'a, S3Store, SystemClock>;
 /// A look at an animation in a bucket of S3.
 pub(crate) type Watch<'a> = rayfold_client::Watch<'a, S3Store, SystemClock>;
 
-/// Does `work` on the bucket; it is dropped when the run is asked to stop.
+/// Runs `work` on the bucket. The work is dropped when the run is asked to stop.
 ///
 /// # Errors
-/// The errors of the work, and one if the environment does not say how to reach the bucket.
+/// The errors of the work, and an error if the environment does not say how to reach the bucket.
 pub(crate) fn with_bucket<T>(
     args: &BucketArgs,
     work: impl AsyncFnOnce(Client<'_>) -> anyhow::Result<T>,
@@ -66,7 +66,7 @@ pub(crate) fn with_bucket<T>(
     })
 }
 
-/// Puts an error of the client into the words for users.
+/// Rewords an error of the client for users.
 fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
     let Some(source) = error.downcast_ref::<client::Error>() else { return error };
     match source.explain(bucket) {
@@ -76,11 +76,10 @@ fn explain(error: anyhow::Error, bucket: &str) -> anyhow::Error {
     }
 }
 
-/// Shows `names`, or as many as people read, and what else there is to say; then asks whether to go on. Returns
-/// `None` when there is no user to ask.
+/// Shows `names`, up to [`MAX_NAMED`] of them, and asks the question. Returns `None` if there is no user to ask.
 ///
 /// # Errors
-/// When the system refuses a thread.
+/// Fails if the system refuses a thread.
 async fn agree(names: &[String], question: &str, console: &Console) -> anyhow::Result<Option<bool>> {
     if !console.can_ask() {
         return Ok(None);
@@ -112,7 +111,7 @@ fn is_yes(answer: &str) -> bool {
     matches!(answer.trim().to_ascii_lowercase().as_str(), "y" | "yes")
 }
 
-/// Names in a row, or as many as people read.
+/// Returns names in a row, up to [`MAX_NAMED`] of them.
 fn named(names: &[String]) -> String {
     let mut text = names.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
     if names.len() > MAX_NAMED {
@@ -132,7 +131,7 @@ async fn interrupted() {
     }
 }
 
-/// For clap: the name of an animation.
+/// Parses the name of an animation, for clap.
 pub(crate) fn parse_animation(name: &str) -> Result<Animation, String> {
     Animation::new(name.trim_end_matches('/')).map_err(|error| match error {
         Error::Key { problem, .. } => problem.to_owned(),

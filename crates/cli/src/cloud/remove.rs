@@ -1,4 +1,4 @@
-//! `rayfold remove`: an animation out of the bucket, with all that was made of it.
+//! `rayfold remove`: removes an animation and everything made of it from the bucket.
 
 use rayfold_client::Contents;
 use rayfold_pipeline::keys::Animation;

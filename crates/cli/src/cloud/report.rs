@@ -6,7 +6,7 @@ use rayfold_pipeline::manifest::{Manifest, Rejected};
 use crate::console::Console;
 use crate::wording::number;
 
-/// `48 of 50 frames, 2 failed`.
+/// Returns a text such as `48 of 50 frames, 2 failed`.
 pub(crate) fn count(manifest: &Manifest) -> String {
     let head = &manifest.head;
     let mut text = format!("{} of {}", head.done, number(head.total + head.not_uploaded(), "frame"));

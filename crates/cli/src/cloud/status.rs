@@ -1,4 +1,4 @@
-//! `rayfold status`: where the animations of a bucket stand.
+//! `rayfold status`: the progress of the animations of a bucket.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -16,7 +16,7 @@ use crate::console::{Console, Format, visible};
 use crate::outcome::Outcome;
 use crate::wording::{Size, number};
 
-/// Between two looks at a whole bucket.
+/// The time between two looks at a whole bucket.
 const APART: Duration = Duration::from_secs(2);
 
 /// Show where the animations of a bucket stand
@@ -51,7 +51,7 @@ pub(crate) struct Args {
 #[derive(Serialize)]
 struct Report<'a> {
     animations: Vec<Entry<'a>>,
-    /// Only where the whole bucket was looked at.
+    /// Present only if the whole bucket was examined.
     #[serde(skip_serializing_if = "Option::is_none")]
     misplaced: Option<Misplaced<'a>>,
 }
@@ -73,7 +73,7 @@ struct MisplacedEntry<'a> {
 struct Entry<'a> {
     #[serde(flatten)]
     known: Known<'a>,
-    /// There are scripts, or versions of them, that the functions have not seen.
+    /// Whether there are scripts, or versions of them, that the functions have not seen.
     behind: bool,
     gif: Option<File<'a>>,
     /// The other files, by their ending.
@@ -180,7 +180,7 @@ fn show(
     }
 }
 
-/// Shows the state if it differs from the one shown last by more than ages; returns whether it does.
+/// Shows the state if it differs from the one shown last in more than ages. Returns whether it does.
 fn show_if_new(
     watches: &[Watch<'_>],
     overview: Option<&Overview>,
@@ -206,7 +206,7 @@ fn show_if_new(
     Ok(true)
 }
 
-/// Says how many objects belong to no animation, and names the first.
+/// Warns of the number of objects that belong to no animation, and names the first.
 fn warn_of_misplaced(overview: &Overview, console: &Console) {
     if overview.misplaced.is_empty() {
         return;
@@ -263,7 +263,7 @@ fn table(watches: &[Watch<'_>], with_age: bool) -> String {
     text
 }
 
-/// Why there is no manifest to show, in a word and in a sentence.
+/// Returns the reason why there is no manifest to show, as a word and as a sentence.
 fn unknown(watch: &Watch<'_>) -> (&'static str, &'static str) {
     if watch.is_unreadable() {
         ("unreadable", "its manifest cannot be read: the next sweep makes it anew")

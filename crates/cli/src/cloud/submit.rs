@@ -1,6 +1,6 @@
-//! `rayfold submit`: a folder of scripts to the bucket, and the animation back.
+//! `rayfold submit`: uploads a folder of scripts, and downloads the animation.
 //!
-//! Nothing is remembered here: an interrupted submission continues from the contents of the bucket.
+//! It keeps no state: an interrupted submission continues from the contents of the bucket.
 
 use std::path::{Path, PathBuf};
 
@@ -26,11 +26,11 @@ use crate::render::target::container_of;
 use crate::values;
 use crate::wording::number;
 
-/// Bytes of a script's name that can be drawn on MinIO and SeaweedFS: their path segments have at most 255 bytes, and a
-/// frame's has its script's version, too.
+/// The maximum number of bytes of a script's name that can be drawn on MinIO and SeaweedFS. Their path segments have at
+/// most 255 bytes, and that of a frame also contains the script's version.
 const LONGEST_NAME: usize = 200;
 
-/// The most bytes of the name of a script that names files: its version is longer.
+/// The maximum number of bytes of the name of a script that names files: its version is longer.
 const LONGEST_NAME_WITH_FILES: usize = 110;
 
 /// Render a folder of scripts, or one script, in the cloud and download the animation
@@ -127,12 +127,12 @@ pub(crate) struct Order {
 }
 
 impl Order {
-    /// Without a name it has the folder's, without an output all that its settings ask for, under its name; the outputs are
-    /// probed if they are fetched.
+    /// Makes an order. The default name is that of the folder. By default the outputs are all that the settings ask
+    /// for, under that name. If outputs are fetched, it checks that they can be written.
     ///
     /// # Errors
-    /// When a script is faulty, the frames are of unlike sizes, the settings do not ask for the output, or it cannot be
-    /// written there.
+    /// Fails if a script is faulty, the frames have different sizes, the settings do not ask for the output, or it
+    /// cannot be written there.
     pub(crate) fn new(
         folder: &PathBuf,
         name: Option<&Animation>,
@@ -170,10 +170,10 @@ impl Order {
         Ok(Self { animation, submission, outputs })
     }
 
-    /// Sends it to a bucket that has nothing yet, waits, and downloads the files.
+    /// Uploads the animation to an empty bucket, waits, and downloads the files.
     ///
     /// # Errors
-    /// When there are none, or the bucket cannot be used.
+    /// Fails if there are no files, or the bucket cannot be used.
     pub(crate) async fn deliver(
         &self,
         client: Client<'_>,
@@ -235,7 +235,7 @@ fn submission(
     Ok(Submission::new(animation.clone(), scripts, settings)?.with_files(files)?)
 }
 
-/// Shows the uploads and deletions that a submission would make, a line a file.
+/// Shows the uploads and deletions that a submission would make, one line per file.
 async fn preview(
     client: Client<'_>,
     submission: &Submission,
@@ -259,7 +259,7 @@ async fn preview(
 /// Asks whether scripts that the folder does not have may be deleted.
 ///
 /// # Errors
-/// When they may not, or there is no user to ask.
+/// Fails if they may not be deleted, or there is no user to ask.
 async fn may_delete(
     args: &Args,
     submission: &Submission,
@@ -284,7 +284,7 @@ async fn may_delete(
     }
 }
 
-/// Makes the bucket's folder as wanted, and tells how far that is.
+/// Makes the bucket's folder equal to the submission, and shows the progress.
 async fn send(
     client: Client<'_>,
     submission: &Submission,
@@ -316,8 +316,8 @@ async fn send(
     client.submit(submission, show).await
 }
 
-/// Waits until the files are made of the uploaded scripts or cannot be, and shows the progress. Returns the reason if
-/// there are none.
+/// Waits until the files of the uploaded scripts are made or cannot be made, and shows the progress. Returns the reason
+/// if there are no files.
 async fn wait(
     client: Client<'_>,
     animation: &Animation,

@@ -1,4 +1,4 @@
-//! Estimates the time that the render function would take for the frames of a folder: some of them are drawn here.
+//! Estimates the time that the render function would take for the frames of a folder, by drawing some of them.
 
 use std::fs;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use crate::render::draw;
 use crate::render::target::Format;
 use crate::wording::{Size, number};
 
-/// Frames that are drawn, spread evenly over the animation.
+/// The number of frames that are drawn, spread evenly over the animation.
 const SAMPLES: u64 = 8;
 
 /// The number of times that each of them is drawn.
@@ -29,7 +29,7 @@ pub(super) struct Measured {
     pub(super) size: Screen,
     /// The time of the render function, per frame.
     pub(super) ms: f64,
-    /// A frame's PNG, in the mean.
+    /// The mean size of a frame's PNG.
     pub(super) frame_kb: f64,
     /// The outputs that the settings ask for.
     pub(super) outputs: Vec<Container>,
@@ -38,10 +38,10 @@ pub(super) struct Measured {
     pub(super) files_mb: f64,
 }
 
-/// Draws some frames of `input`, for functions of `memory_mb` on this number of places.
+/// Draws some frames of `input`, for functions with `memory_mb` and this number of places.
 ///
 /// # Errors
-/// When a script has an error, or the scripts are no animation.
+/// Fails if a script has an error, or the scripts are no animation.
 pub(super) fn measure(
     input: &[PathBuf],
     memory_mb: f64,

@@ -1,7 +1,7 @@
 //! `rayfold cost`: what an animation costs on AWS, before it is made.
 //!
-//! Sends no requests: the prices are a data file, the rest is arithmetic, and the time that drawing
-//! takes is measured here.
+//! Sends no requests: the prices are a data file, the rest is arithmetic, and drawing times are measured on this
+//! machine.
 
 mod measure;
 
@@ -21,10 +21,10 @@ use crate::outcome::Outcome;
 use crate::values;
 use measure::measure;
 
-/// The longest that assembling may take, in seconds: invocations of the assemble function, of 15 minutes each.
+/// The maximum time of an assembly in seconds: invocations of the assemble function, of 15 minutes each.
 const MAX_ASSEMBLING_S: f64 = MAX_PIECES as f64 * 900.0;
 
-/// The least amount that is shown, as 0.0001 US dollars; smaller ones are summed up.
+/// The least amount that is shown, in units of 0.0001 US dollars; smaller ones are summed up.
 const LEAST_SHOWN: f64 = 0.000_05;
 
 /// Estimate what an animation costs on AWS
@@ -101,9 +101,9 @@ struct Report<'a> {
     region: &'a str,
     currency: &'a str,
     sources: &'a [String],
-    /// Everything, while it is made and in the first month.
+    /// The total while the animation is made, and in the first month.
     first_month_usd: f64,
-    /// Everything, in each month after.
+    /// The total in each later month.
     later_month_usd: f64,
     workload: &'a Workload,
     sections: &'a [Section],
@@ -233,7 +233,7 @@ fn table(work: &Workload, prices: &Prices, sections: &[Section]) -> String {
     text
 }
 
-/// With thousands separated; small ones with as many places as tell something.
+/// Formats an amount with thousands separators; small amounts get as many decimal places as are significant.
 fn amount(value: f64) -> String {
     if value < 100.0 && value.fract() != 0.0 {
         return format!("{value:.3}");

@@ -1,4 +1,4 @@
-//! `rayfold dev --endpoint`: the functions on a bucket of an S3 server that is running already.
+//! `rayfold dev --endpoint`: the functions on a bucket of an S3 server that is already running.
 
 use anyhow::{Context, bail};
 use rayfold_local::cluster::Bucket;
@@ -13,7 +13,7 @@ use super::stop::interrupted;
 use crate::console::Console;
 use crate::outcome::Outcome;
 
-/// The variable of the token that the server sends with each call of the webhook.
+/// The environment variable with the token that the server sends with each call of the webhook.
 const TOKEN: &str = "RAYFOLD_WEBHOOK_TOKEN";
 
 /// Runs until a signal stops it.

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::console::Console;
 
-/// Between two looks at the manifests of animations in which something happened.
+/// The time between two looks at the manifests of animations in which something happened.
 const APART: Duration = Duration::from_millis(500);
 
 /// Prints the events of a run.
@@ -22,7 +22,7 @@ pub(crate) struct News<'a> {
     changed: BTreeSet<Animation>,
     reported: Vec<(Animation, String)>,
     next: Instant,
-    /// Whether only trouble is reported.
+    /// Whether only problems are printed.
     is_brief: bool,
 }
 
@@ -32,12 +32,12 @@ impl<'a> News<'a> {
         Self { console, store, changed, reported, next, is_brief: false }
     }
 
-    /// Prints only trouble: the progress of an animation is printed elsewhere.
+    /// Prints only problems: the progress of an animation is printed elsewhere.
     pub(crate) fn brief(console: &'a Console, store: &'a S3Store) -> Self {
         Self { is_brief: true, ..Self::new(console, store) }
     }
 
-    /// Returns when it is time to look at the changed animations; never while none has changed.
+    /// Returns the time of the next look at the changed animations, or never if none has changed.
     pub(crate) async fn tick(&self) {
         if self.changed.is_empty() {
             std::future::pending::<()>().await;
@@ -45,7 +45,7 @@ impl<'a> News<'a> {
         tokio::time::sleep_until(self.next.into()).await;
     }
 
-    /// Tells of an observation.
+    /// Prints an observation.
     pub(crate) fn hear(&mut self, observation: &Observation) {
         match &observation.seen {
             Seen::Log { line, .. } => match serde_json::from_str(line) {
@@ -100,7 +100,7 @@ impl<'a> News<'a> {
         }
     }
 
-    /// Tells how far the animations are in which something happened.
+    /// Prints the progress of the animations in which something happened.
     pub(crate) async fn look(&mut self) {
         for animation in std::mem::take(&mut self.changed) {
             let Ok(object) = self.store.get(&animation.manifest()).await else { continue };
@@ -189,7 +189,7 @@ mod tests {
 
     use super::*;
 
-    /// The event of a file that scripts name was called one of `animation.json`.
+    /// An event of a file that scripts name was reported as one of `animation.json`.
     #[test]
     fn events_name_the_file_or_the_frame_that_they_are_about() {
         for (key, frame, outcome, expected) in [

@@ -17,7 +17,7 @@ const DURATIONS: &str = "durations";
 /// other fields are reported as not read.
 ///
 /// # Errors
-/// When the file cannot be read, or says something else.
+/// Fails if the file cannot be read, or does not contain times.
 pub(super) fn read(path: &Path, console: &Console) -> anyhow::Result<BTreeMap<u64, f64>> {
     let name = path.display().to_string();
     let mut text = String::new();

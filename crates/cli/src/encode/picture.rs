@@ -26,7 +26,7 @@ use super::video::{SIGNATURE, Video};
 use super::webp;
 use crate::interrupt;
 
-/// The gamma of the display. A gamma of a file that is so near to it makes no visible difference (libpng's threshold).
+/// The gamma of the display. If a file's gamma is this near to it, the difference is invisible (libpng's threshold).
 const DISPLAY_GAMMA: f64 = 2.2;
 const GAMMA_THRESHOLD: f64 = 0.05;
 
@@ -36,7 +36,7 @@ const JPEG_SIGNATURE: &[u8] = b"\xff\xd8\xff";
 const GIF_SIGNATURE: &[u8] = b"GIF8";
 const WEBP_SIGNATURE: &[u8] = b"RIFF";
 
-/// The time for which players show a frame of an animated file whose own time is zero, or too short in their view.
+/// The time for which players show a frame of an animated file if its own time is zero or too short for them.
 const USUAL_SECONDS: f64 = 0.1;
 const LEAST_SECONDS: f64 = 0.011;
 
@@ -68,10 +68,10 @@ enum Animated {
     WebP,
 }
 
-/// The frames of an animated file, each with its seconds.
+/// The frames of an animated file, each with its duration in seconds.
 type Frames<'a> = Box<dyn Iterator<Item = anyhow::Result<(DynamicImage, f64)>> + 'a>;
 
-/// The function that takes the frames of a file in order, each with the seconds for which the file shows it.
+/// The function that takes the frames of a file in order, each with its duration in seconds.
 type Take<'a> = &'a mut dyn FnMut(DynamicImage, Option<f64>) -> anyhow::Result<()>;
 
 impl Picture {
@@ -176,7 +176,7 @@ impl Picture {
         self.source.name()
     }
 
-    /// Returns the frames per second of a video; other files give none.
+    /// Returns the frames per second of a video, or `None` for other files.
     pub(super) fn fps(&self) -> Option<f64> {
         match &self.kind {
             Kind::Video(video) => Some(video.fps),
@@ -184,7 +184,7 @@ impl Picture {
         }
     }
 
-    /// Returns how often an animated file is shown; other files do not say.
+    /// Returns the number of times that an animated file is shown, or `None` for other files.
     pub(super) fn plays(&self) -> Option<Plays> {
         match self.kind {
             Kind::Animated { plays, .. } if self.frames > Some(1) => Some(plays),
@@ -192,7 +192,7 @@ impl Picture {
         }
     }
 
-    /// Returns the columns and rows as the picture is shown.
+    /// Returns the columns and rows of the picture as it is shown.
     ///
     /// # Errors
     /// When the header cannot be read; the error names the file.
@@ -240,7 +240,7 @@ impl Picture {
     /// Decodes the frames of an animation or a video, each as a whole picture.
     ///
     /// # Errors
-    /// When the frames cannot be decoded, with the file's name, and the errors of `take`.
+    /// Fails if the frames cannot be decoded (the error names the file), or if `take` fails.
     pub(super) fn decode_each(&self, take: Take<'_>) -> anyhow::Result<()> {
         let (format, gamma) = match &self.kind {
             Kind::Animated { format, gamma, .. } => (*format, *gamma),
@@ -312,7 +312,7 @@ fn frames<'a>(decoder: impl AnimationDecoder<'a>) -> Frames<'a> {
     }))
 }
 
-/// Returns how often an animation is shown whose file says so: 0 is for ever.
+/// Returns the number of times that an animation is shown, from the number in its file: 0 is for ever.
 fn plays_of(times: u32) -> Plays {
     match times {
         0 => Plays::Endless,
@@ -358,7 +358,7 @@ fn check_size(width: u32, height: u32) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Runs `read`, and names the file in its error. A panic of a decoder, as of some on unusual files, is an error.
+/// Runs `read`, and names the file in its error. Some decoders panic on unusual files; a panic is returned as an error.
 fn named<T>(name: &str, read: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     let read = quietly(read).unwrap_or_else(|| bail!("the decoder cannot cope with it"));
     // The decoders' messages already contain those of their causes.
@@ -370,7 +370,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Calls `work`; `None` if it panics, which is not reported here.
+/// Runs `work`. Returns `None` if it panics; the panic is not reported here.
 fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
     static HOOK: std::sync::Once = std::sync::Once::new();
     HOOK.call_once(|| {

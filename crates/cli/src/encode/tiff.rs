@@ -17,7 +17,7 @@ const NO_PAGE: u64 = 0b101;
 /// The PlanarConfiguration of samples that are stored channel by channel.
 const PLANAR: u64 = 2;
 
-/// A number of pages above that of any file of pictures.
+/// More pages than any real file has.
 const MAX_PAGES: usize = 1 << 20;
 
 /// The byte order and offset size of a file.
@@ -64,7 +64,7 @@ pub(super) fn is_tiff(header: &[u8; 8]) -> bool {
 /// Reads the first eight bytes of a file.
 ///
 /// # Errors
-/// When the file is shorter.
+/// Fails if the file is shorter.
 pub(super) fn header(file: &mut (impl Read + Seek)) -> io::Result<[u8; 8]> {
     let mut header = [0; 8];
     file.rewind()?;

@@ -23,7 +23,7 @@ pub(super) struct Video {
     /// The frames per second.
     pub(super) fps: f64,
     layout: Layout,
-    /// The decoder, until the reader of the frames takes it.
+    /// The decoder, until the frames are read.
     frames: Arc<Mutex<Option<y4m::Decoder<Counting>>>>,
     /// The number of bytes read.
     count: Arc<AtomicU64>,
@@ -72,7 +72,7 @@ impl Video {
     /// Decodes the frames in order. A stream is read only once.
     ///
     /// # Errors
-    /// When the stream is cut off, and the errors of `take`.
+    /// Fails if the stream is cut off, or if `take` fails.
     pub(super) fn each(&self, mut take: impl FnMut(RgbImage) -> anyhow::Result<()>) -> anyhow::Result<()> {
         let decoder = self.frames.lock().unwrap_or_else(PoisonError::into_inner).take();
         let mut decoder = decoder.context("it can be read only once")?;

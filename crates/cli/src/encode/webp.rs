@@ -1,8 +1,8 @@
 //! The frames of an animated WebP, as they are shown: RFC 9649, sections 2.7.1 and 2.7.1.1.
 //!
-//! `image-webp` decodes the picture of each frame. What a frame leaves of the one before is worked out here, because that crate
-//! (0.2.4) keeps frames that are to be disposed of, and blends one level too dark. As in browsers, the canvas begins transparent
-//! and a disposed frame leaves it so, whatever background colour the file suggests.
+//! `image-webp` decodes the picture of each frame. This module composes the frames, because that crate (0.2.4) keeps
+//! frames that are to be disposed of, and blends one level too dark. As in browsers, the canvas begins transparent and
+//! a disposed frame leaves it so, whatever background colour the file suggests.
 
 use std::io::Cursor;
 
@@ -10,11 +10,11 @@ use anyhow::{Context, ensure};
 use image::{Rgba, RgbaImage};
 use image_webp::WebPDecoder;
 
-/// The length of the header of the file, and of that of a chunk.
+/// The lengths of the header of the file and of that of a chunk.
 const FILE_HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 
-/// The length of the numbers of a frame, before its picture.
+/// The length of the fields of a frame, before its picture.
 const FRAME_HEADER: usize = 16;
 
 /// Flags of a frame.
@@ -39,7 +39,7 @@ pub(super) struct Frames {
 struct Place([u32; 4]);
 
 impl Frames {
-    /// Begins with the bytes of a file, and the columns and rows that its header gives.
+    /// Starts from the bytes of a file, and the columns and rows in its header.
     pub(super) fn new(bytes: Vec<u8>, (width, height): (u32, u32)) -> Self {
         Self { bytes, at: FILE_HEADER, canvas: RgbaImage::new(width, height), disposed: None }
     }
@@ -84,7 +84,7 @@ impl Frames {
     }
 }
 
-/// Returns the kind of the chunk at an offset, where its data begin, and their length.
+/// Returns the kind of the chunk at an offset, the start of its data, and their length.
 fn chunk(bytes: &[u8], at: usize) -> Option<([u8; 4], usize, usize)> {
     let header = bytes.get(at..at + CHUNK_HEADER)?;
     let (kind, length) = header.split_first_chunk()?;
@@ -119,7 +119,7 @@ fn decode(chunks: &[u8], (width, height): (u32, u32)) -> anyhow::Result<RgbaImag
     RgbaImage::from_raw(width, height, pixels).context("a frame lacks pixels")
 }
 
-/// Puts a pixel over another, each with alpha that its colour is not multiplied by (RFC 9649, "blending method"). Rounds to the
+/// Puts a pixel over another; their colours are not multiplied by alpha (RFC 9649, "blending method"). Rounds to the
 /// nearest level.
 fn blended(above: Rgba<u8>, below: Rgba<u8>) -> Rgba<u8> {
     let [over, under] = [above, below].map(|pixel| u32::from(pixel.0[3]));
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(blended(Rgba([100, 0, 0, 51]), Rgba([0, 0, 0, 0])), Rgba([100, 0, 0, 51]));
     }
 
-    /// By hand: half red over half blue has 3/4 of cover, 2/3 of it red.
+    /// Computed by hand: half red over half blue has a cover of 3/4, of which 2/3 is red.
     #[test]
     fn halves_are_mixed_by_their_cover() {
         assert_eq!(blended(Rgba([255, 0, 0, 128]), Rgba([0, 0, 255, 128])), Rgba([170, 0, 85, 192]));

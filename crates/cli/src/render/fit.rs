@@ -19,13 +19,13 @@ use crate::wording::Size;
 /// The numbers of levels of a channel, from the best quality to the worst.
 const LEVELS: [u16; 16] = [256, 129, 86, 65, 52, 43, 33, 26, 21, 17, 14, 11, 9, 7, 5, 4];
 
-/// The part of a step up to which a pixel may be off and keep its level, so that noise changes no pixel.
+/// The part of a step by which a pixel may differ and still keep its level, so that noise changes no pixel.
 const KEPT: f32 = 0.75;
 
 /// Writes an animation as [`movie::write`] does, in at most `limit` bytes.
 ///
 /// # Errors
-/// The errors of [`movie::write`], and one when even the worst quality is larger.
+/// The errors of [`movie::write`], and one if even the worst quality is larger.
 pub(crate) fn write(
     place: &Place,
     container: Container,

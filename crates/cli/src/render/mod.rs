@@ -136,7 +136,7 @@ impl From<Numbers> for Precision {
     }
 }
 
-/// First and last frame, where they are given.
+/// The first and the last frame, if given.
 type Frames = (Option<u64>, Option<u64>);
 
 pub(crate) fn run(args: &Args, console: &Console) -> anyhow::Result<Outcome> {
@@ -197,7 +197,7 @@ fn check(args: &Args, target: &Target) -> Result<(), Usage> {
 }
 
 /// # Errors
-/// When a size is given for an output that has only one quality.
+/// Fails if a size is given for an output that has only one quality.
 pub(crate) fn check_max_size(max_size: Option<u64>, target: &Target) -> Result<(), Usage> {
     match target {
         _ if max_size.is_none() => Ok(()),
@@ -293,7 +293,7 @@ fn patterns(target: &Target, passes: &Passes) -> Vec<Pattern> {
     }
 }
 
-/// A script's window has the shape of its `Screen`; another size may not have it.
+/// A script's window has the aspect ratio of its `Screen`; another size may have another.
 fn warn_if_squashed(plan: &Plan, size: Screen, console: &Console) -> anyhow::Result<()> {
     let Some(first) = plan.jobs().next() else { return Ok(()) };
     if let Camera::Pinhole(camera) = plan.scene(&first)?.camera
@@ -398,7 +398,7 @@ fn image(path: &Path, format: Format, passes: &Passes, plan: &Plan, console: &Co
 enum Drawn {
     /// The numbers of bytes of the image and of its passes.
     Written(u64, u64),
-    /// It was there already.
+    /// The image existed already.
     Skipped,
 }
 
@@ -472,7 +472,7 @@ fn images(
     Ok(())
 }
 
-/// There is a whole image of this size.
+/// Returns whether there is a complete image of this size.
 fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
     let mut file = Vec::new();
     let read = rayfold_files::open(path).and_then(|mut from| from.read_to_end(&mut file));
@@ -483,7 +483,7 @@ fn is_drawn(path: &Path, format: Format, screen: Screen) -> bool {
 /// Draws a frame, unless the run is stopping. `progress` counts its work.
 ///
 /// # Errors
-/// When it was, and those of the renderer.
+/// Fails if the run is stopping, or with the errors of the renderer.
 pub(crate) fn draw(plan: &Plan, job: &Job, progress: Option<&Work>) -> anyhow::Result<DynamicImage> {
     anyhow::ensure!(!interrupt::stopping(), "interrupted");
     let options = RenderOptions {

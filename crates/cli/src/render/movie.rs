@@ -13,10 +13,10 @@ use crate::interrupt;
 use crate::outcome::Usage;
 use crate::wording::{Size, number};
 
-/// Bytes that are collected before they are written.
+/// The number of bytes that are collected before they are written.
 const BUFFER: usize = 1 << 20;
 
-/// Why an animation could not be written.
+/// The reason why an animation could not be written.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MovieError {
     /// The reader of standard output has closed it.
@@ -33,15 +33,15 @@ pub(crate) enum MovieError {
     /// A frame of another size.
     #[error(transparent)]
     Size(rayfold_movie::Error),
-    /// The file is as large as it may be.
+    /// The file has reached its size limit.
     #[error("the file is too large")]
     Full,
-    /// Frames cannot be kept until they fit.
+    /// The frames cannot be stored until a quality fits.
     #[error("{0:#}")]
     Store(anyhow::Error),
 }
 
-/// Why a sink takes no more.
+/// The reason why a sink takes no more.
 #[derive(Debug, thiserror::Error)]
 #[error("too large")]
 struct TooLarge;
@@ -51,13 +51,13 @@ struct TooLarge;
 pub(crate) struct Written {
     pub(crate) frames: u64,
     pub(crate) container: Container,
-    /// The number of frames that are left out because viewers of the container have no time for them.
+    /// The number of frames that are left out because they are too short for viewers of the container.
     pub(crate) dropped: u64,
     pub(crate) size: (u32, u32),
     pub(crate) bytes: u64,
 }
 
-/// Takes the next frame, and how many seconds it is shown if not as long as the others.
+/// Takes the next frame, and its duration in seconds if it differs from that of the others.
 pub(crate) type Push<'a> = &'a mut (dyn FnMut(DynamicImage, Option<f64>) -> Result<(), MovieError> + Send);
 
 /// Writes an animation of the frames that `fill` pushes, in their order. A file appears once it is whole.
@@ -73,14 +73,14 @@ pub(crate) fn write(
     Ok(encode(place, container, movie, None, fill)?.keep(place)?)
 }
 
-/// An animation that is complete, but not yet in its place.
+/// An animation that is complete, but has not yet replaced the output file.
 pub(super) struct Encoded {
     written: Written,
     sink: Sink,
 }
 
 impl Encoded {
-    /// Puts it into its place.
+    /// Moves the file to its destination.
     ///
     /// # Errors
     /// The errors of the system.
@@ -90,8 +90,8 @@ impl Encoded {
     }
 }
 
-/// Encodes an animation as [`write`] does, but puts it nowhere. It fails with [`MovieError::Full`] if it has
-/// more than `limit` bytes.
+/// Encodes an animation as [`write`] does, but does not move it to its destination. It fails with [`MovieError::Full`]
+/// if it has more than `limit` bytes.
 ///
 /// # Errors
 /// The errors of [`write`].
@@ -173,7 +173,7 @@ struct Sink {
 enum To {
     File(OutputFile),
     StandardOutput,
-    /// Standard output gets all at once, because the beginning is known last.
+    /// Standard output gets all bytes at the end, because the beginning is known last.
     Memory(Vec<u8>),
 }
 
@@ -213,13 +213,13 @@ impl Sink {
     }
 }
 
-/// Writes to standard output, whose reader may take its time for ever.
+/// Writes to standard output, whose reader may block without end.
 fn print(bytes: Vec<u8>) -> io::Result<()> {
     let mut out = io::stdout();
     interrupt::wait_for(move || out.write_all(&bytes).and_then(|()| out.flush())).map_err(io::Error::other)?
 }
 
-/// Says whether the program was started without a standard output, as by `>&-`. The language's runtime then puts
+/// Returns whether the program was started without a standard output, as by `>&-`. The language's runtime then puts
 /// `/dev/null` in its place, open for reading and writing; a shell's `> /dev/null` is open for writing alone.
 #[cfg(target_os = "linux")]
 fn is_closed() -> bool {
@@ -233,7 +233,7 @@ fn is_closed() -> bool {
     is_null && flags.is_some_and(|flags| flags & 0o3 == 0o2)
 }
 
-/// Elsewhere there is no way to see it.
+/// On other systems this cannot be detected.
 #[cfg(not(target_os = "linux"))]
 fn is_closed() -> bool {
     false

@@ -1,4 +1,4 @@
-//! `--pass`: files beside a picture that say what its pixels show. docs/passes.md defines their numbers.
+//! `--pass`: files beside a picture with other data of its pixels. docs/passes.md defines their numbers.
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Cursor;
@@ -21,16 +21,16 @@ use crate::interrupt;
 use crate::outcome::Usage;
 use crate::plan::{Job, Plan};
 
-/// The level of nothing in a `.png` of depth.
+/// The level in a `.png` of depth of a pixel without a hit.
 const NOTHING: u16 = u16::MAX;
 
 /// The level of the farthest distance in a `.png` of depth.
 const FARTHEST: u16 = u16::MAX - 1;
 
-/// The number of characters of a line that a table shows.
+/// The maximum number of characters of a line in a table.
 const SHOWN: usize = 200;
 
-/// The largest number up to which `f32` has every whole one.
+/// The largest number up to which `f32` holds every whole number.
 const WHOLE: usize = 1 << f32::MANTISSA_DIGITS;
 
 /// A kind of pass.
@@ -90,7 +90,7 @@ pub(crate) struct Passes {
 /// The numbers of all pixels of a pass.
 #[derive(Clone, Debug, PartialEq)]
 enum Values {
-    /// One number, in the channel `Y`, the only one that every program reads by itself.
+    /// One number, in the channel `Y`: the only single channel that every program reads.
     One(Vec<f32>),
     /// Three numbers, in the channels `R`, `G` and `B`.
     Three([Vec<f32>; 3]),
@@ -148,7 +148,7 @@ impl PassArgs {
     /// Returns the passes that are asked for, each once.
     ///
     /// # Errors
-    /// When the output is no image, or a flag has no effect.
+    /// Fails if the output is no image, or a flag has no effect.
     pub(crate) fn passes(&self, target: &Target) -> Result<Passes, Usage> {
         let mut wanted = self.wanted.clone();
         wanted.sort_unstable();
@@ -207,7 +207,7 @@ impl Passes {
     /// Returns some files of a frame.
     ///
     /// # Errors
-    /// When the run was interrupted, a number does not fit into the format, and those of the renderer.
+    /// Fails if the run was interrupted, if a number does not fit into the format, and with the errors of the renderer.
     pub(crate) fn encode(
         &self,
         plan: &Plan,
@@ -282,7 +282,7 @@ impl Passes {
         }
     }
 
-    /// Returns whether there is a whole file in the size of the image.
+    /// Returns whether there is a complete file with the size of the image.
     pub(crate) fn is_whole(&self, of: Beside, path: &Path, screen: Screen) -> bool {
         let size = (screen.width(), screen.height());
         let Ok(file) = std::fs::read(path) else { return false };
@@ -311,7 +311,7 @@ impl Passes {
 /// Writes the files of a frame, and returns the number of their bytes.
 ///
 /// # Errors
-/// When one cannot be written.
+/// Fails if one cannot be written.
 pub(crate) fn write(files: Vec<(PathBuf, Vec<u8>)>, durable: bool) -> anyhow::Result<u64> {
     let mut bytes = 0;
     for (path, file) in files {

@@ -49,7 +49,7 @@ impl Target {
     /// Returns the target for a name; `format` overrides the ending. Standard output is a .y4m without a `format`.
     ///
     /// # Errors
-    /// When the ending is unknown or the pattern is invalid.
+    /// Fails if the ending is unknown or the pattern is invalid.
     pub(crate) fn parse(out: &Path, format: Option<Container>) -> Result<Self, Usage> {
         let shown = out.display();
         if out.as_os_str() == "-" {
@@ -99,7 +99,7 @@ impl Target {
 /// Returns the kind of file that a name stands for, for a command that writes files of animations and nothing else.
 ///
 /// # Errors
-/// When the name does not end as such a file's, or stands for many files.
+/// Fails if the name does not end as such a file's, or stands for many files.
 #[cfg(feature = "network")]
 pub(crate) fn container_of(out: &Path) -> Result<Container, Usage> {
     match Target::parse(out, None) {
@@ -116,7 +116,7 @@ fn ending(out: &Path) -> Option<String> {
 }
 
 impl Pattern {
-    /// Returns `None` when `path` has no place for a number.
+    /// Returns `None` if `path` has no place for a number.
     fn parse(path: &Path) -> Result<Option<Self>, Usage> {
         let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return Ok(None) };
         let Some((before, digits, after)) = split(name) else { return Ok(None) };
@@ -131,17 +131,17 @@ impl Pattern {
         Ok(Some(Self { folder, before: before.into(), digits, after: after.into() }))
     }
 
-    /// Returns the pattern of files beside those of this one, with another ending: `a%04d.depth.exr` for `a%04d.png`.
+    /// Returns the pattern of the files beside these, with another ending: `a%04d.depth.exr` for `a%04d.png`.
     pub(crate) fn with_ending(&self, ending: &str) -> Self {
         let after = self.after.rsplit_once('.').map_or("", |(after, _)| after);
         Self { after: format!("{after}.{ending}"), ..self.clone() }
     }
 
-    /// Returns early the error that [`make_folder`](Self::make_folder) or writing a file would return later. Makes
+    /// Returns now the error that [`make_folder`](Self::make_folder) or writing a file would return later. Creates
     /// nothing.
     ///
     /// # Errors
-    /// When no file can be written there.
+    /// Fails if no file can be written there.
     pub(crate) fn probe(&self, number: u64) -> anyhow::Result<()> {
         let is_there = |folder: &&Path| folder.as_os_str().is_empty() || folder.symlink_metadata().is_ok();
         match self.folder.ancestors().find(is_there) {
@@ -241,7 +241,7 @@ fn split(name: &str) -> Option<(&str, &str, &str)> {
 }
 
 impl Format {
-    /// Decodes the image in a file of this format; `None` when the file is not whole.
+    /// Decodes the image in a file of this format. Returns `None` if the file is incomplete.
     pub(crate) fn decode(self, file: &[u8]) -> Option<DynamicImage> {
         let format = match self {
             Self::Png => ImageFormat::Png,
@@ -254,7 +254,7 @@ impl Format {
     /// Encodes an image, with or without alpha, as a file of this format.
     ///
     /// # Errors
-    /// When the image exceeds the limits of the format.
+    /// Fails if the image exceeds the limits of the format.
     pub(crate) fn encode(self, image: &DynamicImage) -> anyhow::Result<Vec<u8>> {
         use image::codecs::{png, tiff};
         let mut file = Vec::new();

@@ -21,13 +21,13 @@ use crate::outcome::{Outcome, Usage};
 /// The time between two looks at the files.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Bytes of a file up to which it is read at each look.
+/// The size in bytes up to which a file is read at each look.
 const SMALL: u64 = 64 << 10;
 
-/// Draws by `draw`, at first and whenever one of the scripts has changed, until the run is asked to stop.
+/// Calls `draw` first, and then whenever one of the files has changed, until the run is asked to stop.
 ///
 /// # Errors
-/// Wrong usage alone: every other error is shown, and may be corrected.
+/// Fails only for wrong usage: any other error is shown, and may be corrected.
 pub(super) fn draw_again(
     inputs: &[PathBuf],
     console: &Console,
@@ -99,7 +99,7 @@ fn is_named(path: &Path) -> bool {
     !is_part_of_animation(path)
 }
 
-/// `None` for a file that is not there.
+/// `None` for a missing file.
 fn state(path: &Path) -> Option<State> {
     let metadata = path.metadata().ok()?;
     if metadata.len() > SMALL {
