@@ -75,8 +75,8 @@ impl<S: Store, C: Clock> Client<'_, S, C> {
         }
     }
 
-    /// Returns the scripts and settings, including misnamed ones, the files that a result was drawn from, and files that
-    /// operating systems leave there. `made` are the keys of the results.
+    /// Returns the scripts and settings, including misnamed ones, the files from which a result was drawn, and files
+    /// that operating systems leave there. `made` are the keys of the results.
     async fn uploaded_of(&self, animation: &Animation, made: &[String]) -> Result<Vec<String>> {
         let lists = made.iter().filter_map(|key| match key.parse() {
             Ok(Key::Receipt { receipt: Receipt::Files { list, .. }, .. }) => Some(list),

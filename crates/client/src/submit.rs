@@ -1,7 +1,8 @@
 //! Submission: makes an animation's folder in the bucket equal to a local one, with as few uploads as possible.
 //!
-//! The order matters: scripts are deleted first, then the new number of frames is put, then the files that scripts name,
-//! then the new scripts. So the animation is never complete before it is as wanted, and no script waits for its files.
+//! The order matters: scripts are deleted first, then the new number of frames is put, then the files that scripts
+//! name, then the new scripts. So the animation is never complete before its content is the wanted one, and no script
+//! waits for its files.
 
 use std::collections::{BTreeMap, BTreeSet};
 

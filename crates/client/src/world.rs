@@ -226,8 +226,8 @@ impl World {
     }
 }
 
-/// A renderer for which `bad` has no frame. Every other script is one, which shows its name and its text. `with FILE` has none
-/// before the file is there.
+/// A renderer for which `bad` has no frame. Every other script is one frame, which shows its name and its text. A
+/// script `with FILE` has no frame before the file exists.
 struct OneLine;
 
 /// Returns the name of the file that a script names.

@@ -1,7 +1,7 @@
 //! An estimate of the bill for an animation and for its stack, line by line.
 //!
-//! Invariants: free allowances are not subtracted, so a bill is never higher because of them. A quantity that is not
-//! known beforehand (requests per frame, sizes) is a named constant with its reason, or comes from the caller.
+//! Invariants: free allowances are not subtracted, so a real bill is at most lower because of them. A quantity that is
+//! not known beforehand (requests per frame, sizes) is a named constant with its reason, or comes from the caller.
 
 use rayfold_scene::{Container, Screen};
 use serde::Serialize;
@@ -24,7 +24,7 @@ const WAITING_MS: f64 = 210.0;
 /// The time of `WAITING_MS` if all frames are drawn at once. Simulated: 208 to 235.
 const WAITING_AT_ONCE_MS: f64 = 240.0;
 
-/// The places of an account, unless it asks for more.
+/// The places of an account, unless it requests more.
 const PLACES: u64 = 1_000;
 
 /// An animation of fewer frames takes more requests for each.
@@ -88,7 +88,7 @@ pub struct Workload {
     pub frames: u64,
     /// The time of the render function per frame, in milliseconds.
     pub ms: f64,
-    /// The number of invocations of the render function at once, if it was said.
+    /// The number of invocations of the render function at once, if given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub places: Option<u64>,
     /// The width of a frame in pixels.

@@ -5,7 +5,7 @@ use serde::Deserialize;
 /// The built-in prices: those of `infra/prices.json`.
 const BUILT_IN: &str = include_str!("../../../../infra/prices.json");
 
-/// The prices in US dollars, each for one unit of what the field's name says.
+/// The prices in US dollars, each for one unit of the thing that the field's name says.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Prices {
