@@ -39,8 +39,8 @@ pub fn library_beside(script: &Path) -> Arc<Library> {
     library.clone()
 }
 
-/// Returns the files in the folder of a script, for a library that has others besides. [`named_by_scripts`] does not know
-/// what is asked of them.
+/// Returns the files in the folder of a script, for a library that also has others. [`named_by_scripts`] does not
+/// record requests to them.
 pub fn files_beside(script: &Path) -> impl Files + use<> {
     Beside { folder: folder_of(script), asked: Arc::default() }
 }

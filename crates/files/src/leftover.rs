@@ -33,7 +33,7 @@ pub(crate) fn temporary_name() -> String {
     format!("{BEFORE}{:0MARK_DIGITS$x}{:0digits$x}{AFTER}", mark >> 48, random >> (64 - 4 * digits))
 }
 
-/// A mark of the system that runs, from its start to its end; `None` where it has no name.
+/// Returns a mark of the running system, from its start to its end, or `None` if the system has no such name.
 fn mark() -> Option<u64> {
     static MARK: OnceLock<Option<u64>> = OnceLock::new();
     *MARK.get_or_init(|| {
@@ -45,7 +45,7 @@ fn mark() -> Option<u64> {
     })
 }
 
-/// Says whether a temporary file was made on the system that runs.
+/// Returns whether a temporary file was made on the running system.
 fn is_of_this_system(name: &str) -> bool {
     let digits = name.strip_prefix(BEFORE).and_then(|rest| rest.get(..MARK_DIGITS));
     digits.zip(mark()).is_some_and(|(digits, mark)| digits == format!("{:0MARK_DIGITS$x}", mark >> 48))

@@ -1,4 +1,4 @@
-//! Files appear whole or not at all, where they were asked for, and as they were.
+//! Files appear whole or not at all, at their requested path, and with their former mode and owner.
 
 use super::*;
 
