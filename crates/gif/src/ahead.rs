@@ -137,7 +137,7 @@ impl Ahead {
 mod tests {
     use super::*;
 
-    /// Returns what is planned after the indices 1, 2, 7 for pixels with these choices.
+    /// Returns the plan after the indices 1, 2, 7 for pixels with these choices.
     fn planned(of: &[&[(u8, f32)]]) -> Vec<u8> {
         let mut writer = Writer::new(8);
         [1, 2, 7].iter().for_each(|&index| writer.put(index));

@@ -1,8 +1,8 @@
 //! Frames with clear pixels. Each is drawn alone, on a canvas that the block before it has left clear.
 //!
-//! A GIF has no cover between 0 and 1: a pixel is drawn or clear. Which pixels are drawn is decided by an ordered pattern
-//! of thresholds, so that half of the pixels of half cover are drawn. The pattern stands still, so that what rests does
-//! not flicker.
+//! A GIF has no cover between 0 and 1: a pixel is drawn or clear. Which pixels are drawn is decided by an ordered
+//! pattern of thresholds, so that half of the pixels of half cover are drawn. The pattern does not move, so static
+//! parts do not flicker.
 
 use std::io;
 

@@ -8,17 +8,18 @@
 //!
 //! - Every frame is in the file, in order and for its time, also one that equals its predecessor. Only above 50
 //!   frames per second are frames dropped, never the last, and [`Summary`] counts them.
-//! - Memory does not grow with the number of frames: two frames, the canvas, and a block; above 50 frames per second
-//!   two more frames. [`Encoder::push`] writes the frame before the one that it takes.
+//! - Memory does not grow with the number of frames. It holds two frames, the canvas, and a block; above 50 frames per
+//!   second, two more frames. [`Encoder::push`] writes the frame before the one that it takes.
 //! - Between two frames an animation can be [suspended](Encoder::suspend) and continued in another process. The
 //!   bytes are the same.
 //! - The bytes depend on frames and settings alone, not on threads or time. Work is spread over the rayon pool in
 //!   which [`Encoder::push`] is called, by fork and join only. A pool of one thread is enough, inside or outside.
-//! - A frame with at most 256 colours is kept exactly. An exception are frames of more than 100,000 pixels in which
-//!   the picture drifts: at least an eighth of it changes from one frame to the next, and three quarters of that by
-//!   less than three levels, as in a slow fade of a gradient. Such a frame, and those after it until much changes
-//!   clearly, are off by at most 4 levels; the first is exact. With [`Settings::exact`] all are exact.
-//! - Frames may have alpha. A GIF has none: their pixels are drawn or clear, and of those that are covered in part an ordered
+//! - A frame with at most 256 colours is kept exactly. There is one exception: frames of more than 100,000 pixels in
+//!   which the picture drifts. At least an eighth of such a picture changes from one frame to the next, and three
+//!   quarters of that by less than three levels, as in a slow fade of a gradient. Such a frame, and those after it
+//!   until much changes clearly, are off by at most 4 levels; the first is exact. With [`Settings::exact`] all are
+//!   exact.
+//! - Frames may have alpha. A GIF has no alpha, so each pixel is drawn or clear. Of partly covered pixels, an ordered
 //!   pattern is drawn. From the first such frame on, each frame is drawn alone.
 //! - No pixel of another frame is further off than 1.25 times the worst pixel of that frame encoded alone, measured
 //!   as the largest difference of a level, however many frames come before it.

@@ -1,8 +1,9 @@
 //! Chooses the palette index of each pixel while LZW compresses the indices.
 //!
-//! LZW writes a string of indices that is in its code table as one code. So if the best index would end the string,
-//! an index that is nearly as good and continues it is used instead. Strings of pixels that are drawn are
-//! [sought ahead](crate::ahead). An index may be worse where the next frame changes the pixel, for its error is seen once.
+//! LZW writes a string of indices that is in its code table as one code. So if the best index would end the string, an
+//! index that is nearly as good and continues it is used instead. Strings of pixels that are drawn are [sought
+//! ahead](crate::ahead). If the next frame changes the pixel, an index may be worse, because its error is seen only
+//! once.
 //!
 //! Error diffusion spreads the palette's error: the residual of a pixel, its intended minus its shown colour, is
 //! divided between the pixels to the right and below. Three rules keep the file small:

@@ -12,8 +12,8 @@ const THINNED_FPS: f64 = 50.0;
 
 /// A filter that drops frames of an animation with more frames per second than players show.
 ///
-/// Of each fiftieth of a second the first frame stays. Of the last one the last frame stays, so that an animation
-/// ends with its last frame.
+/// In each fiftieth of a second the first frame is kept. In the last fiftieth the last frame is kept, so that an
+/// animation ends with its last frame.
 #[derive(Debug)]
 pub struct Thinning {
     fps: f64,

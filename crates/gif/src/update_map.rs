@@ -6,8 +6,8 @@
 //! leave counts as left. If another index was chosen, the next comparison finds it. Before a frame is drawn itself,
 //! the canvas is known, and pixels that would be left too far off are [drawn](UpdateMap::draw_what_is_off).
 //!
-//! The frame is divided into tiles. A tile whose changes are small is left as a whole. Of the static pixels that are
-//! seen wrong, the worst of each tile are refined, that is, redrawn with a better colour. Tiles away from all changes
+//! The frame is divided into tiles. A tile whose changes are small is left as a whole. In each tile, the worst of the
+//! static pixels that are seen wrong are refined, that is, redrawn with a better colour. Tiles away from all changes
 //! are refined only if together they are worth the larger block.
 
 use rayon::prelude::*;
@@ -109,8 +109,7 @@ struct TileUpdate {
 }
 
 impl UpdateMap {
-    /// Makes the map of a suspended animation, whose updates are final: [`count`](Self::count) counts
-    /// them as they are.
+    /// Makes the map of a suspended animation. Its updates are final, so [`count`](Self::count) counts them unchanged.
     pub(crate) fn decided(width: usize, pixels: Vec<PixelUpdate>) -> Self {
         let tiles = width.div_ceil(TILE) * pixels.len().div_ceil(TILE * width);
         let as_it_is = TileUpdate { changes: false, wrong: 0, error: f32::INFINITY };
