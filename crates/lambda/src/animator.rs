@@ -14,7 +14,7 @@ use rayfold_scene::{AnimationSettings, Container, Limits};
 
 use crate::{png, pool};
 
-/// More frames than there can be.
+/// An impossible number of frames.
 const MANY_FRAMES: u64 = 1 << 40;
 
 /// The bytes of a state before that of the encoder: columns, rows, the number of frames, and whether there is alpha.
@@ -86,12 +86,12 @@ pub struct MovieEncoding {
     most_pixels: u64,
 }
 
-/// The encoder, and what it needs to know.
+/// The encoder, and the data that it needs.
 struct Work {
     output: Container,
-    /// Its size is that of the first frame.
+    /// The size of the animation is that of the first frame.
     movie: Movie,
-    /// By the place of the frame, from 0.
+    /// The frames by their index, from 0.
     durations: BTreeMap<u64, f64>,
     pushed: u64,
     /// `None` before the first frame.
@@ -230,7 +230,7 @@ mod tests {
 
     use super::*;
 
-    /// Frames that differ in a pixel; the second one may be clear.
+    /// Frames that differ in one pixel; the second one may be transparent.
     fn frames(is_clear: bool) -> Vec<Bytes> {
         let frame = |k: u32| {
             let mut frame = RgbaImage::from_pixel(9, 7, Rgba([90, 20, 60, 255]));
@@ -246,7 +246,7 @@ mod tests {
         settings.with_durations([(2, 0.5)].into()).unwrap()
     }
 
-    /// The file as `rayfold render` writes it, with the frames as they are shown.
+    /// Returns the file that `rayfold render` writes of these frames, in the order in which they are shown.
     fn expected(output: Container, frames: &[Bytes], alpha: bool) -> Vec<u8> {
         let movie = Movie {
             size: (9, 7),
@@ -267,7 +267,7 @@ mod tests {
         file
     }
 
-    /// In one piece, and left after each frame.
+    /// Encodes in one piece, and with a suspension after each frame.
     #[tokio::test]
     async fn every_file_is_that_of_the_command_in_one_piece_or_in_many() {
         let animator = MovieAnimator::default();

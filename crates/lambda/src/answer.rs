@@ -1,8 +1,8 @@
 //! The answer of a function: an outcome per record, or a failure that makes the platform retry.
 //!
 //! An error that would be the same at the next try (a bad script, a key of no interest, an unreadable event) is
-//! recorded and is no failure. Only a transient error is a failure, and then the whole batch comes again. For records
-//! that are done this costs a few requests and no work.
+//! recorded and is no failure. Only a transient error is a failure, and then the whole batch comes again. Records that
+//! are already done then cost a few requests and no work.
 
 use rayfold_pipeline::Error;
 use serde::Serialize;

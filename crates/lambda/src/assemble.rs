@@ -266,7 +266,7 @@ mod tests {
         );
     }
 
-    /// A restart of `rayfold dev` failed frames whose files had not come yet, and with that deleted the GIF before.
+    /// A restart of `rayfold dev` marked frames as failed that waited for their files, and so deleted the previous GIF.
     #[tokio::test]
     async fn catching_up_wakes_what_is_pending_and_lets_wait_what_waits() {
         let context = context().await;

@@ -1,8 +1,8 @@
 //! The capacity of an invocation, and the number of bands for a frame that exceeds it.
 //!
 //! Time is measured: thin strips of the frame, spread over its height, are drawn until it is clear whether the whole
-//! fits. Frames of few rays are drawn without measurement; if one takes too long, it is cut after all. Memory is
-//! computed from the number of pixels. This module knows no scene, only numbers.
+//! fits. Frames of few rays are drawn without measurement; if one of them takes too long, it is cut into bands. Memory
+//! is computed from the number of pixels. This module knows no scene, only numbers.
 
 use std::num::NonZeroU32;
 use std::ops::Range;

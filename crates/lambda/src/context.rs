@@ -42,8 +42,8 @@ impl Context<S3Store> {
     /// Reads the function's environment: `RAYFOLD_BUCKET`, and the standard AWS variables for credentials and region.
     ///
     /// `RAYFOLD_MAX_OBJECTS` and the other `RAYFOLD_MAX_` variables limit scripts. `RAYFOLD_QUIET_MS` and
-    /// `RAYFOLD_STUCK_AFTER_MS` set the pauses of the protocol. `RAYFOLD_ATTEMPTS` sets how often the sweep wakes a
-    /// frame before it gives up. `RAYFOLD_SPARE_FRAMES` sets how early an assembler leaves a long GIF to the next
+    /// `RAYFOLD_STUCK_AFTER_MS` set the pauses of the protocol. `RAYFOLD_ATTEMPTS` sets how often the sweep triggers a
+    /// frame before it gives up. `RAYFOLD_SPARE_FRAMES` sets how early an assembler hands a long GIF over to the next
     /// one. `RAYFOLD_SEED` makes random pauses repeatable.
     ///
     /// # Errors

@@ -42,9 +42,9 @@ pub enum Event {
 /// The mode of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sweep {
-    /// Pending work may be queued, so only work that has waited for long is woken.
+    /// Pending work may be queued, so only work that has waited for long is triggered.
     Patient,
-    /// No event can be queued, because nothing received events until now: all pending work is woken.
+    /// No event can be queued, because nothing received events until now. So all pending work is triggered.
     CatchUp,
 }
 

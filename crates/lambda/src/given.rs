@@ -1,4 +1,4 @@
-//! The files beside a script in the bucket, as the parser asks for them.
+//! The files beside a script in the bucket, as the parser requests them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -19,10 +19,10 @@ pub(crate) struct GivenLibrary {
 #[derive(Default)]
 struct Given {
     files: Files,
-    /// Files of earlier drawings, by their names. They stand in for files that are not given yet, so that models that were
-    /// made of them are not dropped before it is known whether the files have changed.
+    /// Files of earlier drawings, by their names. They replace files that have not been fetched yet, so that their
+    /// models are not dropped before it is known whether the files have changed.
     earlier: BTreeMap<String, File>,
-    /// The names that were asked for, given or not.
+    /// The names that were requested, whether the files are given or not.
     asked: BTreeSet<String>,
 }
 
@@ -41,7 +41,7 @@ impl GivenLibrary {
         GivenLibrary { library: Library::new(Shared(given.clone())), given }
     }
 
-    /// Returns the names that were asked for since the last call.
+    /// Returns the names that were requested since the last call.
     pub(crate) fn take_asked(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.given).asked).into_iter().collect()
     }
@@ -115,7 +115,8 @@ impl Kept {
         lock(&self.0).files.get(key).cloned()
     }
 
-    /// Keeps a file, or nothing for this key. If the files are too large together, the others are dropped.
+    /// Keeps a file under its key, or records that there is none. If the files are too large together, the others are
+    /// dropped.
     pub(crate) fn keep(&self, key: &str, file: Option<&File>) {
         let mut state = lock(&self.0);
         match file {
@@ -145,7 +146,7 @@ mod tests {
         Some(File { version: ETag::new(text), body: text.to_owned().into() })
     }
 
-    /// As for a frame: first the names that are missing, then the drawing.
+    /// Works as for a frame: first the names that are missing, then the drawing. @6d422x
     fn model(kept: &Kept, model: &str) -> Arc<assets::Model> {
         let files = [("c.obj".to_owned(), file(model)), ("c.mtl".to_owned(), None)];
         let files: Files = Arc::new(files.into_iter().collect());

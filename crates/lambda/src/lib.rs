@@ -39,9 +39,9 @@ use context::{Call, Context};
 /// The function that a process runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// It renders a frame.
+    /// The render function.
     Render,
-    /// It writes the GIF, sweeps, and records failed events.
+    /// The assemble function, which writes the GIF, sweeps, and records failed events.
     Assemble,
 }
 

@@ -1,7 +1,7 @@
 //! The render function's renderer: turns scripts into PNG images with `rayfold-scene` and `rayfold-tracer`.
 //!
 //! A drawing is cancelled when its caller stops waiting. A frame that is too big for an invocation is drawn in bands.
-//! [`Capacity`] decides that by a few strips of the frame, or after drawing has taken too long.
+//! [`Capacity`] decides that from the time of a few strips of the frame, or after drawing has taken too long.
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::pin::pin;
@@ -316,8 +316,7 @@ impl Shot {
 }
 
 impl Time {
-    /// Decides about a frame of which only the following is known: this many rows take longer
-    /// than the remaining time.
+    /// Decides about a frame if it is only known that this many rows take longer than the remaining time.
     fn judge_late(&self, extent: &Extent, rows: u32) -> Verdict {
         let left = self.left.unwrap_or_default();
         // Assumes twice the time, because the real time is unknown.
@@ -427,8 +426,8 @@ mod tests {
         render_frame(&invocation, process, key).await.unwrap().outcome
     }
 
-    /// A process that had drawn an older model gave the newer one's version files to which only the older one refers. The
-    /// other processes, which had not, took their frames for superseded.
+    /// A process that had drawn an older model gave the newer one's version files to which only the older one refers.
+    /// Other processes, which had not drawn the older model, treated their frames as superseded.
     #[tokio::test]
     async fn all_processes_give_a_script_the_same_version_whatever_they_have_drawn_before() {
         const CORNER: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
