@@ -20,7 +20,7 @@ pub enum Error {
         /// The missing programs, and the places that were searched.
         reason: String,
     },
-    /// The variable that names the S3 server names nothing.
+    /// The path in the variable that names the S3 server does not exist.
     #[error("{variable} names {}, which is no file", path.display())]
     NamedServerMissing {
         /// The environment variable with the path.
@@ -28,7 +28,7 @@ pub enum Error {
         /// The path in that variable.
         path: PathBuf,
     },
-    /// Go ran and failed.
+    /// The Go compiler failed.
     #[error(
         "{program} could not be built from source ({reason}): put `{}` on the PATH, or name it in {}",
         program.binary, program.variable

@@ -33,7 +33,7 @@ pub(crate) fn json(status: StatusCode, body: &serde_json::Value) -> Response<Bod
     answer
 }
 
-/// Returns the address for any free port on the loopback interface.
+/// Returns the loopback address with any free port.
 pub fn any_port() -> SocketAddr {
     SocketAddr::from(([127, 0, 0, 1], 0))
 }

@@ -7,11 +7,12 @@ use crate::error::{Error, Result};
 /// The rights of a person, as Terraform reads them.
 const RIGHTS: &str = include_str!("../../../infra/terraform/policies/person.json.tftpl");
 
-/// The seconds for which the credentials are of use, as on AWS.
+/// The lifetime of the credentials in seconds, as on AWS.
 const SECONDS: i32 = 3600;
 
-/// Returns credentials of a person for a bucket, by the store's owner. On AWS, IAM puts the identity into the policy at each
-/// request; here it is there before. An identity is that of a Cognito identity pool, or one like it.
+/// Returns credentials of a person for a bucket, issued by the store's owner. On AWS, IAM inserts the identity into the
+/// policy at each request; here the policy already contains it. The identity is one of a Cognito identity pool, or of
+/// the same form.
 ///
 /// # Errors
 /// [`Error::NoSession`] if the store gives no temporary credentials, as SeaweedFS.
@@ -28,7 +29,7 @@ pub async fn sign_in(owner: &Connection, identity: &str, bucket: &str) -> Result
     })
 }
 
-/// The document of a person's rights. STS takes at most 2,048 characters, hence without spaces.
+/// The policy document with a person's rights. It has no spaces, because STS takes at most 2,048 characters.
 fn rights(identity: &str, bucket: &str) -> String {
     let arn = format!("arn:aws:s3:::{bucket}");
     let filled = RIGHTS.replace("${bucket_arn}", &arn).replace("${person}", identity);

@@ -18,7 +18,7 @@ use crate::observation::Observation;
 use crate::routes::Routes;
 use crate::s3_server::{S3Server, StoreKind};
 
-/// The time limit until MinIO has its webhook.
+/// The time limit for MinIO to know its webhook.
 const QUEUE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The built-in store connects to the webhook at its start. It delivers kept events as soon as the invoker listens.
@@ -157,7 +157,7 @@ impl Platform {
 /// rejects their queues until then, so this waits.
 ///
 /// # Errors
-/// Fails like the store.
+/// Fails if the store does.
 pub async fn notify(store: &S3Store, notifications: &[Notification]) -> rayfold_pipeline::Result<()> {
     let start = Instant::now();
     loop {

@@ -143,7 +143,8 @@ async fn is_ready(address: SocketAddr, path: &str) -> bool {
     matches!(tokio::time::timeout(Duration::from_secs(2), ask).await, Ok(Ok(true)))
 }
 
-/// Whether the server at the address knows the keys. Another one may have taken the port before ours listened; ours then ends.
+/// Returns whether the server at the address accepts the keys. If another server took the port before ours listened,
+/// ours ends.
 async fn knows(address: SocketAddr, credentials: &Credentials) -> bool {
     match S3Store::at(&credentials.connection(address), "rayfold").get("ready").await {
         Err(rayfold_pipeline::Error::Refused { source, .. }) => {
@@ -183,7 +184,7 @@ mod tests {
         assert!(error.contains("SeaweedFS") && error.contains("server.log"), "{error}");
     }
 
-    /// An earlier version took another port without a message.
+    /// An earlier version used another port without a message.
     #[tokio::test]
     async fn a_port_that_was_asked_for_and_is_taken_is_named() {
         let folder = tempfile::tempdir().unwrap();
@@ -196,7 +197,7 @@ mod tests {
         );
     }
 
-    /// Two servers started at once were once given the same port: the second one's client was refused by the first.
+    /// Two servers that were started at once got the same port: the client of the second was refused by the first.
     #[tokio::test]
     async fn a_server_with_other_keys_is_not_the_one_that_was_started() {
         let (ours, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());

@@ -1,4 +1,4 @@
-//! The S3 servers that are programs of their own.
+//! The S3 servers that are separate programs.
 
 use std::fmt;
 

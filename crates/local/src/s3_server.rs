@@ -1,11 +1,11 @@
-//! The S3 server that holds the bucket: the store built in, in this process, or MinIO or SeaweedFS, as a child process.
+//! The S3 server that holds the bucket: the built-in store in this process, or MinIO or SeaweedFS as a child process.
 //!
-//! A folder can hold the data of all three, each in a folder of its own below it: they never touch each other's, and share
-//! the owner's credentials, so that what a terminal has exported stays right. Buckets and objects are the S3 store's business
-//! (`rayfold_pipeline::store`), which speaks the same to all and to AWS.
+//! A folder can hold the data of all three servers, each in its own subfolder. They share the owner's credentials, so
+//! variables that a terminal has exported stay valid. This module does not access buckets or objects: the S3 store does
+//! (`rayfold_pipeline::store`), in the same way for all servers and for AWS.
 //!
-//! Invariants: it ends with us, however we end; two processes never share a data folder; a folder that MinIO itself has
-//! for its data is refused, not written into.
+//! Invariants: the server ends with this process, however that ends. Two processes never share a data folder. A folder
+//! that MinIO itself uses for its data is refused and not changed.
 
 use std::fmt;
 use std::fs::{self, File};
@@ -26,13 +26,13 @@ use crate::{minio, seaweedfs};
 /// The folder at the top of MinIO's data.
 const MINIO_MARK: &str = ".minio.sys";
 
-/// Between two attempts to lock a data folder.
+/// The time between two attempts to lock a data folder.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A server that does not stop is killed after five seconds.
+/// The time after which a server that does not stop is killed: five seconds.
 const ATTEMPTS: u32 = 140;
 
-/// The names of everything in a data folder.
+/// The names of everything that may be in a data folder.
 const OURS: [&str; 8] = [
     "lock",
     "credentials.json",
@@ -47,7 +47,7 @@ const OURS: [&str; 8] = [
 /// The kind of S3 server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StoreKind {
-    /// The one in this program, which needs nothing installed.
+    /// The built-in store, which needs no installation.
     #[default]
     BuiltIn,
     /// MinIO, which must be installed, or built from its source.
@@ -60,7 +60,7 @@ impl StoreKind {
     /// All kinds, the built-in store first.
     pub const ALL: [Self; 3] = [Self::BuiltIn, Self::Minio, Self::SeaweedFs];
 
-    /// As a flag has it.
+    /// Returns its name for a flag.
     pub const fn name(self) -> &'static str {
         match self {
             Self::BuiltIn => "built-in",
@@ -69,7 +69,7 @@ impl StoreKind {
         }
     }
 
-    /// The program that has to be on the machine.
+    /// Returns the program that must be installed.
     pub fn program(self) -> Option<&'static Program> {
         match self {
             Self::BuiltIn => None,
@@ -105,7 +105,7 @@ pub struct S3Server {
     running: Running,
     data: PathBuf,
     credentials: Credentials,
-    /// The lock of the data folder, until the server is gone.
+    /// The lock of the data folder, held until the server has ended.
     _lock: File,
 }
 
@@ -115,12 +115,12 @@ enum Running {
 }
 
 impl S3Server {
-    /// Starts a server on the folder `data` (made when missing), which is ready when this returns.
+    /// Starts a server on the folder `data`, which is created if missing. The server is ready on return.
     ///
     /// MinIO and SeaweedFS are found, or installed from source; `say` gets a line before each step that takes time.
     ///
     /// # Errors
-    /// [`Error::DataInUse`], [`Error::MinioFolder`], and whatever keeps the server from starting.
+    /// [`Error::DataInUse`], [`Error::MinioFolder`], and any error that keeps the server from starting.
     pub async fn start(
         kind: StoreKind,
         data: &Path,
@@ -211,7 +211,8 @@ impl S3Server {
         &self.credentials
     }
 
-    /// The queue that bucket notifications name to reach the webhook; none if the server has no notifications.
+    /// Returns the queue that bucket notifications must name to reach the webhook; `None` if the server has no
+    /// notifications.
     pub fn queue_arn(&self) -> Option<&'static str> {
         match self.kind {
             StoreKind::BuiltIn => Some(rayfold_bucket::QUEUE_ARN),
@@ -220,7 +221,8 @@ impl S3Server {
         }
     }
 
-    /// Returns when the server has ended by itself, and how. The one built in ends with this process alone.
+    /// Returns when the server has ended by itself, with its exit status. The built-in store ends only with this
+    /// process.
     pub async fn ended(&self) -> std::process::ExitStatus {
         match &self.running {
             Running::BuiltIn(_) => std::future::pending().await,
@@ -228,7 +230,7 @@ impl S3Server {
         }
     }
 
-    /// Stops it, and returns when its data may be used again.
+    /// Stops the server. Returns when its data may be used again.
     pub async fn stop(self) {
         match self.running {
             Running::BuiltIn(server) => server.stop().await,
@@ -268,7 +270,7 @@ async fn take(lock: &File, data: &Path, say: &mut (dyn FnMut(&str) + Send)) -> R
     Err(Error::DataInUse(data.to_owned()))
 }
 
-/// Whether all in the folder is ours. A folder of the user's that we were only put into stays open to whom it was.
+/// Returns whether everything in the folder is ours. If not, a user's folder keeps its access rights.
 fn holds_nothing_else(data: &Path) -> std::io::Result<bool> {
     for entry in fs::read_dir(data)? {
         if !OURS.iter().any(|ours| entry.as_ref().is_ok_and(|entry| entry.file_name() == *ours)) {

@@ -18,7 +18,7 @@ use crate::program::SEAWEEDFS;
 /// Its file of identities, in the data folder.
 pub(crate) const CONFIG: &str = "seaweedfs.json";
 
-/// The parts whose ports only the process itself needs.
+/// The services whose ports only the process itself uses.
 const INNER_PORTS: [&str; 7] = [
     "master.port",
     "master.port.grpc",
@@ -29,7 +29,7 @@ const INNER_PORTS: [&str; 7] = [
     "s3.port.grpc",
 ];
 
-/// Starts `binary` on the folder `objects`, which lies in the data folder.
+/// Starts `binary` on the folder `objects` within the data folder.
 ///
 /// # Errors
 /// The errors of [`ServerProcess::start`].

@@ -1,4 +1,4 @@
-//! The studio's static page beside the bucket: what the stack has by CloudFront and Cognito, on this machine.
+//! The studio's static page beside the bucket: the local counterpart of CloudFront and Cognito in the stack.
 //!
 //! The page gets the same policies and the same file beside it (`rayfold.json`) as on AWS. There is one person, who need not sign
 //! in: the page asks for that person's credentials. Everything is on the loopback interface.
@@ -29,7 +29,7 @@ const CONFIG: &str = "rayfold.json";
 /// The path at which the page asks for credentials.
 const CREDENTIALS: &str = "/credentials";
 
-/// The start of the page's content policy, and the part that names whom the page may talk to.
+/// The beginning of the page's content security policy, and its part with the hosts that the page may contact.
 const POLICY: &str = "default-src 'none';";
 const TALKS_TO: &str = "connect-src 'self'";
 
@@ -102,12 +102,12 @@ impl Site {
     }
 }
 
-/// The files and the settings that the server answers with.
+/// The files and the settings that the server serves.
 struct Desk {
     folder: PathBuf,
     /// The content of `rayfold.json`.
     config: Value,
-    /// The page, which may talk to the store.
+    /// The page, which may contact the store.
     page: String,
     policy: String,
     origin: String,

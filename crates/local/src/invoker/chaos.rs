@@ -1,7 +1,7 @@
 //! The faults of events and processes that the platform makes on purpose, from a seed.
 //!
-//! A seed always draws the same faults in the same order; which event meets which fault still depends on the order in
-//! which the store reports them.
+//! A seed always draws the same faults in the same order; the order in which the store reports events still decides
+//! which event gets which fault.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -13,38 +13,38 @@ use crate::observation::{Attempt, StoreRequest};
 pub struct Chaos {
     /// The seed of all random choices.
     pub seed: u64,
-    /// Probability that an event is delivered twice.
+    /// The probability that an event is delivered twice.
     pub duplicate: f64,
-    /// Probability that an event is delayed, by up to `delay_up_to`.
+    /// The probability that an event is delayed, by up to `delay_up_to`.
     pub delay: f64,
     /// The longest delay of an event.
     pub delay_up_to: Duration,
-    /// Events are kept until none has come for this long, then delivered newest first.
+    /// Events are held back until none has arrived for this long, and are then delivered newest first.
     pub reverse_after: Option<Duration>,
-    /// Probability that an event is lost.
+    /// The probability that an event is lost.
     pub drop: f64,
-    /// Probability that an invocation's process is killed, at a random time up to `kill_within`.
+    /// The probability that the process of an invocation is killed, at a random time up to `kill_within`.
     pub kill: f64,
     /// The latest time of a kill within its invocation.
     pub kill_within: Duration,
 }
 
-/// The fate of a process that is about to send a request to the store.
+/// The fault of a request that a process is about to send to the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// The request goes through.
     Pass,
     /// The process is killed; the store never sees the request.
     KillBefore,
-    /// The store gets the request; the process is killed before the answer.
+    /// The store receives the request; the process is killed before the reply.
     KillAfter,
-    /// The store gets the request; the process sees its connection break.
+    /// The store receives the request; the connection of the process breaks.
     LoseAnswer,
-    /// The store is said to be overloaded: 503.
+    /// The reply says that the store is overloaded: 503.
     SlowDown,
 }
 
-/// Decides the fate of each request to the store.
+/// Decides the fault of each request to the store.
 pub type Fates = Arc<dyn Fn(&Attempt, &StoreRequest) -> Fate + Send + Sync>;
 
 /// The chaos of one invoker.
@@ -60,7 +60,7 @@ impl Dice {
         Self { chaos, random }
     }
 
-    /// When to deliver an event: not at all, once or twice, each after a pause.
+    /// The pauses after which an event is delivered: none, one or two deliveries.
     pub(crate) fn deliveries(&self) -> Vec<Duration> {
         let mut random = self.random.lock().unwrap_or_else(PoisonError::into_inner);
         if random.f64() < self.chaos.drop {
@@ -75,7 +75,7 @@ impl Dice {
             .collect()
     }
 
-    /// When to kill the process of the next invocation, if at all.
+    /// The time at which the process of the next invocation is killed, if it is.
     pub(crate) fn kill_after(&self) -> Option<Duration> {
         let mut random = self.random.lock().unwrap_or_else(PoisonError::into_inner);
         (random.f64() < self.chaos.kill).then(|| self.chaos.kill_within.mul_f64(random.f64()))

@@ -1,7 +1,8 @@
-//! From the store's webhook, or a listing of the bucket, to the functions' queues, by the shared routes.
+//! Sends events from the store's webhook, or from listings of the bucket, to the queues of the functions, by the shared
+//! routes.
 //!
-//! Events are forwarded as the store writes them; the functions read AWS's shape and MinIO's. Chaos lives here: an event may
-//! be lost, doubled, late, or one of a bunch that is delivered newest first.
+//! Events are forwarded as the store writes them; the functions read AWS's shape and MinIO's. This module injects the
+//! faults of events: an event may be lost, duplicated or late, or be delivered in a group in the wrong order.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -69,7 +70,7 @@ impl Delivery {
         Self { sender, routes: Arc::new(Routes::shared()), observer, pending }
     }
 
-    /// Takes the event of this name on an object.
+    /// Handles the event of this name on an object.
     pub(crate) fn take(&self, name: &str, key: &str, payload: Bytes) {
         let function = self.routes.function(key, name);
         self.observer.see(Seen::Event { function, name: name.to_owned(), key: key.to_owned() });
@@ -82,7 +83,7 @@ impl Delivery {
     }
 }
 
-/// Receives events that carry `token` on `listener`: their names, keys and payloads.
+/// Receives events on `listener` if they carry `token`: their names, keys and payloads.
 pub(crate) fn receive(
     listener: TcpListener,
     token: &str,
@@ -119,8 +120,8 @@ async fn take(
     json(StatusCode::OK, &json!({}))
 }
 
-/// An event of a store that sends none, in AWS's shape. An object that was put has its entity tag, by which a failure
-/// names the version that failed.
+/// Returns an event in AWS's shape, for a store that sends none. If the object was put, the event has its entity tag,
+/// which tells the version if the event fails.
 pub(crate) fn written(bucket: &str, name: &str, key: &str, etag: Option<&ETag>) -> Bytes {
     let key = utf8_percent_encode(key, NON_ALPHANUMERIC).to_string();
     let mut object = json!({ "key": key });
@@ -141,7 +142,7 @@ pub(crate) fn written(bucket: &str, name: &str, key: &str, etag: Option<&ETag>) 
     json!({ "Records": [record] }).to_string().into()
 }
 
-/// The event's name and the object's key, decoded.
+/// Returns the event's name and the object's decoded key.
 fn described(payload: &[u8]) -> Option<(String, String)> {
     let event: Value = serde_json::from_slice(payload).ok()?;
     let record = &event["Records"][0];

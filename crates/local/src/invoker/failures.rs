@@ -1,4 +1,4 @@
-//! The way of an invocation that failed for good: a destination record in a queue, read by the assemble function.
+//! The delivery of an invocation that failed for good: a destination record in a queue, read by the assemble function.
 //!
 //! On AWS both functions deliver to one SQS queue; the assemble function polls it. Here the queue is in memory, with the
 //! same records, batches, redelivery and dead letters.
@@ -15,10 +15,10 @@ use crate::region::REGION;
 /// SQS's largest batch for a function.
 const BATCH: usize = 10;
 
-/// A message that failed so often is given up (`maxReceiveCount` in `infra/terraform`).
+/// The number of failures after which a message is given up (`maxReceiveCount` in `infra/terraform`).
 const MAX_RECEIVES: u32 = 5;
 
-/// Instead of the queue's visibility timeout.
+/// The pause before a redelivery, in place of the queue's visibility timeout.
 const PAUSE: Duration = Duration::from_millis(500);
 
 struct Message {
@@ -27,7 +27,7 @@ struct Message {
     receives: u32,
 }
 
-/// Feeds the assemble function from the queue until the senders are gone.
+/// Passes the messages of the queue to the assemble function until there are no more senders.
 pub(crate) async fn deliver(
     mut failures: mpsc::UnboundedReceiver<Failure>,
     assemble: Pool,
@@ -80,7 +80,7 @@ fn message(failure: &Failure) -> Message {
     Message { id: random_id(), body: record(failure).to_string(), receives: 1 }
 }
 
-/// The record that Lambda sends to a destination.
+/// Returns the record that Lambda sends to a destination.
 fn record(failure: &Failure) -> Value {
     let payload: Value = serde_json::from_slice(&failure.payload).unwrap_or(Value::Null);
     let (error, response) = match &failure.outcome {
@@ -143,14 +143,14 @@ fn event(batch: &[Message]) -> String {
     json!({ "Records": records }).to_string()
 }
 
-/// The messages that the function did not manage (`ReportBatchItemFailures`).
+/// Returns the messages that the function could not process (`ReportBatchItemFailures`).
 fn failed_items(answer: &str) -> Vec<String> {
     let answer: Value = serde_json::from_str(answer).unwrap_or(Value::Null);
     let failures = answer["batchItemFailures"].as_array().into_iter().flatten();
     failures.filter_map(|item| item["itemIdentifier"].as_str()).map(str::to_owned).collect()
 }
 
-/// ISO 8601 in UTC, to the millisecond.
+/// Formats a time by ISO 8601 in UTC, to the millisecond.
 fn timestamp(at: SystemTime) -> String {
     let since = at.duration_since(UNIX_EPOCH).unwrap_or_default();
     let (days, seconds) = ((since.as_secs() / 86_400) as i64, since.as_secs() % 86_400);

@@ -1,7 +1,7 @@
-//! A proxy between one process and the store that counts its requests, and can come in between.
+//! A proxy between one process and the store that counts its requests and can inject faults.
 //!
-//! Bytes pass unchanged, the Host header too, so that signatures stay valid. As every process has a meter of its own and
-//! handles one invocation at a time, each request belongs to the invocation in hand.
+//! Bytes pass unchanged, the Host header too, so that signatures stay valid. Every process has its own meter and
+//! handles one invocation at a time, so each request belongs to the current invocation.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +21,7 @@ use crate::error::Result;
 use crate::http::{Body, Server, any_port, full, listen};
 use crate::observation::{Attempt, Observer, RequestKind, Requests, Seen, StoreRequest};
 
-/// Between one process and the store.
+/// A proxy between one process and the store.
 pub(crate) struct Meter {
     address: SocketAddr,
     shared: Arc<Shared>,
@@ -65,7 +65,7 @@ impl Meter {
         Ok(Self { address, shared, _server: server })
     }
 
-    /// Returns the endpoint that the process takes for the store.
+    /// Returns the endpoint that the process uses as the store.
     pub(crate) fn endpoint(&self) -> String {
         format!("http://{}", self.address)
     }

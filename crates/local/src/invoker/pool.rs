@@ -1,7 +1,8 @@
 //! The processes of one function, and the queue of its asynchronous invocations.
 //!
-//! Lambda's terms: at most `concurrency` at once, new processes no faster than the ramp, the process used last is used
-//! next, an event that fails is tried twice more after pauses, and what fails then goes to the failure destination.
+//! It follows Lambda's rules. At most `concurrency` processes run at once, and new ones start no faster than the ramp
+//! allows. The process used last is used next. A failed event is tried twice more, after pauses, and then goes to the
+//! failure destination.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,10 +22,10 @@ use crate::observation::{Observer, Outcome};
 use crate::region::REGION;
 use crate::routes::Function;
 
-/// After so long without work a process is let go.
+/// The time without work after which a process is stopped.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(120);
 
-/// The pool's own side, run as a task.
+/// The part of the pool that runs as a task.
 pub(crate) struct Workers {
     function: Function,
     settings: Arc<Settings>,
@@ -98,7 +99,7 @@ impl Workers {
         self.pending.remove();
     }
 
-    /// The process used last, or a new one as soon as the ramp allows it.
+    /// Returns the process used last, or a new one as soon as the ramp allows it.
     async fn sandbox(&self) -> Result<Sandbox> {
         loop {
             {

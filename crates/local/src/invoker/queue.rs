@@ -1,5 +1,5 @@
-//! Invocations on their way: the queued ones with their callers, the number that are not done, and those
-//! that failed for good.
+//! Invocations in progress: the queued ones with their callers, the number of unfinished ones, and those that failed
+//! for good.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,9 +21,10 @@ pub(crate) struct Job {
 
 /// The receiver of the outcome.
 pub(crate) enum Caller {
-    /// No receiver: failures are tried again, then delivered.
+    /// The receiver of the result. Without one, a failed event is tried again, and finally delivered to the failure
+    /// queue.
     Event,
-    /// The one who waits; trying again is up to them.
+    /// The caller that waits for the result, and decides about further attempts.
     Waiting(oneshot::Sender<Outcome>),
 }
 
@@ -33,7 +34,7 @@ impl Job {
     }
 }
 
-/// Handle to a pool; its tasks end when the last handle is dropped and the invoker's tasks are aborted.
+/// A handle to a pool. The pool's tasks end when the last handle is dropped and the invoker's tasks are aborted.
 #[derive(Clone)]
 pub(crate) struct Pool {
     jobs: mpsc::UnboundedSender<Job>,
@@ -53,7 +54,7 @@ impl Pool {
     }
 }
 
-/// Invocations that are queued, running, or waiting for another try; shared by all pools.
+/// The number of invocations that are queued, running, or waiting for another attempt, over all pools.
 #[derive(Clone, Default)]
 pub(crate) struct Pending(Arc<(AtomicUsize, Notify)>);
 

@@ -11,14 +11,14 @@ pub struct Ramp {
     pub per_second: f64,
 }
 
-/// Lambda's own: 1,000 every ten seconds.
+/// Lambda's own rate: 1,000 every ten seconds.
 impl Default for Ramp {
     fn default() -> Self {
         Self { burst: 1000, per_second: 100.0 }
     }
 }
 
-/// The token bucket that a ramp is kept by.
+/// The token bucket that enforces a ramp.
 pub(crate) struct Tokens {
     ramp: Ramp,
     tokens: f64,

@@ -1,11 +1,11 @@
 //! Lambda's Runtime API for one process, as its documentation describes it.
 //!
 //! `GET …/invocation/next` waits for an invocation; `POST …/invocation/{id}/response` and `…/error` end it; `POST
-//! …/init/error` says that there will be none. A process handles one invocation at a time.
+//! …/init/error` reports that the process cannot start. A process handles one invocation at a time.
 //!
-//! Lambda's own is seen by its process alone. A port of this machine is seen by all of its users and by the
-//! pages of their browsers. So each path here begins with a token that only the process gets, and nothing from
-//! a page is heard.
+//! On AWS only the process itself can reach its Runtime API. A port of this machine can be reached by all of its users
+//! and by the pages in their browsers. So each path here begins with a token that only the process gets, and requests
+//! from a page are rejected.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -39,9 +39,9 @@ pub(crate) struct Handout {
 /// An action of the process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Call {
-    /// It asked for the next invocation.
+    /// The process requested the next invocation.
     Next,
-    /// It got it: the clock runs.
+    /// The process received the invocation: its time starts.
     Taken,
     Response(String),
     Error(String),
@@ -59,7 +59,7 @@ pub(crate) struct RuntimeApi {
 }
 
 struct Shared {
-    /// Its own address, as a request names it.
+    /// The address of the API, as requests name it.
     host: String,
     /// The beginning of each request's path.
     base: String,
@@ -135,7 +135,7 @@ impl Shared {
         }
     }
 
-    /// Whether a browser sends it, for a page or on behalf of one that claims our address for a name of its own.
+    /// Returns whether a browser sent the request, for a page, or for a host name that resolves to our address.
     fn is_strange(&self, request: &Request<Incoming>) -> bool {
         let headers = request.headers();
         headers.get(HOST).is_none_or(|host| host.as_bytes() != self.host.as_bytes())

@@ -1,8 +1,8 @@
 //! A process of a function, from its cold start to its end.
 //!
-//! It ends with the invoker: dropping it kills the process. If the invoker is killed, the process ends by itself, because its
-//! standard input is a pipe of the invoker, which the system then closes. Otherwise it would draw on for minutes before it
-//! found its runtime API gone.
+//! It ends with the invoker: dropping it kills the process. If the invoker is killed, the process ends by itself,
+//! because its standard input is a pipe of the invoker, which the system then closes. Without this it would continue to
+//! draw for minutes before it noticed that its Runtime API is gone.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -20,7 +20,8 @@ use crate::routes::Function;
 /// The time that Lambda gives a process before its first call of `next`.
 const INIT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Tells the functions of this project to end when their standard input ends. The crate of the functions reads it.
+/// The variable that makes the project's functions end when their standard input ends. The crate of the functions reads
+/// it.
 const LIFELINE: &str = "RAYFOLD_ENDS_WITH_STDIN";
 
 /// A process, warm after its first invocation.

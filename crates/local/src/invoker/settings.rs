@@ -37,8 +37,8 @@ pub struct Settings {
     pub timeout: Duration,
     /// The pauses before each further attempt at a failed event; Lambda's are one and two minutes.
     pub retry_pauses: Vec<Duration>,
-    /// The time within which the store delivers the events that it has kept while nobody listened; `None` when it
-    /// keeps no events. The sweep at the start waits for these: a frame that they wake needs no waking.
+    /// The time within which the store delivers the events that it kept while there was no listener; `None` if it keeps
+    /// no events. The sweep at the start waits for these, because it need not trigger frames that they trigger.
     pub kept_events: Option<Duration>,
     /// The listings of the bucket from which events come, if the store sends none.
     pub listing: Option<Listing>,
@@ -84,7 +84,7 @@ impl Settings {
 pub struct Listing {
     /// The store of the bucket.
     pub store: S3Store,
-    /// The invoker's name, without slashes. Of two invokers on a bucket with one name, each believes to be alone.
+    /// The invoker's name, without slashes. If two invokers on a bucket have the same name, neither sees the other.
     pub name: String,
     /// The interval between two listings.
     pub every: Duration,
