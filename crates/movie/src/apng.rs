@@ -1,4 +1,4 @@
-//! APNG: an animation without loss, as browsers show it. Of each frame only the rectangle is written that has changed.
+//! APNG: a lossless animation for browsers. Only the changed rectangle of each frame is written.
 
 use std::io::{self, Write};
 
@@ -10,34 +10,35 @@ use crate::rate::fraction;
 use crate::state::{Counts, DAMAGED, State};
 use crate::{Error, Movie};
 
-/// Parts of a second in which a frame's time is counted where a whole number of frames does not fill it: milliseconds, or
-/// hundredths where those have no room in the format's 16 bits.
+/// The unit in which a frame's duration is counted if a second is no whole number of frames: milliseconds, or
+/// hundredths if milliseconds do not fit the format's 16 bits.
 const PARTS: [u16; 2] = [1_000, 100];
 
-/// The most frames a second that browsers show: they show a frame of 10 ms or less for 100 ms, and round down to whole
-/// milliseconds. With more, frames are left out as in a GIF.
+/// The maximum frame rate of browsers: they show a frame of 10 ms or less for 100 ms, and round down to whole
+/// milliseconds. At a higher rate frames are dropped, as in a GIF.
 pub const MAX_FPS: f64 = 90.0;
 
 /// The first bytes of a PNG.
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Frames on their way.
+/// An encoder of frames.
 pub(crate) struct Apng<W: Write> {
     out: W,
     movie: Movie,
     thinning: Thinning,
-    /// How many frames there will be in the file, and how many there are.
+    /// The number of frames that the file will have, and the number so far.
     frames: u64,
     written: u64,
     pushed: u64,
-    /// The number of the next chunk that has one: a description of a frame, or the data of any frame but the first.
+    /// The sequence number of the next chunk that has one: the description of a frame, or the data of any frame but the
+    /// first.
     next: u32,
     last: Option<DynamicImage>,
 }
 
 impl<W: Write> Apng<W> {
     /// # Errors
-    /// The writer's, and when the animation is beyond what the format can hold.
+    /// Fails if the writer does, or if the animation exceeds the limits of the format.
     pub(crate) fn new(out: W, movie: Movie) -> io::Result<Self> {
         let mut apng = Self::after(out, movie, Thinning::new(movie.fps, MAX_FPS))?;
         let count = u32::try_from(apng.frames).map_err(io::Error::other)?;
@@ -81,7 +82,7 @@ impl<W: Write> Apng<W> {
         Ok(Self { written, pushed, next, last, ..apng })
     }
 
-    /// Takes the next frame, which is as large as the others, and how many seconds it is shown if not as long as they.
+    /// Takes the next frame, of the same size as the others, and its duration in seconds if that differs from theirs.
     ///
     /// # Errors
     /// The writer's.
@@ -149,7 +150,7 @@ impl<W: Write> Apng<W> {
     /// Returns how many frames were left out.
     ///
     /// # Errors
-    /// The writer's, and when there are fewer frames than were announced.
+    /// Fails if the writer does, or if there are fewer frames than announced.
     pub(crate) fn finish(mut self) -> io::Result<u64> {
         if let Some(last) = self.thinning.finish() {
             self.write(last, None)?;
@@ -186,7 +187,7 @@ fn compressed(picture: &DynamicImage) -> io::Result<Vec<Vec<u8>>> {
     Ok(data)
 }
 
-/// As the format counts: how often it is shown, 0 for ever.
+/// Returns the number of times that the animation is shown, as the format counts: 0 for ever.
 fn plays(plays: Plays) -> u32 {
     match plays {
         Plays::Endless => 0,
@@ -195,8 +196,7 @@ fn plays(plays: Plays) -> u32 {
     }
 }
 
-/// How long the frame of this number, from 0, is shown: so many parts of so many that a second has. Rounding does not
-/// add up.
+/// Returns the duration of frame `k`, counted from 0, as a fraction of a second. Rounding errors do not add up.
 fn delay(fps: f64, number: u64) -> (u16, u16) {
     if let (frames @ 1..=65_535, seconds @ 1..=65_535) = fraction(fps) {
         return (seconds as u16, frames as u16);
@@ -207,7 +207,7 @@ fn delay(fps: f64, number: u64) -> (u16, u16) {
     ((start(number + 1) - start(number)) as u16, parts)
 }
 
-/// A time as so many parts of so many that a second has.
+/// Returns a time as a fraction of a second: numerator and denominator.
 fn in_parts(seconds: f64) -> (u16, u16) {
     let ms = seconds * 1_000.0;
     if (ms - ms.round()).abs() > 1e-9 * ms
@@ -219,7 +219,8 @@ fn in_parts(seconds: f64) -> (u16, u16) {
     ((seconds * f64::from(parts)).round() as u16, parts)
 }
 
-/// Column, row, width and height of what differs; a pixel if nothing does, because a frame must have one.
+/// Returns column, row, width and height of the area that differs. It is a single pixel if nothing differs, because a
+/// frame must have one.
 pub(crate) fn changed(last: &DynamicImage, frame: &DynamicImage) -> (u32, u32, u32, u32) {
     let (width, height) = (frame.width(), frame.height());
     let (each, bytes) =

@@ -1,4 +1,4 @@
-//! Ordered frames into one file of an animation: GIF, APNG, WebP or YUV4MPEG2.
+//! Encodes ordered frames into one file of an animation: GIF, APNG, WebP or YUV4MPEG2.
 //!
 //! An [`Encoding`] takes the frames one by one and writes as it goes, so that memory does not grow with their number.
 //! `rayfold-gif` encodes GIFs; the other containers are here. Every program that writes animations uses this crate, so that
@@ -34,7 +34,7 @@ pub struct Movie {
     pub frames: Option<u64>,
     /// The frames per second.
     pub fps: f64,
-    /// How often it is shown.
+    /// The number of times that it is shown.
     pub plays: Plays,
     /// The duration of the last frame in hundredths of a second, if it differs from that of the others.
     pub last_delay_cs: Option<u16>,
@@ -47,7 +47,7 @@ pub struct Movie {
 /// The error of an [`Encoding`].
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The writer's error, or the frames are beyond the limits of the container.
+    /// The writer failed, or the frames exceed the limits of the container.
     #[error(transparent)]
     Write(#[from] io::Error),
     /// The GIF encoder's error, other than the writer's.
@@ -209,7 +209,7 @@ impl<W: Write> Encoding<W> {
     }
 }
 
-/// Puts a picture over a colour, by its levels as they stand. Without alpha it stays as it is.
+/// Puts a picture over a colour, by its encoded levels. A picture without alpha stays unchanged.
 #[must_use]
 pub fn over(picture: DynamicImage, matte: [u8; 3]) -> RgbImage {
     if !picture.color().has_alpha() {
@@ -230,7 +230,7 @@ fn opaque(picture: RgbImage) -> DynamicImage {
 }
 
 impl Finished {
-    /// Writes what belongs to the start of the file into a file in memory.
+    /// Writes the bytes that belong to the start of the file into a file in memory.
     pub fn complete(&self, file: &mut [u8]) {
         if let Some((at, length)) = self.length {
             file[at as usize..][..length.len()].copy_from_slice(&length);
@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// Whatever the frame after which the file is left: also when frames are dropped, and with alpha.
+    /// The file is the same whichever frame it is suspended after, also when frames are dropped, and with alpha.
     #[test]
     fn a_file_in_two_pieces_is_the_file_in_one() {
         let frames: Vec<DynamicImage> = (0..7)

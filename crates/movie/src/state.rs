@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// Raised when the state, or the bytes of a file after it, are written in another way.
+/// The version of the format. Raise it when the state, or the bytes of a file after it, are written differently.
 const VERSION: u32 = 1;
 
 /// The state of an encoder between two frames.
@@ -24,13 +24,13 @@ pub(crate) struct State {
 /// The numbers of a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Counts {
-    /// Frames that were pushed.
+    /// The number of frames that were pushed.
     pub(crate) pushed: u64,
-    /// Frames that are in the file.
+    /// The number of frames in the file.
     pub(crate) written: u64,
-    /// Bytes of the file, or its numbered chunks, as the container counts.
+    /// The number of bytes of the file, or of its numbered chunks, as the container counts.
     pub(crate) counted: u64,
-    /// Column, row, width, height and milliseconds of the picture that is not written yet.
+    /// Column, row, width, height and milliseconds of the picture that is not yet written.
     pub(crate) chunk: Option<[u32; 5]>,
 }
 
@@ -42,7 +42,7 @@ struct Head {
     /// The channels of the last frame, and of the frames that are held back.
     last: Option<u8>,
     held: Vec<u8>,
-    /// Bytes of the picture that is not written yet.
+    /// The number of bytes of the picture that is not yet written.
     picture: usize,
 }
 

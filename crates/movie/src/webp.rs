@@ -148,7 +148,8 @@ impl<W: Write> WebP<W> {
         Ok(())
     }
 
-    /// Returns how many frames were left out, and the length field, which is to be written at the start of the file.
+    /// Returns the number of frames that were left out, and the length field, which must be written at the start of the
+    /// file.
     ///
     /// # Errors
     /// The writer's errors, and one when the file is longer than the format allows.

@@ -1,8 +1,8 @@
 //! YUV4MPEG2: raw frames with a line of text before each, which every video encoder reads from a pipe.
 //!
-//! Colours are Y'CbCr by ITU-R BT.601 in the limited range (luma 16 to 235, chroma 16 to 240), with a sample of each a
-//! pixel (4:4:4): what programs take the format for that look at nothing but its size.
-//! `XCOLORRANGE` tells it to those that look further. Nothing in the header can name the matrix.
+//! Colours are Y'CbCr by ITU-R BT.601 in the limited range (luma 16 to 235, chroma 16 to 240), with one sample of each
+//! per pixel (4:4:4). Programs that read only the size from the header assume this. `XCOLORRANGE` states the range for
+//! other programs. The header cannot name the matrix.
 
 use std::io::{self, Write};
 
@@ -10,15 +10,15 @@ use image::RgbImage;
 
 use crate::rate::fraction;
 
-/// Parts that a fixed-point number has of 1.
+/// The number of fixed-point units in 1.
 const ONE: i32 = 1 << 16;
 
-/// Y', Cb and Cr of R', G' and B' levels, in parts of a level, and what they are at black: BT.601, of weights .299, .587
-/// and .114, scaled to 219 and 224 levels.
+/// The factors from R', G' and B' levels to Y', Cb and Cr, in fixed-point units, and the values at black. They are
+/// those of BT.601, with weights .299, .587 and .114, scaled to 219 and 224 levels.
 const MATRIX: [([i32; 3], i32); 3] =
     [([16_829, 33_039, 6_416], 16), ([-9_714, -19_071, 28_785], 128), ([28_784, -24_103, -4_681], 128)];
 
-/// Frames on their way.
+/// A writer of frames.
 #[derive(Debug)]
 pub(crate) struct Y4m<W> {
     out: W,
@@ -26,7 +26,7 @@ pub(crate) struct Y4m<W> {
 }
 
 impl<W: Write> Y4m<W> {
-    /// Of so many columns, rows, and frames a second.
+    /// Starts a file with this number of columns and rows, at this frame rate.
     ///
     /// # Errors
     /// The writer's.
@@ -41,7 +41,7 @@ impl<W: Write> Y4m<W> {
         Self { out, planes: Vec::new() }
     }
 
-    /// Writes the next frame, which is as large as the others.
+    /// Writes the next frame, which has the size of the others.
     ///
     /// # Errors
     /// The writer's.
@@ -77,7 +77,7 @@ mod tests {
         assert!(header.starts_with(b"YUV4MPEG2 W4 H3 F30000:1001 "));
     }
 
-    /// ITU-R BT.601 gives black, white, and the primary colours at full saturation so.
+    /// Values of ITU-R BT.601 for black, white, and the primary colours at full saturation.
     #[test]
     fn colours_are_those_of_the_recommendation() {
         let known = [
