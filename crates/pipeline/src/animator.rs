@@ -9,12 +9,13 @@ use rayfold_scene::{AnimationSettings, Container};
 use crate::manifest::Reason;
 use crate::store::Patch;
 
-/// Makes encoders. The assemble function brings those of all containers, the simulation a smaller one.
+/// A maker of encoders. The assemble function provides those of all containers, the simulation a smaller one.
 pub trait Animator: Send + Sync {
     /// An animation being encoded.
     type Encoding: Encoding;
 
-    /// Starts an animation, whose frames may have alpha if `alpha` says so; the reason when it cannot be.
+    /// Starts an animation, whose frames may have alpha if `alpha` says so. Fails with the reason why there can be
+    /// none.
     fn begin(
         &self,
         settings: &AnimationSettings,
@@ -22,8 +23,8 @@ pub trait Animator: Send + Sync {
         alpha: bool,
     ) -> Result<Self::Encoding, Reason>;
 
-    /// Goes on with an animation that was [suspended](Encoding::suspend), with the bytes that it would have had; the reason
-    /// when that cannot be: the state is damaged, or of another version of the encoder.
+    /// Continues an animation that was [suspended](Encoding::suspend), with the same bytes. Fails with the reason: the
+    /// state is damaged, or of another version of the encoder.
     fn resume(
         &self,
         settings: &AnimationSettings,
@@ -41,14 +42,14 @@ pub trait Encoding: Send {
     /// The problem of this frame, or of all frames together.
     fn push(&mut self, frame: Bytes) -> impl Future<Output = Result<Bytes, Unfit>> + Send;
 
-    /// Gives the rest of the file, and what is known of its start only at its end.
+    /// Returns the rest of the file, and the bytes of its start that are known only at the end.
     ///
     /// # Errors
     ///
-    /// The reason why these frames make no animation; it would be the same next time.
+    /// The reason why these frames make no animation, which would be the same next time.
     fn finish(self) -> impl Future<Output = Result<(Bytes, Option<Patch>), Reason>> + Send;
 
-    /// Stops between two frames: gives a state that another process can go on with.
+    /// Stops between two frames. Returns a state from which another process can continue.
     ///
     /// # Errors
     ///
@@ -56,13 +57,13 @@ pub trait Encoding: Send {
     fn suspend(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
 }
 
-/// Why a frame cannot be added to an animation.
+/// The reason why a frame cannot be added to an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unfit {
-    /// The body is no frame: another writer has put something else in its place. Drawn again it may be one.
+    /// The object is no frame, because another writer has replaced it. Drawing it again may help.
     Corrupt(Reason),
-    /// The frame does not go with the others; it would be the same next time.
+    /// The frame does not fit the others. This would be the same next time.
     Unlike(Reason),
-    /// The frame has alpha, and the file was begun without.
+    /// The frame has alpha, but the file was begun without.
     Alpha,
 }

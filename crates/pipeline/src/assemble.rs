@@ -1,11 +1,11 @@
-//! The assembler makes the bucket agree with itself, whichever claim woke it.
+//! The assembler, which makes the outputs of a bucket agree with its listing, whatever claim invoked it.
 //!
-//! Each round reads the manifest and the versions and generations of the files (`outputs.rs`), and lists, in this order.
-//! Then it does what is due: it commits the manifest where it differs (without a claim: the assembler is here already),
-//! builds a file of a set that is done and settled, removes a file of a set that can have none. The assembler ends only
-//! on a round that wrote nothing, so that no file from an older listing stays, and no set that became whole while it
-//! worked is left. An assembler that waits or builds holds the animation's lease; another assembler that finds it taken leaves
-//! all to its holder.
+//! Each round reads the manifest and the versions and generations of the files (`outputs.rs`), and lists, in this
+//! order. Then it does what is due. If the manifest differs, it commits it, without a claim, because the assembler is
+//! already running. If a set is done and settled, it builds a file of it. If a set can have no file, it removes the
+//! file. The assembler ends only after a round that wrote nothing. So no file from an older listing remains, and a set
+//! that became complete meanwhile is not missed. An assembler that waits or builds holds the animation's lease. Another
+//! assembler that finds the lease taken exits, and leaves the work to the holder.
 //!
 //! If a file does not fit the time of one invocation, the next invocation continues it (`build`).
 
@@ -36,28 +36,29 @@ pub struct Assembled {
     pub animation: Animation,
     /// The animation's status in the last round.
     pub status: Status,
-    /// Its generation in the last round.
+    /// The generation of the set in the last round.
     pub generation: Generation,
-    /// Rounds, the last of which wrote nothing.
+    /// The number of rounds. The last one wrote nothing.
     pub rounds: u32,
     /// The number of files that were written.
     pub built: u32,
-    /// Frames of the last file that was written.
+    /// The number of frames of the last file that was written.
     pub frames: u64,
-    /// Frames of a file that was left unfinished to the next invocation.
+    /// The number of frames in a file that was left unfinished to the next invocation.
     pub left_after: Option<u64>,
-    /// Waiting for uploads to settle.
+    /// The time spent waiting for uploads to settle.
     pub waited: Duration,
     /// The time spent on building files.
     pub building: Duration,
 }
 
-/// Works on one claim, given its key; `None` if another assembler is at the animation, who will look at it once more.
+/// Works on one claim, given its key. Returns `None` if another assembler works on the animation; that one looks at it
+/// once more.
 ///
 /// # Errors
 ///
-/// [`Error::Key`] for a key that is no claim: nothing was done, and a retry would not help. Others are the store's:
-/// the platform should try again.
+/// [`Error::Key`] for a key that is no claim: nothing was done, and a retry would not help. All other errors are the
+/// store's, and the platform should try again.
 pub async fn assemble<S: Store, C: Clock, A: Animator>(
     invocation: &Invocation<'_, S, C>,
     animator: &A,
@@ -72,18 +73,18 @@ pub async fn assemble<S: Store, C: Clock, A: Animator>(
 /// The end of a round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Next {
-    /// Something was written or waited for: look again.
+    /// The round wrote or waited, so another round follows.
     Round,
     /// There is nothing to do.
     End,
-    /// Another assembler does it: this one has no say in its lease.
+    /// Another assembler does the work. This one does not touch its lease.
     Leave,
-    /// The set does not settle in this invocation's time, or its GIF is not finished in it: wake the next one.
+    /// The set does not settle in this invocation's time, or its GIF is not finished: invoke the next assembler.
     HandOver,
 }
 
-/// When the set of scripts last changed; `None` when it is settled: when there are just as many frames as
-/// `animation.json` says.
+/// Returns the time of the last change of the set of scripts. Returns `None` if the set is settled because there are
+/// exactly as many frames as `animation.json` says.
 fn last_change(
     head: &Head,
     newest_script: Option<Timestamp>,
@@ -93,7 +94,7 @@ fn last_change(
     newest_script.max(removed_at).filter(|_| expected != Some(head.total))
 }
 
-/// Quiet that has been waited for.
+/// The quiet time that was waited for.
 #[derive(Debug, Default)]
 struct Quiet {
     since: Option<Timestamp>,
@@ -112,7 +113,7 @@ struct Tally {
     building: Duration,
     /// The animation's lease, while this invocation holds it.
     lease: Option<HeldLease>,
-    /// Files that were looked at in an earlier round.
+    /// Files that an earlier round examined.
     looked_at: BTreeSet<Container>,
 }
 
@@ -245,8 +246,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Deletes what is left of an animation that is gone, manifest and all, and writes nothing. Returns
-    /// whether anything was left.
+    /// Deletes everything that is left of an animation that is gone, including the manifest, and writes nothing.
+    /// Returns whether anything was left.
     async fn clear(
         &self,
         animation: &Animation,
@@ -266,7 +267,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(true)
     }
 
-    /// Gives the lease back, and with it the file that no assembler will go on with.
+    /// Releases the lease, and deletes the unfinished file that no assembler will continue.
     async fn give_up_lease(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         self.abandon_checkpoint(head, held).await?;
         self.release_lease(&head.animation).await
@@ -330,7 +331,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Next::Round)
     }
 
-    /// Has a frame drawn again that cannot be read; after a bounded number of attempts it gets an error receipt.
+    /// Triggers the drawing of a frame that cannot be read. After a limited number of attempts the frame gets an error
+    /// receipt.
     async fn draw_anew(&self, observation: &Observation, frame: &Frame, reason: &Reason) -> Result<()> {
         let animation = &observation.manifest.head.animation;
         let Some(key) = frame_key(animation, frame) else { return Ok(()) };
@@ -347,7 +349,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_retry(animation, &frame.script, tag, frame.part, attempts + 1).await
     }
 
-    /// Writes down that this generation gives no such file.
+    /// Records that this generation gives no such file.
     pub(crate) async fn refuse(&self, manifest: &Manifest, output: Container, reason: &Reason) -> Result<()> {
         let generation = manifest.head.generation.clone();
         let key = manifest.head.animation.receipt(&Receipt::Refusal { generation, output });

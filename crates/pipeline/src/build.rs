@@ -1,10 +1,9 @@
 //! Builds a file of an animation, in one piece or in several.
 //!
-//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and its output
-//! is sent part by part. If the time of an invocation does not suffice for one more frame, the invocation writes
-//! a [`checkpoint`](crate::checkpoint) and leaves the file to the next one; both together write the bytes that
-//! one would have written. Each takes at least one frame. A set of which not even one frame fits, or that takes
-//! a day, is refused.
+//! Memory does not grow with the number of frames: they are fetched a few ahead of the encoder, and its output is sent
+//! part by part. If the time of an invocation does not suffice for one more frame, the invocation writes a
+//! [`checkpoint`](crate::checkpoint), and the next one continues the file. The bytes are those of a single invocation.
+//! Each invocation takes at least one frame. A set is refused if not even one frame fits, or if it takes a day.
 
 use std::time::Duration;
 
@@ -23,38 +22,38 @@ use crate::{Clock, Error, Result, Timestamp};
 /// The name of the entry of a file's metadata that holds its generation.
 pub const GENERATION: &str = "generation";
 
-/// The most invocations that may build a file, one after the other. 15 minutes each are 22 hours and a half: after a
-/// day the bucket's rules remove the unfinished upload, and all would start over.
+/// The maximum number of invocations that may build a file, one after the other. At 15 minutes each they take 22.5
+/// hours. After a day the bucket's rules remove the unfinished upload, and the build would start again.
 pub const MAX_PIECES: u32 = 90;
 
 /// The end of a build.
 pub(crate) enum Built<'a> {
     /// The file is put, as this version.
     Put(ETag),
-    /// It is left after this number of frames, for the next invocation to continue.
+    /// The file was suspended after this number of frames, for the next invocation.
     Left(u64),
-    /// A frame is gone, or another assembler's file came first: look again.
+    /// A frame is gone, or another assembler wrote its file first, so another round follows.
     Stale,
     /// This frame cannot be read.
     Corrupt(&'a Frame, Reason),
-    /// These frames make no such file.
+    /// These frames make no file of this kind.
     Refused(Reason),
 }
 
 /// The encoder's progress at its end.
 enum Encoded<'a> {
-    /// It has taken all frames.
+    /// The encoder has taken all frames.
     All,
-    /// It has taken this number of frames, and there is no time for more.
+    /// The encoder has taken this number of frames, and there is no time for more.
     SoFar(u64),
-    /// A frame has alpha: the file has to be begun anew.
+    /// A frame has alpha, so the file must be started again.
     Alpha,
-    /// This ends the build.
+    /// This outcome ends the build.
     No(Built<'a>),
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Writes a file of a manifest that is done over the version that was there, or fails to. `held`: the lease.
+    /// Tries to write a file of a manifest that is done, in place of the version that was read. `held`: the lease.
     pub(crate) async fn build<'m, A: Animator>(
         &self,
         animator: &A,
@@ -237,16 +236,16 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Encoded::All)
     }
 
-    /// Whether no time will be left to go on after `wait`.
+    /// Returns whether no time will be left to continue after `wait`.
     pub(crate) fn is_out_of_time_in(&self, wait: Duration) -> bool {
         let then = self.clock.now().after(wait).after(self.policy.margin);
         self.deadline.is_some_and(|deadline| then >= deadline)
     }
 }
 
-/// Returns the reason to refuse a set with whose first frame an invocation has come to its end. A set of which no
-/// frame fits the function's time is refused, but only by an invocation that had most of its time for that. An
-/// invocation that spent more `before`, waiting and building other sets, leaves the set to its next attempt.
+/// Returns the reason to refuse a set, if an invocation has come to its end at the first frame. A set is refused if no
+/// frame fits the function's time, but only by an invocation that had most of its time for that frame. An invocation
+/// that spent more time `before`, waiting and building other sets, leaves the set to its next attempt.
 fn out_of_time(head: &Head, before: Duration, building: Duration) -> Result<Reason> {
     if before > building {
         let what = format!("{} became whole too late to assemble it", head.animation);
@@ -266,7 +265,7 @@ pub fn frame_key(animation: &Animation, frame: &Frame) -> Option<String> {
     Some(animation.receipt(&Receipt::Frame { name, tag: Tag { version, pixels }, part: frame.part }))
 }
 
-/// The generation that a file was made of.
+/// Returns the generation that a file was made of.
 pub fn generation_of(file: Option<&ObjectInfo>) -> Option<&str> {
     file?.metadata.get(GENERATION).map(String::as_str)
 }

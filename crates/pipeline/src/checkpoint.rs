@@ -1,9 +1,9 @@
-//! The progress of a file that does not fit the time of one invocation, written down for the next one.
+//! The progress of a file that does not fit the time of one invocation, stored for the next one.
 //!
 //! A checkpoint is resumed only if it makes the same bytes: the same set of frames, to replace the same file, by the
-//! same version of the encoder. Any other one, also a damaged one, costs a build from the start. The lease says that
-//! there is a checkpoint, so an assembler that builds in one piece asks for none; one that no lease speaks of is
-//! litter, and the bucket's rules clear it away.
+//! same version of the encoder. Any other checkpoint, also a damaged one, costs a build from the start. The lease
+//! records that there is a checkpoint, so an assembler that builds in one piece need not look for one. A checkpoint
+//! that no lease mentions is garbage, and the bucket's rules delete it.
 //!
 //! The object is a line with the hash of the rest, a line of JSON, the bytes of the file that are not sent yet,
 //! and the encoder's state.
@@ -21,10 +21,10 @@ use crate::manifest::Head;
 use crate::store::{ETag, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Clock, Error, Result};
 
-/// Raised when the object is written in another way.
+/// The version of the format. Raise it when the object is written differently.
 const SCHEMA: u32 = 1;
 
-/// Bytes of the first line.
+/// The number of bytes of the first line.
 const HASH: usize = 64;
 
 /// A file between two frames.
@@ -35,7 +35,7 @@ pub(crate) struct Checkpoint {
     pub(crate) encoding: Bytes,
 }
 
-/// The identity of the file of which a checkpoint is.
+/// The identity of the file that a checkpoint belongs to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CheckpointHead {
     /// The set of frames.
@@ -47,7 +47,7 @@ pub(crate) struct CheckpointHead {
     pub(crate) replaces: Option<ETag>,
     /// The number of frames that the encoder has taken.
     pub(crate) frames: u64,
-    /// In how many invocations.
+    /// The number of invocations so far.
     pub(crate) pieces: u32,
 }
 
@@ -61,7 +61,7 @@ struct Line {
     #[serde(flatten)]
     head: CheckpointHead,
     upload: UnfinishedUpload,
-    /// Bytes of the upload's start, and of its tail.
+    /// The number of bytes of the upload's start, and of its tail.
     #[serde(default)]
     start: usize,
     tail: usize,
@@ -116,15 +116,15 @@ fn hash(parts: &[&[u8]]) -> String {
 pub(crate) struct ResumedUpload<E, U> {
     pub(crate) encoding: E,
     pub(crate) upload: U,
-    /// Frames that the encoder has taken.
+    /// The number of frames that the encoder has taken.
     pub(crate) frames: u64,
-    /// In how many invocations.
+    /// The number of invocations so far.
     pub(crate) pieces: u32,
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Goes on with the file that the lease's last holder has left, if it is one of this kind and set, over this version. Else
-    /// its upload is aborted, and the checkpoint goes.
+    /// Continues the file that the lease's last holder left unfinished, if it is of this kind and set, and would
+    /// replace this version. Otherwise its upload is aborted, and the checkpoint is deleted.
     pub(crate) async fn take_up<A: Animator>(
         &self,
         animator: &A,
@@ -172,7 +172,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
-    /// Removes the checkpoint and aborts its upload: no assembler will go on with it.
+    /// Deletes the checkpoint and aborts its upload, because no assembler will continue it.
     pub(crate) async fn abandon_checkpoint(&self, head: &Head, held: &mut HeldLease) -> Result<()> {
         if !held.has_checkpoint {
             return Ok(());
@@ -214,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Whatever byte is missing or another one.
+    /// Any missing or changed byte is detected.
     #[test]
     fn a_damaged_checkpoint_is_none() {
         let whole = checkpoint().encode("key").unwrap();

@@ -1,4 +1,4 @@
-//! Time and chance, passed in: a step that asks these and nothing else can be replayed from a seed.
+//! Time and randomness are passed in. A step that uses no others can be replayed from a seed.
 
 use std::future::Future;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -25,14 +25,14 @@ impl Timestamp {
 
 /// A clock on which a task can also wait.
 pub trait Clock: Send + Sync {
-    /// The time. It need not be exact: ages are compared with seconds of tolerance.
+    /// Returns the current time. It need not be exact: ages are compared with seconds of tolerance.
     fn now(&self) -> Timestamp;
 
     /// Waits for at least `duration`.
     fn sleep(&self, duration: Duration) -> impl Future<Output = ()> + Send;
 }
 
-/// The machine's clock; needs a tokio runtime with its timer.
+/// The machine's clock. It needs a tokio runtime with a timer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SystemClock;
 
@@ -50,7 +50,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// A seeded source of chance (SplitMix64; Steele, Lea & Flood 2014). It spreads retries, it keeps no secrets.
+/// A seeded source of randomness (SplitMix64; Steele, Lea & Flood 2014). It spreads retries, and is not secret.
 #[derive(Debug)]
 pub struct Randomness(AtomicU64);
 
@@ -69,7 +69,7 @@ impl Randomness {
         z ^ (z >> 31)
     }
 
-    /// A number below `bound`, 0 when `bound` is 0.
+    /// Returns a number below `bound`, or 0 if `bound` is 0.
     pub fn below(&self, bound: u64) -> u64 {
         u64::try_from((u128::from(self.bits()) * u128::from(bound)) >> 64).unwrap_or(0)
     }
@@ -81,7 +81,7 @@ impl Randomness {
         )
     }
 
-    /// True once in `of` draws.
+    /// Returns `true` once in `of` draws, on average.
     pub fn one_in(&self, of: u64) -> bool {
         self.below(of) == 0
     }

@@ -2,25 +2,25 @@
 
 use std::error::Error as StdError;
 
-/// A cause that came from outside: a store's client, a decoder.
+/// A cause from outside the crate: a store's client, or a decoder.
 pub type Cause = Box<dyn StdError + Send + Sync + 'static>;
 
-/// The pipeline's errors. Each names the object's key where there is one.
+/// The pipeline's errors. Each names the object's key if there is one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages show what the fields hold")]
 pub enum Error {
-    /// There is no such object (404). A conditional put answers so when the object that it should replace is gone.
+    /// There is no such object (404). A conditional put fails with it if the object that it should replace is gone.
     #[error("{key} does not exist")]
     NotFound { key: String },
-    /// The condition of a put does not hold (412): another write was first, possibly one's own, when
-    /// an answer was lost.
+    /// The condition of a put does not hold (412), because another write was first. That may be an earlier write of the
+    /// same caller whose reply was lost.
     #[error("{key} is not as the write expected it")]
     PreconditionFailed { key: String },
-    /// Another write to the same object is under way (409): nothing was written, try again.
+    /// Another write to the same object is in progress (409). Nothing was written; try again.
     #[error("{key} is being written by someone else")]
     Conflict { key: String },
-    /// The store asks for patience (503, 429): nothing was done.
+    /// The store is overloaded (503, 429). Nothing was done.
     #[error("the store is busy: {key}")]
     Throttled {
         /// The object's key or the listing's prefix.
@@ -28,7 +28,7 @@ pub enum Error {
         /// The error of the store.
         source: Cause,
     },
-    /// The store has no room for the object (507): nothing was done.
+    /// The store has no space for the object (507). Nothing was done.
     #[error("the store has no room: {key}")]
     Full {
         /// The object's key.
@@ -36,7 +36,7 @@ pub enum Error {
         /// The error of the store.
         source: Cause,
     },
-    /// The answer was lost (timeout, broken connection, 500): the request may or may not have taken effect.
+    /// The reply was lost (timeout, broken connection, 500). The request may or may not have taken effect.
     #[error("no answer from the store: {key}")]
     Ambiguous {
         /// The object's key or the listing's prefix.
@@ -44,7 +44,7 @@ pub enum Error {
         /// The error of the client.
         source: Cause,
     },
-    /// The store refuses for good: permissions, a missing bucket, a malformed request.
+    /// The store refuses permanently: permissions, a missing bucket, a malformed request.
     #[error("the store refuses {key}")]
     Refused {
         /// The object's key or the listing's prefix.
@@ -52,13 +52,13 @@ pub enum Error {
         /// The error of the store.
         source: Cause,
     },
-    /// An upload has more parts than the store takes.
+    /// An upload has more parts than the store accepts.
     #[error("{key} would be larger than {limit_gb} GB, the most that can be uploaded in parts")]
     TooLarge { key: String, limit_gb: u64 },
-    /// The environment does not say in which region the bucket is; nothing was asked of the store.
+    /// The environment does not name the region of the bucket. No request was sent.
     #[error("found no AWS region: set AWS_REGION, or a region in the AWS profile")]
     NoRegion,
-    /// A key that is none of the pipeline's.
+    /// A key that is not one of the pipeline's.
     #[error("{key}: {problem}")]
     Key {
         /// The key as it came.
@@ -66,14 +66,14 @@ pub enum Error {
         /// The rule that the value breaks.
         problem: &'static str,
     },
-    /// An object of the pipeline's own that cannot be read back.
+    /// An object of the pipeline that cannot be read back.
     #[error("{key} cannot be read")]
     Malformed {
         key: String,
         /// The error of the decoder.
         source: Cause,
     },
-    /// A manifest that breaks its own rules was about to be written; it was not.
+    /// A manifest that breaks its own rules was about to be written. It was not written.
     #[error("the manifest of {animation} would break the rule {rule}")]
     Invariant {
         animation: String,
@@ -89,7 +89,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Returns whether another write was first: read again, then decide again.
+    /// Returns whether another write was first, so that the caller must read and decide again.
     pub fn is_conflict(&self) -> bool {
         matches!(self, Error::PreconditionFailed { .. } | Error::Conflict { .. })
     }
@@ -105,7 +105,7 @@ impl Error {
         matches!(self, Conflict { .. } | Throttled { .. } | Full { .. } | Ambiguous { .. })
     }
 
-    /// Whether the request took effect is unknown.
+    /// Returns whether it is unknown if the request took effect.
     pub fn is_ambiguous(&self) -> bool {
         matches!(self, Error::Ambiguous { .. })
     }

@@ -2,9 +2,10 @@
 //! the assemble function receives.
 //!
 //! A frame that timed out, or whose function died, in each attempt at one version would do so again: it gets an error
-//! receipt that says so. Other failures (a busy store, events too old) may pass: the frame is woken once more, a
-//! bounded number of times. Either way the manifest is folded, so that the user sees it. An assembly that timed out or
-//! died in each attempt is refused by name; other failed assemblies are the sweep's.
+//! receipt that says so. Other failures (a busy store, events too old) may be transient: the frame is triggered again,
+//! a limited number of times. In both cases the manifest is folded, so that the user sees the failure. An assembly that
+//! timed out or died in each attempt is refused, and the refusal names the output. The sweep handles other failed
+//! assemblies.
 
 use serde::Deserialize;
 
@@ -25,7 +26,7 @@ use crate::{Clock, Error, Result};
 pub struct Failure {
     /// The key that the event was about.
     pub key: String,
-    /// The version of the object that the event was about, if it says so.
+    /// The version of the object that the event was about, if the event contains it.
     pub version: Option<ETag>,
     /// The number of attempts; 0 if the function was never started.
     pub attempts: u64,
@@ -42,7 +43,7 @@ pub enum End {
     TimedOut,
     /// The process died, most likely for lack of memory.
     Died,
-    /// The event became too old before it was tried.
+    /// The event became too old before an attempt.
     TooOld,
     /// The function answered with an error.
     Error(String),
@@ -51,7 +52,7 @@ pub enum End {
 /// The result of handling a failed event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recorded {
-    /// There is a result, or nothing to render any more.
+    /// There is a result, or there is nothing to render any more.
     Resolved(Folded),
     /// The frame was woken once more.
     Woken {
@@ -62,17 +63,17 @@ pub enum Recorded {
     GivenUp(Folded),
     /// The set of frames is refused now.
     Refused(Folded),
-    /// The sweep will see to it: of an assembly, and of a frame that was woken often enough.
+    /// The sweep handles it: an assembly, or a frame that was triggered often enough.
     LeftToSweep,
 }
 
-/// The failed events of an on-failure destination record (JSON, as Lambda writes it).
+/// Returns the failed events of an on-failure destination record (JSON, as Lambda writes it).
 ///
-/// Records of events that are no object events, such as the schedule's, have none.
+/// Records of other events, such as those of the schedule, contain none.
 ///
 /// # Errors
 ///
-/// [`Error::Malformed`] when it is not such a record.
+/// [`Error::Malformed`] if it is no such record.
 pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
     let record: Record = serde_json::from_slice(record).map_err(|source| Error::Malformed {
         key: "the on-failure record".to_owned(),
@@ -201,7 +202,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// The number of a frame's last waking, and to how many wakings an invocation has begun.
+    /// The number of a frame's last trigger, and the number of triggers for which an invocation has begun.
     async fn attempts(
         &self,
         animation: &Animation,
@@ -309,7 +310,7 @@ struct EventObject {
 }
 
 impl Record {
-    /// Lambda says how an attempt ended only in the words of its error.
+    /// Lambda reports how an attempt ended only in the text of its error.
     fn end(&self) -> End {
         if self.request_context.condition == "EventAgeExceeded" {
             return End::TooOld;

@@ -66,7 +66,7 @@ fn without_files(text: &str) -> &str {
     text.strip_prefix(WITH).and_then(|rest| rest.split_once(' ')).map_or(text, |(_, rest)| rest)
 }
 
-/// Returns the names of files in a script, each of which must be there for its drawing.
+/// Returns the names of files in a script, each of which must exist for its drawing.
 pub fn named(script: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(script);
     let text = text.strip_prefix(BIG).unwrap_or(&text);
@@ -79,8 +79,8 @@ pub fn referred(file: &[u8]) -> Option<String> {
     String::from_utf8_lossy(file).strip_prefix(ALSO).map(str::to_owned)
 }
 
-/// Returns the text that a drawing shows: the script with the files that it is drawn from, or the name of a file that
-/// has not come.
+/// Returns the text that a drawing shows: the script with the files from which it is drawn, or the name of a file that
+/// is absent.
 ///
 /// # Errors
 ///
@@ -109,7 +109,7 @@ pub fn drawn_text(script: &[u8], file: impl Fn(&str) -> Option<Vec<u8>>) -> Resu
 /// The first word of a script whose frames are too big for one invocation.
 pub const BIG: &str = "big ";
 
-/// Whether a script's frames are to be drawn in bands.
+/// Returns whether a script's frames are drawn in bands.
 pub fn is_big(script: &[u8]) -> bool {
     script.starts_with(BIG.as_bytes())
 }
@@ -119,8 +119,8 @@ fn strip(name: &ScriptName, script: &[u8], part: Part, band: Band) -> String {
     format!("{band} of {}", picture(name, script, part))
 }
 
-/// Bands being laid one below the other. The result is the picture if they are all of its bands;
-/// otherwise it is torn.
+/// Bands that are joined from top to bottom. The result is the picture if they are all of its bands; otherwise it is
+/// incomplete.
 pub struct Paste {
     picture: String,
     strips: Vec<String>,
@@ -150,7 +150,7 @@ impl BandJoiner for Paste {
     }
 }
 
-/// A body that a stranger puts in the place of a frame.
+/// A body that another writer puts in the place of a frame.
 pub const GARBLED: &str = "garbled";
 
 /// The picture of a frame.
@@ -165,7 +165,7 @@ pub fn film(settings: &AnimationSettings, output: Container, pictures: &[String]
     film.replacen(LENGTH, &length(film.len()), 1)
 }
 
-/// Stands for the length of a file that begins with it, until it is known.
+/// A placeholder for the length of a file that begins with it, until the length is known.
 const LENGTH: &str = "of ........ bytes";
 
 fn length(bytes: usize) -> String {
@@ -187,7 +187,7 @@ fn lines(pictures: &[String]) -> String {
 
 /// A renderer that draws at once.
 pub struct InstantRenderer {
-    /// The number of bands of a frame that is too big: with one it is drawn whole.
+    /// The number of bands of a frame that is too big; with one band it is drawn whole.
     pub bands: NonZeroU64,
 }
 
@@ -283,7 +283,7 @@ impl Listed {
         text.into()
     }
 
-    /// Takes the last bytes, and the length of the whole if the file begins with it.
+    /// Takes the last bytes, and the length of the whole file if the file begins with it.
     pub fn finish(&mut self) -> (Bytes, Option<Patch>) {
         let rest = self.take();
         let bytes = length(self.taken).into();
@@ -292,14 +292,14 @@ impl Listed {
 
     /// # Errors
     ///
-    /// Never fails, in fact.
+    /// Cannot fail.
     pub fn suspend(&self) -> Result<Bytes, Reason> {
         serde_json::to_vec(self).map(Bytes::from).map_err(|error| Reason::new(error.to_string()))
     }
 
     /// # Errors
     ///
-    /// When it is none.
+    /// Fails if it is none.
     pub fn resume(state: &[u8]) -> Result<Self, Reason> {
         serde_json::from_slice(state).map_err(|error| Reason::new(error.to_string()))
     }

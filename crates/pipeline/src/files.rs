@@ -1,16 +1,17 @@
 //! The files that scripts name, as the protocol sees them.
 //!
-//! A script that names files is drawn from itself and from those files. Its *version* is therefore its entity tag with the
-//! hash of a *set* of files behind it: each file with the content that it has, or that it is absent. The receipts
-//! `files-…` of a version spell the set out, so that a listing alone shows which version of a script is current: the one
-//! whose set agrees with the files in the listing. If none agrees, the version is the entity tag alone, and no result
-//! belongs to it: the frame is pending.
+//! A script that names files is drawn from itself and from those files. Its *version* is therefore its entity tag,
+//! followed by the hash of a *set* of files: each file with a hash of its content, or that the file is absent. The
+//! receipts `files-…` of a version contain the set, so a listing alone shows the current version of a script: the one
+//! whose set agrees with the files in the listing. If none agrees, the version is the entity tag alone. It has no
+//! result, so the frame is pending.
 //!
-//! The set is complete: what a model refers to in turn follows from the model's content, and so from its entity tag. It has
-//! nothing else, so that all processes give the same files the same version, whatever they have read before.
+//! The set is complete: the files to which a model refers follow from the model's content, and so from its entity tag.
+//! The set contains no other files. So all processes give the same files the same version, whatever they have read
+//! before.
 //!
-//! Invariant: a set is put before any result of its version, and the files are looked at once more after it was put. A
-//! file that changes before that look is seen by it. The event of one that changes later finds the set, and wakes the
+//! Invariant: a set is put before any result of its version, and the files are checked once more after the set was put.
+//! The check detects a file that changed before it. If a file changes later, its event finds the set and triggers the
 //! script.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,13 +27,13 @@ use crate::render::{File, Files, Renderer};
 use crate::store::{ETag, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// The files that a receipt names: with more its key would be too long for some stores.
+/// The maximum number of files that a receipt names. With more, its key would be too long for some stores.
 const PER_RECEIPT: usize = 4;
 
-/// The most times that files are read because they have changed meanwhile.
+/// The maximum number of times that files are read again because they changed meanwhile.
 const MAX_READS: u32 = 8;
 
-/// Returns the set that a drawing has read, in the order in which its version hashes it.
+/// Returns the set of files that a drawing has read, in the order of the hash in its version.
 fn set_of(files: &BTreeMap<String, Option<File>>) -> Vec<Entry> {
     let entry = |(name, file): (&String, &Option<File>)| {
         (NameHash::of(name), file.as_ref().map(|file| VersionHash::of(&file.version)))
@@ -42,7 +43,7 @@ fn set_of(files: &BTreeMap<String, Option<File>>) -> Vec<Entry> {
     set
 }
 
-/// A set as the receipts of a listing show it.
+/// A set as the receipts of a listing contain it.
 #[derive(Default)]
 struct SetSeen<'a> {
     numbers: BTreeSet<NonZeroU64>,
@@ -58,7 +59,7 @@ impl SetSeen<'_> {
     }
 }
 
-/// The sets of files of all scripts' versions that the receipts of a listing show.
+/// The sets of files of all versions of scripts, from the receipts of a listing.
 pub(crate) struct FileSets<'a>(BTreeMap<(&'a ScriptName, &'a str), BTreeMap<&'a ETag, SetSeen<'a>>>);
 
 impl<'a> FileSets<'a> {
@@ -81,7 +82,7 @@ impl<'a> FileSets<'a> {
         self.0.is_empty()
     }
 
-    /// Whether any set has this file.
+    /// Returns whether any set has this file.
     fn names(&self, file: &NameHash) -> bool {
         self.0.values().flat_map(BTreeMap::values).any(|set| set.entries.iter().any(|(name, _)| name == file))
     }
@@ -92,8 +93,8 @@ impl<'a> FileSets<'a> {
         set.into_iter().flat_map(|set| set.entries.iter().map(|(name, _)| name)).collect()
     }
 
-    /// Returns the version of a script whose set agrees with the files of a folder. If two renderers have read a
-    /// model differently, it is the newer one's.
+    /// Returns the version of a script whose set agrees with the files of a folder. If two renderers have read a model
+    /// differently, the version of the newer one is returned.
     pub(crate) fn current(
         &self,
         name: &ScriptName,
@@ -112,8 +113,8 @@ impl<'a> FileSets<'a> {
         current.map(|(version, _)| *version)
     }
 
-    /// Returns the version that a script will most likely have, if one of its sets has this file: that of the files that
-    /// its newest set names, with their contents as they are now.
+    /// Returns the version that a script will most likely have, if one of its sets has this file. It is made of the
+    /// files that the script's newest set names, with their current contents.
     fn expected(
         &self,
         name: &ScriptName,
@@ -131,8 +132,8 @@ impl<'a> FileSets<'a> {
     }
 }
 
-/// Whether a version of a script is drawn, or invocations are at it. Those that began before a file was `changed` may have
-/// ended for another version, and drawn nothing of this one; without a time the file is absent now.
+/// Returns whether a version of a script is drawn, or invocations are drawing it. Invocations that began before a file
+/// was `changed` do not count, because they may have ended for another version. Without a time the file is absent now.
 fn is_drawn(
     receipts: &[ReceiptFound],
     name: &ScriptName,
@@ -183,8 +184,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(agreed.map_or(script, |(version, _)| version))
     }
 
-    /// Returns the version whose set of files agrees with the folder, if one does, and since when it may have done so.
-    /// Without sets nothing is listed.
+    /// Returns the version whose set of files agrees with the folder, if there is one, and the earliest time since when
+    /// it may have agreed. Without sets nothing is listed.
     pub(crate) async fn agreed_version(
         &self,
         animation: &Animation,
@@ -206,11 +207,12 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Some((version.clone(), since.unwrap_or_default())))
     }
 
-    /// Reads the files that a script's drawing needs, and gives it the version that it has with them. If `agreed`
-    /// is a version whose set is there already, and the files are of it, nothing is written. If they are not and the
-    /// event is about that version alone (`is_only`), nothing is written either: nothing is to be drawn.
+    /// Reads the files that a script's drawing needs, and determines the script's version with them. If `agreed` is an
+    /// existing version and the files are those of it, nothing is written. If they are not, and the event is about that
+    /// version alone (`is_only`), nothing is written either, because nothing is to be drawn.
     ///
-    /// Files that were kept decide nothing but that they are of the agreed version: otherwise all are read anew.
+    /// Kept files may only show that the files are those of the agreed version. If they are not, all files are read
+    /// again.
     ///
     /// # Errors
     ///
@@ -247,7 +249,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key: animation.script(name) })
     }
 
-    /// Reads the files that a script's drawing needs, and says whether any was kept from an earlier drawing.
+    /// Reads the files that a script's drawing needs. Returns also whether any of them was kept from an earlier
+    /// drawing.
     async fn read_once<R: Renderer>(
         &self,
         renderer: &R,
@@ -289,7 +292,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(file)
     }
 
-    /// Says that this version is being drawn. Its event wakes no other invocation any more.
+    /// Records that this version is being drawn, so that a file's event triggers no other invocation for it.
     pub(crate) async fn take_version(
         &self,
         animation: &Animation,
@@ -336,7 +339,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(true)
     }
 
-    /// Wakes the scripts whose files have changed with this one. Returns whether a script names it at all.
+    /// Triggers the scripts whose files have changed with this one. Returns whether any script names it.
     pub(crate) async fn wake_for_file(&self, animation: &Animation, file: &str) -> Result<bool> {
         let file = NameHash::of(file);
         let receipts = self.list_results(animation).await?;
@@ -360,7 +363,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(true)
     }
 
-    /// Wakes a script, unless it was woken for this version since the file was `changed`.
+    /// Triggers a script, unless it was triggered for this version since the file was `changed`.
     async fn wake_script(
         &self,
         animation: &Animation,

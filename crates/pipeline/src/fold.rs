@@ -1,32 +1,33 @@
 //! The fold: an invocation that has put a result commits manifests until one shows that result, and puts the claim
 //! for the revision that it has committed.
 //!
-//! 1. Read the manifest, of a large one the beginning; leave if it covers the fact and another invocation wrote it.
-//! 2. An invocation that has put a result selects at random a frame that the manifest shows as pending. It leaves if that
-//!    frame is still to come: its script has that version, and there is no result (`survey`). The invocation that draws
-//!    that frame folds later (below).
-//! 3. Pause a few times as long as it takes to read the manifest, and read it again, until no one has written it during a
-//!    pause: with many finishers at once one listing serves all.
-//! 4. List, reconcile, and if the manifest differs, put it on the condition that it is still the one that was read.
-//! 5. Leave as in 2, or **list again**, and commit again until a listing agrees with what was committed: the first listing
-//!    may be older than a quick change and change back.
-//!    If there is neither a manifest nor an upload, nothing is put: an animation that was removed stays removed.
+//! 1. Read the manifest, or the beginning of a large one. Stop if it covers the fact and another invocation wrote it.
+//! 2. An invocation that has put a result selects at random a frame that the manifest shows as pending. It stops if
+//!    that frame is still to come: its script has that version, and there is no result (`survey`). The invocation that
+//!    draws that frame folds later (below).
+//! 3. Pause for a few times as long as a read of the manifest takes, and read it again. Repeat this until no invocation
+//!    has written it during a pause. So with many finishers at once, one listing serves all.
+//! 4. List and reconcile. If the manifest differs, put it on the condition that the manifest is still the one that was
+//!    read.
+//! 5. Stop as in 2, or **list again**, and commit again until a listing agrees with the commit, because the first
+//!    listing may be older than a quick change and change back. If there is neither a manifest nor an upload, nothing
+//!    is put, so a removed animation stays removed.
 //! 6. If no frame is to come, put the claim of that revision. Its name is new, because only the writer of a revision
 //!    claims it.
 //!
-//! The result of an invocation that leaves for a frame to come is covered. When that frame's result comes, or its
-//! script changes, the manifest of that time does not show this. So the invocation of that event lists, and sees both
-//! results, or it leaves for a frame that is still to come after it. The last invocation finds no such frame and lists.
-//! Most frames that a fresh manifest shows as pending are still to come, so few invocations list; the older the
-//! manifest, the more do.
+//! If an invocation stops for a frame to come, its own result is not lost. When that frame's result comes, or its
+//! script changes, the manifest does not show that yet. So the invocation of that event lists and sees both results, or
+//! it stops for a frame that comes even later. The last invocation finds no such frame and lists. Most frames that a
+//! fresh manifest shows as pending are still to come, so few invocations list. The older the manifest, the more
+//! invocations list.
 //!
-//! A manifest covers a fact if it shows it, or if it is at least the second revision after one that was read when the
-//! fact held already: each revision is put on the condition that its predecessor is still there, and its listing starts
-//! after the predecessor was read. So the listing of the second one started after the first was put, hence after the
-//! fact; it has seen the fact, or what came later.
+//! A manifest covers a fact if it shows the fact. It also does if it is at least the second revision after a revision
+//! that was read when the fact already held. Each revision is put on the condition that its predecessor is still
+//! current, and its listing starts after the predecessor was read. So the listing of the second revision started after
+//! the first was put, hence after the fact.
 //!
-//! Invariant: an invocation that finds its own commit, as after a crash or a lost answer, has still to put the claim,
-//! and leaves only for a frame to come.
+//! Invariant: an invocation that finds its own commit, as after a crash or a lost reply, must still put the claim. It
+//! stops only for a frame to come.
 
 use std::time::Duration;
 
@@ -43,11 +44,11 @@ use crate::{Clock, Error, Result, invariants};
 /// The outcome of a fold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Folded {
-    /// No result has come that a manifest shows: the manifest was not read.
+    /// There is no result that a manifest shows, so the manifest was not read.
     Untouched,
-    /// The manifest, by another writer, showed the fact: nothing was listed.
+    /// The manifest, by another writer, showed the fact. Nothing was listed.
     Covered,
-    /// Another frame is to come, and the invocation that draws it folds: nothing was listed.
+    /// Another frame is to come, and the invocation that draws it folds. Nothing was listed.
     Awaited,
     /// The manifest agreed with the listing.
     Agreed,
@@ -63,14 +64,14 @@ const MAX_COMMITS: u32 = 16;
 /// The age of a fact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Age {
-    /// This invocation has just put the object that makes it hold: hardly any other can have listed that.
+    /// The invocation has just put the object that makes the fact true, so hardly any other listing can contain it.
     New,
-    /// It may have held for a while.
+    /// The fact may have held for a while.
     Old,
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Makes sure that the manifest shows `fact`. The later steps of an invocation depend on nothing from before it.
+    /// Ensures that the manifest shows `fact`. The later steps of an invocation depend on nothing from before it.
     pub(crate) async fn fold(&self, animation: &Animation, fact: &Fact, age: Age) -> Result<Folded> {
         self.forget_history_before(&(animation, fact, age));
         let start = self.clock.now();
@@ -78,7 +79,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.fold_from(animation, fact, age, (glimpse, self.clock.now().since(start))).await
     }
 
-    /// Folds as [`fold`](Self::fold) does, from a read of the manifest that was made when the fact held already, with
+    /// Folds as [`fold`](Self::fold) does, given a read of the manifest that was made when the fact already held, and
     /// the duration of that read.
     pub(crate) async fn fold_from(
         &self,
@@ -132,8 +133,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Returns whether the manifest is to be written in any case: to show a fact that is no frame's result, or because
-    /// it has not shown the progress for long. That time grows with the cost of a listing.
+    /// Returns whether the manifest must be written in any case: to show a fact that is no frame's result, or because
+    /// it has not shown progress for long. That time grows with the cost of a listing.
     pub(crate) fn is_due(&self, glimpse: &ManifestPrefix, fact: &Fact) -> bool {
         let Some(head) = glimpse.head() else { return true };
         let pages = u32::try_from(head.total / PAGE as u64).unwrap_or(u32::MAX).saturating_add(1);
@@ -143,14 +144,14 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
             || age >= self.policy.fresh.saturating_mul(pages)
     }
 
-    /// Returns whether the writer of the manifest will put its claim. This invocation and earlier attempts at its event
-    /// have not, or it would not be here.
+    /// Returns whether the writer of the manifest will put its claim. Neither this invocation nor an earlier attempt at
+    /// its event has put it.
     fn may_leave(&self, glimpse: &ManifestPrefix) -> bool {
         glimpse.head().is_some_and(|head| !self.is_own(head) || self.breaks(Mutation::LeaveOwnCommit))
     }
 
-    /// Returns whether another invocation's manifest shows the fact, or follows late enough on the revision that was
-    /// read when the fact held.
+    /// Returns whether another invocation's manifest shows the fact, or is late enough after the revision that was read
+    /// when the fact held.
     async fn is_covered(
         &self,
         animation: &Animation,
@@ -173,8 +174,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 
     /// Lists and commits until a listing agrees, or until a frame is to come whose invocation will list. Returns `None`
-    /// when another invocation's commit came first, or when frames come as fast as they are committed and it is the
-    /// turn of others. `listed` is a listing that was made after the manifest was read.
+    /// if another invocation's commit came first, or if frames come as fast as they are committed, so that others take
+    /// their turn. `listed` is a listing that was made after the manifest was read.
     async fn commit_until_agreed(
         &self,
         animation: &Animation,
@@ -230,7 +231,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Folded::Claimed)
     }
 
-    /// Puts the next revision. Returns `None` when the manifest is no longer, or perhaps not, the one that was known.
+    /// Puts the next revision. Returns `None` if the manifest is no longer, or possibly no longer, the one that was
+    /// read.
     pub(crate) async fn commit(
         &self,
         animation: &Animation,
@@ -256,8 +258,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_manifest(next, options).await
     }
 
-    /// Records files of this generation in the manifest; `None` as for a commit. This is no new revision: everything
-    /// else in the manifest was listed before it.
+    /// Records files of this generation in the manifest. Returns `None` in the same cases as a commit. This is no new
+    /// revision, because everything else in the manifest was listed before.
     pub(crate) async fn record_files(
         &self,
         known: &Known,
@@ -283,7 +285,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Puts a claim, which wakes the assembler.
+    /// Puts a claim, which invokes the assembler.
     pub(crate) async fn claim(&self, manifest: &Manifest) -> Result<()> {
         let head = &manifest.head;
         let key = Key::Claim {
@@ -296,11 +298,11 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// Folds in any case, for a command that has changed results without the functions.
+/// Folds in any case, for a command that has changed results itself.
 ///
 /// # Errors
 ///
-/// The errors of the store, and [`Error::Malformed`] when an object of the pipeline cannot be read.
+/// The errors of the store, and [`Error::Malformed`] if an object of the pipeline cannot be read.
 pub async fn fold<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     animation: &Animation,

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::manifest::{Fault, FrameState, Manifest, SCHEMA, Status};
 use crate::{Error, Result};
 
-/// A rule's name, and whether a manifest keeps it over its predecessor.
+/// The name of a rule, and a function that returns whether a manifest satisfies it, given its predecessor.
 type Rule = (&'static str, fn(&Manifest, Option<&Manifest>) -> bool);
 
 const RULES: &[Rule] = &[
@@ -22,7 +22,7 @@ const RULES: &[Rule] = &[
     ("the schema is the current one", schema_is_current),
 ];
 
-/// Checks every rule of a manifest that is about to replace `before`.
+/// Checks all rules for a manifest that is about to replace `before`.
 ///
 /// # Errors
 ///
@@ -68,7 +68,7 @@ fn frames_are_unique(next: &Manifest, _: Option<&Manifest>) -> bool {
     next.frames.iter().all(|frame| seen.insert((&frame.script, frame.part)))
 }
 
-/// Each script has one frame without a number, or frames numbered from 1 without a gap.
+/// Each script has one frame without a number, or frames that are numbered from 1 without a gap.
 fn parts_are_whole(next: &Manifest, _: Option<&Manifest>) -> bool {
     next.frames.iter().enumerate().all(|(place, frame)| {
         let before = place.checked_sub(1).map(|place| &next.frames[place]);

@@ -1,8 +1,8 @@
-//! The environment of a step: the store, the clock, chance, its own name, and its patience.
+//! The environment of a step: the store, the clock, randomness, its request id, and its policy.
 //!
-//! Requests go through here, so that a busy store and a lost answer are handled in one way: a request that may be
-//! repeated without harm is repeated a few times, with growing random pauses. Conditional writes of the manifest and
-//! the GIF are not repeated; after a lost answer to one, the steps read what is there.
+//! All requests go through this module, so a busy store and a lost reply are handled in one place. A request that can
+//! be repeated without harm is repeated a few times, with growing random pauses. Conditional writes of the manifest and
+//! the GIF are not repeated: after a lost reply, the steps read the object.
 
 use std::future::Future;
 use std::time::Duration;
@@ -15,44 +15,43 @@ use crate::reconcile::{Results, Scripts, reconcile};
 use crate::store::{ETag, ListPage, ListRequest, Object, ObjectInfo, PutOptions, Store};
 use crate::{Clock, Error, Randomness, Result, Timestamp, found};
 
-/// The numbers of the protocol. Each default has its reason; tests and the local invoker shorten some.
+/// The constants of the protocol. Each default has its reason; tests and the local invoker shorten some.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Policy {
-    /// The renderer's pixel version, for the tags of frames that are drawn and woken.
+    /// The renderer's pixel version, for the tags of frames that are drawn and triggered.
     pub pixels: u32,
-    /// The age that the newest script must have before a GIF is made, when `animation.json` does not say how many
-    /// frames to wait for. 5 s: longer than the gaps of an upload, short enough to wait for.
+    /// The age that the newest script must have before a GIF is made, if `animation.json` does not say how many frames
+    /// to wait for. 5 s: longer than the gaps of an upload, and short enough to wait for.
     pub quiet: Duration,
-    /// The longest pause before a listing, as a multiple of the time that a read of the manifest takes: with many
-    /// finishers at once one listing serves them all, and where requests are fast it is made soon.
+    /// The longest pause before a listing, as a multiple of the time that a read of the manifest takes. With many
+    /// finishers at once, one listing then serves them all, and where requests are fast the listing comes soon.
     pub pause_looks: u32,
-    /// The longest pause whatever a look takes; with it the last finisher still claims within a second.
+    /// The longest pause, however long a read takes. With it the last finisher still claims within a second.
     pub pause_cap: Duration,
-    /// The age that a manifest of one page of frames may have before it is written again though
-    /// only people need that.
+    /// The age of a manifest with one page of frames at which it is written again only to show people the progress.
     pub fresh: Duration,
-    /// The number of bytes of a manifest that are read to see whether it covers a result. 32 KiB: all of it up
-    /// to some 300 frames.
+    /// The number of bytes of a manifest that are read to see whether it covers a result. 32 KiB hold all of it up to
+    /// some 300 frames.
     pub glimpse: u64,
-    /// The most frames that an animation may have; with `None` any number. An animation with more is failed, and no
-    /// more of them are drawn. This bounds the cost that a user who may upload can cause for others.
+    /// The maximum number of frames of an animation; `None` means any number. An animation with more frames is failed,
+    /// and no more of them are drawn. This bounds the cost that a user who may upload can cause for others.
     pub most_frames: Option<u64>,
-    /// The time without any progress after which the sweep wakes pending frames; it doubles with each attempt. 15
+    /// The time without any progress after which the sweep triggers pending frames; it doubles with each attempt. 15
     /// min: as long as an invocation may run.
     pub stuck_after: Duration,
-    /// After how many wakings a pending frame is given up.
+    /// The number of triggers after which a pending frame is given up.
     pub attempts: u64,
-    /// Whether the functions themselves have just been restarted: pending frames are woken at once, an attempt that was
-    /// cut off with them does not count, and an earlier lease has no holder.
+    /// Whether the functions have just been restarted. Then pending frames are triggered at once, interrupted attempts
+    /// do not count, and an earlier lease has no holder.
     pub is_fresh_start: bool,
     /// The age of a superseded frame at which the sweep deletes it. A week: a script that is changed back
     /// finds its old frame.
     pub superseded_after: Duration,
-    /// The number of times that a harmless request is sent before its failure is the step's.
+    /// The number of times that a harmless request is sent before the step fails.
     pub request_attempts: u32,
     /// The first pause before a request is repeated; doubles each time.
     pub request_pause: Duration,
-    /// The number of requests of one kind that run side by side.
+    /// The number of concurrent requests of one kind.
     pub concurrency: usize,
     /// The number of frames that are fetched ahead of the encoder.
     pub prefetch: usize,
@@ -61,12 +60,12 @@ pub struct Policy {
     /// The time before the margin that the assembler keeps free for one more frame and for writing a checkpoint, as a
     /// multiple of the longest time that a frame has taken. A checkpoint takes about as long as 5 to 10 frames.
     pub spare_frames: u32,
-    /// The time before its deadline at which a drawing is stopped: enough to report it.
+    /// The time before its deadline at which a drawing is stopped: enough to report the failure.
     pub draw_margin: Duration,
 }
 
 impl Policy {
-    /// The usual numbers, for a renderer of this pixel version.
+    /// Returns the default constants, for a renderer of this pixel version.
     pub fn new(pixels: u32) -> Self {
         Policy {
             pixels,
@@ -106,8 +105,8 @@ pub struct Invocation<'a, S, C> {
     replay_state: Option<&'a ReplayState>,
 }
 
-/// The latest statement of an invocation about the values that the rest of its steps depends on. The search of
-/// small worlds reads it.
+/// The latest declaration of an invocation about the values on which its remaining steps depend. The search of small
+/// worlds reads it.
 #[cfg(any(test, feature = "simulation"))]
 #[derive(Debug, Default)]
 pub struct ReplayState(std::sync::Mutex<Option<String>>);
@@ -120,32 +119,32 @@ impl ReplayState {
     }
 }
 
-/// A rule of the protocol that the simulation breaks on purpose, to see its predicates catch it.
+/// A rule of the protocol that the simulation breaks on purpose, to check that its predicates detect it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mutation {
     /// The fold does not list again after its commit.
     SkipSecondListing,
-    /// The claim is put before the commit that it claims for.
+    /// The claim is put before the commit to which it belongs.
     ClaimBeforeCommit,
     /// The manifest is put without its condition.
     DropIfMatch,
-    /// An invocation leaves when the manifest is covered by its own unfinished commit.
+    /// An invocation stops when the manifest is covered by its own unfinished commit.
     LeaveOwnCommit,
-    /// Each invocation that finds the set complete leaves the claim to another one, also the revision's writer.
+    /// Each invocation that finds the set complete leaves the claim to another one, even the writer of the revision.
     NeverClaim,
-    /// The assembler leaves as soon as a frame is pending, though it has just written.
+    /// The assembler ends as soon as a frame is pending, although it has just written.
     AssemblerLeavesEarly,
-    /// The assembler does not look again after it has put the GIF, nor after it has given back the lease.
+    /// The assembler does not check again after it has put the GIF, nor after it has released the lease.
     AssemblerDoesNotLookAgain,
     /// The GIF is put without its condition.
     DropGifCondition,
-    /// A frame is put together though one of its bands is missing.
+    /// A frame is joined although one of its bands is missing.
     JoinTooEarly,
-    /// An unfinished GIF is gone on with, whatever set it is of.
+    /// An unfinished GIF is continued, whatever set it belongs to.
     TakeUpAnyCheckpoint,
-    /// A finisher leaves for any frame that the manifest shows to come, without a look whether it still is.
+    /// A finisher stops for any frame that the manifest shows as pending, without a check whether it is still to come.
     LeaveForAnyFrame,
-    /// The files that a script names are not looked at again after their versions were put.
+    /// The files that a script names are not checked again after their versions were put.
     FilesNotLookedAtAgain,
 }
 
@@ -170,12 +169,12 @@ impl Mutation {
 /// A manifest as it was read or written.
 #[derive(Debug, Clone)]
 pub(crate) struct Known {
-    /// A blank one if the manifest cannot be read, which agrees with none.
+    /// The manifest; an empty one if it cannot be read, which agrees with no listing.
     pub(crate) manifest: Manifest,
     pub(crate) etag: ETag,
-    /// When it was written.
+    /// The time when it was written.
     pub(crate) modified: Timestamp,
-    /// The document, if it cannot be read: it is set aside when a new one is written.
+    /// The document if it cannot be read. It is set aside when a new one is written.
     pub(crate) unreadable: Option<Bytes>,
 }
 
@@ -207,7 +206,7 @@ pub(crate) enum ManifestPrefix {
     Unreadable(Known),
     /// The request has read the whole manifest.
     Whole(Known),
-    /// Its beginning; it is larger.
+    /// Its beginning; the manifest is larger.
     Start { beginning: Beginning, info: ObjectInfo },
 }
 
@@ -230,7 +229,7 @@ impl ManifestPrefix {
         }
     }
 
-    /// The manifest's frames, or some of those to come.
+    /// The manifest's frames, or some of the pending ones.
     pub(crate) fn frames(&self) -> &[Frame] {
         match self {
             ManifestPrefix::Nothing | ManifestPrefix::Unreadable(_) => &[],
@@ -248,15 +247,15 @@ impl ManifestPrefix {
         }
     }
 
-    /// 0 when there is none that can be read.
+    /// 0 if there is none that can be read.
     pub(crate) fn revision(&self) -> u64 {
         self.head().map_or(0, |head| head.revision)
     }
 }
 
 impl<'a, S, C> Invocation<'a, S, C> {
-    /// `request_id` names the event that is worked on; the platform's retries of an event share it. `random` spreads
-    /// invocations that would collide.
+    /// `request_id` identifies the event; the platform's retries of an event share it. `random` spreads invocations
+    /// that would collide.
     pub fn new(
         store: &'a S,
         clock: &'a C,
@@ -294,14 +293,14 @@ impl<'a, S, C> Invocation<'a, S, C> {
         Invocation { mutation, ..self }
     }
 
-    /// Makes the invocation leave its replay state there.
+    /// Makes the invocation store its replay state there.
     #[cfg(any(test, feature = "simulation"))]
     pub fn leaving(self, replay_state: &'a ReplayState) -> Self {
         Invocation { replay_state: Some(replay_state), ..self }
     }
 
-    /// Says that all that this invocation will do from here on depends on these alone, besides its event and the answers to
-    /// come. The search of small worlds forgets everything else that has happened to it.
+    /// Declares that the remaining steps of this invocation depend only on these values, besides its event and the
+    /// replies to come. The search of small worlds drops the invocation's earlier history.
     #[cfg(any(test, feature = "simulation"))]
     pub(crate) fn forget_history_before(&self, what: &dyn std::fmt::Debug) {
         if let Some(ReplayState(replay_state)) = self.replay_state {
@@ -314,7 +313,7 @@ impl<'a, S, C> Invocation<'a, S, C> {
     #[expect(clippy::unused_self, reason = "without the search nobody asks")]
     pub(crate) fn forget_history_before(&self, _: &dyn std::fmt::Debug) {}
 
-    /// Whether this rule is to be broken.
+    /// Returns whether this rule is to be broken.
     #[cfg(any(test, feature = "simulation"))]
     pub(crate) fn breaks(&self, rule: Mutation) -> bool {
         self.mutation == Some(rule)
@@ -328,23 +327,24 @@ impl<'a, S, C> Invocation<'a, S, C> {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Reads an object, or `None` when there is none.
+    /// Reads an object. Returns `None` if there is none.
     pub(crate) async fn get(&self, key: &str) -> Result<Option<Object>> {
         found(self.persist(|| self.store.get(key)).await)
     }
 
-    /// Reads an object's first bytes, at least one more than `most` if there are more, or `None` when there is none.
+    /// Reads an object's first bytes, at least one more than `most` if there are more. Returns `None` if there is no
+    /// object.
     pub(crate) async fn get_start(&self, key: &str, most: u64) -> Result<Option<Object>> {
         let range = 0..most.saturating_add(1);
         found(self.persist(|| self.store.get_range(key, range.clone())).await)
     }
 
-    /// Reads all but the body, or `None` when there is no such object.
+    /// Reads the object's data except its body. Returns `None` if there is no such object.
     pub(crate) async fn head(&self, key: &str) -> Result<Option<ObjectInfo>> {
         found(self.persist(|| self.store.head(key)).await)
     }
 
-    /// Puts an object that may be put twice.
+    /// Puts an object, which may be put twice without harm.
     pub(crate) async fn put(&self, key: &str, body: Bytes) -> Result<ETag> {
         let options = || PutOptions::always().content_type("application/json");
         self.persist(|| self.store.put(key, body.clone(), options())).await
@@ -356,7 +356,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.persist(|| self.store.put(key, body.clone(), options())).await.map(drop)
     }
 
-    /// Puts a receipt; `None` when there is one already.
+    /// Puts a receipt. Returns `None` if it exists already.
     pub(crate) async fn put_receipt(
         &self,
         key: &str,
@@ -384,7 +384,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(self.get(&animation.manifest()).await?.map(|object| Known::of(animation, object)))
     }
 
-    /// Reads the manifest's beginning, or all of it when it is small.
+    /// Reads the manifest's beginning, or all of it if it is small.
     pub(crate) async fn read_prefix(&self, animation: &Animation) -> Result<ManifestPrefix> {
         let key = animation.manifest();
         let read = self.persist(|| self.store.get_range(&key, 0..self.policy.glimpse)).await;
@@ -398,8 +398,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         }
     }
 
-    /// Returns whether the manifest shows the fact. Of a large manifest the lines that would show it are read; if it
-    /// has been replaced since, it does not.
+    /// Returns whether the manifest shows the fact. If the manifest is large, the lines about the fact are read. If it
+    /// was replaced meanwhile, it does not show the fact.
     pub(crate) async fn shows(
         &self,
         animation: &Animation,
@@ -423,18 +423,18 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(lines.info.etag == info.etag && fact.is_shown_by(&beginning.head, &frames))
     }
 
-    /// Whether this invocation, or an earlier attempt at the same event, wrote the manifest.
+    /// Returns whether this invocation, or an earlier attempt at the same event, wrote the manifest.
     pub(crate) fn is_own(&self, head: &Head) -> bool {
         head.writer == self.request_id
     }
 
-    /// Waits a random time that is the longer the longer a look at the manifest takes.
+    /// Waits for a random time, which grows with the time that a read of the manifest takes.
     pub(crate) async fn pause(&self, look: Duration) {
         let most = look.saturating_mul(self.policy.pause_looks).min(self.policy.pause_cap);
         self.clock.sleep(self.random.up_to(most)).await;
     }
 
-    /// Sends a request until it is answered for good, or its attempts are used up.
+    /// Sends a request until it gets a final reply, or its attempts are used up.
     async fn persist<T, F>(&self, request: impl Fn() -> F) -> Result<T>
     where
         F: Future<Output = Result<T>>,

@@ -1,4 +1,4 @@
-//! The layout of the bucket: every key that the pipeline reads or writes is parsed and formatted here, once.
+//! The layout of the bucket. Every key that the pipeline reads or writes is parsed and formatted here, and only here.
 //!
 //! A key that parses is canonical: formatting it gives the same text back. `docs/pipeline.md` has the table.
 //!
@@ -32,7 +32,8 @@ pub use event::decode_event_key;
 pub use files::{Entry, FileList, NameHash, VersionHash};
 pub use names::{Uploaded, goes_with, misplaced};
 
-/// The longest key below `scripts/`, in bytes: S3 allows 1,024, and a receipt's key adds a tag to the script's.
+/// The maximum length of a key below `scripts/` in bytes: S3 allows 1,024, and a receipt's key adds a tag to the
+/// script's.
 pub const LONGEST_SCRIPT_KEY: usize = 900;
 
 /// The folder of the scripts.
@@ -40,11 +41,11 @@ pub const SCRIPTS: &str = "scripts/";
 /// The folder of the manifests.
 pub const MANIFESTS: &str = "manifests/";
 
-/// The name of a lease's file. No receipt ends like this.
+/// The name of a lease's file. No receipt has this ending.
 const LEASE_FILE: &str = "@assembler.json";
 const SWEEP_LEASE_FILE: &str = "@sweep.json";
 
-/// The name of the object that wakes a script whose files have changed.
+/// The name of the object that triggers a script whose files have changed.
 const WAKE_FILE: &str = "files.json";
 
 /// The folder of unfinished GIFs, and the ending of their names.
@@ -70,7 +71,7 @@ pub struct Tag {
     pub pixels: u32,
 }
 
-/// The place of a frame in a script with several, counted from 1; `None` when the script is one frame.
+/// The number of a frame in a script with several, counted from 1; `None` if the script is one frame.
 pub type Part = Option<NonZeroU64>;
 
 /// The identity of a set of frames and settings, for a manifest, a claim and a GIF: 32 hexadecimal digits.
@@ -105,21 +106,22 @@ pub enum Key {
         part: Part,
         /// The rows of the frame.
         band: Band,
-        /// The retry that woke the band; 0 if the invocation that cut the frame did.
+        /// The retry that triggered the band; 0 if the invocation that cut the frame did.
         attempt: u64,
     },
     /// `parts/<animation>/<name>@<tag>/files.json`: a file that the script names has changed.
     Wake {
         animation: Animation,
         name: ScriptName,
-        /// The version that the script is expected to have with its files as they are now.
+        /// The version that the script is expected to have with its files in their current state.
         tag: Tag,
     },
-    /// Below `frames/`: the result of a script, a part, or of the whole.
+    /// An object below `frames/`: the result of a script, of a part, or of the whole set.
     Receipt { animation: Animation, receipt: Receipt },
-    /// `frames/<animation>/@assembler.json`: which invocation waits for the set to settle, or builds its GIF.
+    /// `frames/<animation>/@assembler.json`: the lease of the invocation that waits for the set to settle, or builds
+    /// its GIF.
     Lease { animation: Animation },
-    /// `frames/<animation>/@sweep.json`: the sweep that deletes results which may have to be drawn again.
+    /// `frames/<animation>/@sweep.json`: the lease of the sweep that deletes results which may have to be drawn again.
     SweepLease { animation: Animation },
     /// `manifests/<animation>.json`
     Manifest { animation: Animation },
@@ -127,7 +129,7 @@ pub enum Key {
     /// new one was written.
     SetAside {
         animation: Animation,
-        /// The version that it had in its place.
+        /// The version that the manifest had in its place.
         version: ETag,
     },
     /// `assemblies/<animation>/<revision>-<generation>.json`
@@ -148,7 +150,7 @@ pub enum Key {
         /// The number of the attempt, from 1.
         attempt: NonZeroU64,
     },
-    /// `checkpoints/<animation>.state`: how far a GIF is that is made by several invocations, one after the other.
+    /// `checkpoints/<animation>.state`: the progress of a GIF that several invocations build, one after the other.
     Checkpoint { animation: Animation },
     /// `animations/<animation>.gif`, or another ending: a file that is made of the animation.
     Output { animation: Animation, output: Container },
@@ -174,8 +176,8 @@ pub enum Receipt {
         /// The frame in its script.
         part: Part,
     },
-    /// `<name>@<tag>.begun-<attempt>`, of a part `<name>@<tag>/<number>.begun-<attempt>`: an invocation that a
-    /// retry woke has begun.
+    /// `<name>@<tag>.begun-<attempt>`, of a part `<name>@<tag>/<number>.begun-<attempt>`: an invocation that a retry
+    /// triggered has begun.
     Begun {
         name: ScriptName,
         tag: Tag,
@@ -209,11 +211,11 @@ pub enum Receipt {
         /// The rows of the frame.
         band: Band,
     },
-    /// `<name>@<tag>.files-<i>-of-<n>-<entries>`: the files that this version of the script is drawn from.
+    /// `<name>@<tag>.files-<i>-of-<n>-<entries>`: the files from which this version of the script is drawn.
     Files { name: ScriptName, tag: Tag, list: FileList },
-    /// `<name>@<tag>.taken`: an invocation draws this version, whose files were current after its set was put.
+    /// `<name>@<tag>.taken`: an invocation draws this version. Its files were still current after its set was put.
     Taken { name: ScriptName, tag: Tag },
-    /// `<name>@<tag>.waits.json`: the frame cannot be drawn before files come that the script names.
+    /// `<name>@<tag>.waits.json`: the frame cannot be drawn before files arrive that the script names.
     Waits { name: ScriptName, tag: Tag },
     /// `@<generation>.error.json`: this set of frames gives no GIF; of another file `@<generation>.<ending>.error.json`
     Refusal {
@@ -342,7 +344,7 @@ impl Tag {
 }
 
 impl Generation {
-    /// Takes 32 hexadecimal digits in lower case.
+    /// Parses 32 hexadecimal digits in lower case.
     pub fn new(text: &str) -> Result<Self> {
         let digit = |byte: &u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte);
         if text.len() != 32 || !text.as_bytes().iter().all(digit) {
@@ -351,7 +353,7 @@ impl Generation {
         Ok(Generation(text.to_owned()))
     }
 
-    /// Takes digits that this crate has just made.
+    /// Wraps digits that this crate has just made.
     pub(crate) fn of_hash(digits: String) -> Self {
         Generation(digits)
     }
@@ -466,7 +468,7 @@ impl FromStr for Key {
 }
 
 impl Receipt {
-    /// The script and the version that it is about.
+    /// Returns the script and the version that the receipt is about.
     pub(crate) fn subject(&self) -> Option<(&ScriptName, &ETag)> {
         match self {
             Receipt::Frame { name, tag, .. }
@@ -482,12 +484,12 @@ impl Receipt {
         }
     }
 
-    /// Whether it is about a version of a script with this entity tag, whatever its files.
+    /// Returns whether it is about a version of a script with this entity tag, whatever its files.
     pub(crate) fn is_of_script(&self, script: &ScriptName, etag: &ETag) -> bool {
         self.subject().is_some_and(|(name, version)| name == script && version.script() == etag.as_str())
     }
 
-    /// Whether it is about this version of a script, whatever drew it.
+    /// Returns whether it is about this version of a script, whatever renderer drew it.
     pub fn is_of(&self, script: &ScriptName, version: &ETag) -> bool {
         self.subject() == Some((script, version))
     }
@@ -496,7 +498,7 @@ impl Receipt {
 impl FromStr for Receipt {
     type Err = Error;
 
-    /// Reads the part of a key below `frames/<animation>/`.
+    /// Parses the part of a key below `frames/<animation>/`.
     fn from_str(text: &str) -> Result<Self> {
         let unknown = || Error::key(text, "not a receipt");
         match receipt(&format!("a/{text}")).ok_or_else(unknown)? {
@@ -532,14 +534,14 @@ fn above(rest: &str, file: &str) -> Option<Animation> {
     Animation::new(rest.strip_suffix(file)?.strip_suffix('/')?).ok()
 }
 
-/// `<animation>/<name>@<tag>/<file>`, cut at the slashes.
+/// Splits `<animation>/<name>@<tag>/<file>` at the slashes.
 fn beneath_tag(rest: &str) -> Option<(&str, &str, &str)> {
     let (above, file) = rest.rsplit_once('/')?;
     let (animation, scripted) = above.rsplit_once('/')?;
     Some((animation, scripted, file))
 }
 
-/// `<animation>/<name>@<tag>`, of a part `<animation>/<name>@<tag>/<number>`.
+/// Formats `<animation>/<name>@<tag>`, for a part `<animation>/<name>@<tag>/<number>`.
 fn scripted_part(above: &str) -> Option<(&str, ScriptName, Tag, Part)> {
     let (animation, last) = above.rsplit_once('/')?;
     if let Some((name, tag)) = name_and_tag(last) {
@@ -602,12 +604,12 @@ fn receipt_of_kind(name: ScriptName, tag: Tag, part: Part, kind: &str) -> Option
     })
 }
 
-/// A number whose text is the one way of writing it.
+/// Parses a number that is written in its only canonical form.
 fn canonical<N: FromStr + ToString>(text: &str) -> Option<N> {
     text.parse().ok().filter(|number: &N| number.to_string() == text)
 }
 
-/// Letters, digits, `-` and `_` stay; other bytes of a tag become `~` and two hexadecimal digits.
+/// Encodes a tag: letters, digits, `-` and `_` stay; other bytes become `~` and two hexadecimal digits.
 fn escape(etag: &ETag) -> String {
     let mut text = String::new();
     for &byte in etag.as_str().as_bytes() {

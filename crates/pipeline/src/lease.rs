@@ -1,10 +1,11 @@
-//! At most one assembler per animation waits or builds at a time: an object, the lease, says which one, and until when.
+//! At most one assembler per animation waits or builds at a time. An object, the lease, names it, and the time until
+//! which it holds the lease.
 //!
-//! The holder deletes the lease when there is nothing left to do, and then reads the manifest and the GIF once more: an
-//! invocation that found the lease taken, and left, was woken for a manifest that was written before, and may have
-//! deleted the GIF before. A holder that dies leaves the lease to the platform's next attempt at its event, which has
-//! the same request id. Once the lease has expired, any invocation may take it over. A holder that does not finish its
-//! GIF in its time hands the lease over to the next invocation, and says so in the lease.
+//! The holder deletes the lease when there is nothing left to do, and then reads the manifest and the GIF once more. An
+//! invocation that found the lease taken, and stopped, was invoked for an earlier manifest, and may have deleted the
+//! GIF before. If a holder dies, the platform's next attempt at its event, which has the same request id, takes the
+//! lease. After the lease has expired, any invocation may take it. A holder that does not finish its GIF in its time
+//! hands the lease over to the next invocation, and records that in the lease.
 
 use std::time::Duration;
 
@@ -16,11 +17,11 @@ use crate::keys::{Animation, Key};
 use crate::store::{ETag, PutOptions, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// The number of attempts to take a lease that comes and goes.
+/// The number of attempts to take a lease that is released and taken again meanwhile.
 const ATTEMPTS: u32 = 3;
 
-/// The longest time until a lease can expire: Lambda's 15 minutes, and a few minutes for clocks that disagree. A lease
-/// with more time left was written by a clock that was ahead, and would keep others waiting for as long as that.
+/// The maximum time until a lease can expire: Lambda's 15 minutes, and a few minutes for clocks that disagree. A lease
+/// with more time left was written by a clock that was ahead, and would make others wait that long.
 const LONGEST: Duration = Duration::from_secs(20 * 60);
 
 /// The largest difference between two clocks.
@@ -31,7 +32,7 @@ const SLACK: Duration = Duration::from_secs(2 * 60);
 struct Lease {
     /// The holder's request id.
     assembler: String,
-    /// The time by which the platform has ended the holder.
+    /// The time at which the platform has ended the holder at the latest.
     until: Timestamp,
     /// Whether there is a checkpoint of an unfinished GIF.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -43,9 +44,9 @@ struct Lease {
 pub(crate) enum SweepLease {
     /// The lease is another sweep's.
     Anothers,
-    /// This sweep; there was no lease before.
+    /// This sweep. There was no lease before.
     New,
-    /// This sweep now. A sweep that died, perhaps an earlier attempt at this one, has held the lease since then.
+    /// This sweep, after a dead sweep (perhaps an earlier attempt at this one) that held the lease since this time.
     Left(Timestamp),
 }
 
@@ -65,7 +66,8 @@ enum Taken {
     Anothers,
     /// There was no lease.
     New,
-    /// A dead holder or an earlier attempt at this event left it: its content, and the time since which it was held.
+    /// A dead holder or an earlier attempt at this event left the lease. Holds its content, and the time since which it
+    /// was held.
     Left(Option<Lease>, Timestamp),
 }
 
@@ -87,7 +89,7 @@ fn encode(key: &str, lease: &Lease) -> Result<Bytes> {
     Ok(body.into())
 }
 
-/// Decodes a lease; one that cannot be read has no holder.
+/// Decodes a lease. An unreadable lease counts as one without holder.
 fn holder(body: &[u8]) -> Option<Lease> {
     serde_json::from_slice(body).ok()
 }
@@ -97,7 +99,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ///
     /// # Errors
     ///
-    /// The errors of the store, and [`Error::Conflict`] for a lease that comes and goes.
+    /// The errors of the store, and [`Error::Conflict`] for a lease that is released and taken again and again.
     pub(crate) async fn take_lease(&self, animation: &Animation) -> Result<Option<HeldLease>> {
         let key = Key::Lease { animation: animation.clone() };
         Ok(match self.take(&key, |holder| holder.stands(self.clock.now())).await? {
@@ -131,7 +133,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key })
     }
 
-    /// Takes the lease for the sweep that deletes results. Returns since when a dead sweep has held it, if one has.
+    /// Takes the lease for the sweep that deletes results. If a dead sweep held it, returns the time since when.
     ///
     /// # Errors
     ///
@@ -161,13 +163,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Lease { assembler: self.request_id().to_owned(), until, checkpoint: held.has_checkpoint }
     }
 
-    /// Returns whether this event holds the lease, perhaps by an earlier attempt at it.
+    /// Returns whether this event holds the lease, perhaps through an earlier attempt.
     fn is_held(&self, holder: Option<&Lease>) -> bool {
         holder.is_some_and(|holder| holder.assembler == self.request_id())
     }
 
     /// Returns whether another invocation holds the lease. The holder reads the manifest again after it has released
-    /// the lease, so that an invocation that was woken for an earlier manifest need not.
+    /// the lease, so an invocation that was invoked for an earlier manifest need not.
     pub(crate) async fn is_held_by_another(&self, animation: &Animation) -> Result<bool> {
         let there = self.get(&Key::Lease { animation: animation.clone() }.to_string()).await?;
         let holder = there.and_then(|there| holder(&there.body));
@@ -179,8 +181,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.free_lease(animation, |holder| holder.assembler == request_id).await
     }
 
-    /// Releases a lease that expires before one taken now would. Its holder started earlier, and has
-    /// the same time limit.
+    /// Releases a lease that expires before a lease that is taken now. Its holder started earlier, and has the same
+    /// time limit.
     pub(crate) async fn release_stale_lease(&self, animation: &Animation) -> Result<()> {
         let own = self.own_lease(HeldLease::default());
         self.free_lease(animation, |holder| holder.until < own.until).await
@@ -233,7 +235,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     ///
     /// # Errors
     ///
-    /// The errors of the store, and [`Error::Conflict`] for a lease that comes and goes.
+    /// The errors of the store, and [`Error::Conflict`] for a lease that is released and taken again and again.
     pub(crate) async fn hand_over_lease(&self, animation: &Animation, held: &HeldLease) -> Result<()> {
         if !held.has_checkpoint {
             return self.release_lease(animation).await;
@@ -321,7 +323,7 @@ mod tests {
         assert!(takes(&store, "a").await && !takes(&store, "b").await);
     }
 
-    /// The holder's clock was an hour ahead and the holder died: no invocation would have built for an hour.
+    /// The holder's clock was an hour ahead, and the holder died. For an hour no invocation would have built the GIF.
     #[tokio::test]
     async fn a_lease_of_a_clock_that_ran_ahead_holds_nobody_off() {
         let store = MemoryStore::new(SystemClock);

@@ -1,7 +1,7 @@
 //! Scripts in a bucket become an animation: keys, stores, the manifest protocol and its steps.
 //!
-//! `docs/pipeline.md` is the protocol's reference. This crate knows the bucket only as a [`store::Store`], time only
-//! as a [`clock::Clock`] and chance only as [`clock::Randomness`]; it starts no threads and no tasks.
+//! `docs/pipeline.md` is the protocol's reference. This crate knows the bucket only as a [`store::Store`], time only as
+//! a [`clock::Clock`], and random numbers only as [`clock::Randomness`]. It starts no threads and no tasks.
 
 mod animator;
 pub mod assemble;

@@ -1,10 +1,10 @@
 //! The manifest: the summary of the bucket's listing, for people, the command line and the protocol.
 //!
-//! `docs/manifest.md` describes the document field by field. The type knows no store: [`mod@crate::fold`] decides when one
-//! is written, [`crate::reconcile()`] what it says, [`crate::invariants`] what it may never say.
+//! `docs/manifest.md` describes the document field by field. The type knows no store: [`mod@crate::fold`] decides when
+//! a manifest is written, [`crate::reconcile()`] computes it, and [`crate::invariants`] checks it.
 //!
-//! Its first line is the [`Head`], whose size does not grow with the number of frames. The frames follow, a line
-//! each, and the first line says where.
+//! Its first line is the [`Head`], whose size does not grow with the number of frames. The frames follow, one per line,
+//! and the head of a large manifest has their positions.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -21,19 +21,19 @@ mod document;
 
 pub(crate) use document::{Beginning, frames_of};
 
-/// The version of the document's form. Readers refuse a later one.
+/// The version of the document's format. Readers refuse a later one.
 pub const SCHEMA: u32 = 1;
 
 /// The number of diagnostics of a script that the manifest repeats; the receipt has more.
 pub const DIAGNOSTICS_SHOWN: usize = 3;
 
-/// The largest `animation.json` that is read: thousands of times what its fields need.
+/// The largest `animation.json` that is read: thousands of times the size that its fields need.
 pub const MAX_SETTINGS_BYTES: u64 = 64 * 1024;
 
 /// The manifest of an animation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
-    /// All but the frames.
+    /// All data but the frames.
     pub head: Head,
     /// The frames in the order of the animation.
     pub frames: Vec<Frame>,
@@ -46,52 +46,52 @@ pub struct Head {
     pub schema: u32,
     /// The animation whose frames the manifest lists.
     pub animation: Animation,
-    /// Grows by one with each write, from 1.
+    /// The number of this revision, from 1. It grows by one with each write.
     pub revision: u64,
     /// The request id of the invocation that wrote this revision.
     pub writer: String,
     /// The progress of the animation.
     pub status: Status,
-    /// The identity of this set of frames and settings; a file of the same generation is up to date.
+    /// The identity of this set of frames and settings; a file of the same generation is current.
     pub generation: Generation,
-    /// Scripts in the folder.
+    /// The number of scripts in the folder.
     pub scripts: u64,
-    /// Frames known; a script that has not been read yet counts as one.
+    /// The number of known frames; a script that has not been read yet counts as one.
     pub total: u64,
     /// The number of frames that are drawn.
     pub done: u64,
-    /// Frames that are still to come.
+    /// The number of pending frames.
     pub pending: u64,
-    /// Frames that wait for files that their scripts name.
+    /// The number of frames that wait for files that their scripts name.
     #[serde(default, skip_serializing_if = "is_none")]
     pub waiting: u64,
-    /// Frames that cannot be drawn.
+    /// The number of frames that cannot be drawn.
     pub failed: u64,
     /// The settings in `animation.json`.
     pub settings: Settings,
-    /// Files that are meant as scripts but have a key that the pipeline cannot take.
+    /// Objects that are meant as scripts but have a key that the pipeline cannot use.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rejected: Vec<Rejected>,
-    /// Files that are not read because they are not called as scripts and settings are.
+    /// Objects that are not read because their names only resemble those of scripts and settings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Rejected>,
-    /// Why one of the files cannot be made of this generation though all its frames are there.
+    /// The reason why one of the files cannot be made of this generation, although all of its frames are drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refusal: Option<Fault>,
     /// The reason if there are more frames than an animation may have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excess: Option<Reason>,
-    /// When a script was last found to be gone, by the clock of the function that found it.
+    /// The time when a script was last found to be gone, by the clock of the function that found it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removed_at: Option<Timestamp>,
-    /// The last GIF that an assembler has seen or put. Another GIF with the metadata of this generation
-    /// is not that one.
+    /// The last GIF that an assembler has found or written. If another GIF has the metadata of this generation, it does
+    /// not count as current.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gif: Option<Made>,
     /// The other files, likewise.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub outputs: BTreeMap<Container, Made>,
-    /// Every 1,000th script's name: where listings in ranges start.
+    /// The name of every 1,000th script, at which listings in ranges start.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<ScriptName>,
 }
@@ -109,21 +109,21 @@ pub struct Made {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// There is no script; there will be no GIF.
+    /// There is no script, and there will be no GIF.
     Empty,
-    /// Fewer frames than `animation.json` says are there, or some wait for files that their scripts name.
+    /// There are fewer frames than `animation.json` says, or some wait for files that their scripts name.
     Waiting,
     /// Frames are being drawn.
     Rendering,
-    /// Everything has been tried, and something cannot be drawn or understood: there will be no GIF.
+    /// Everything has been tried, and something cannot be drawn or read. There will be no GIF.
     Failed,
-    /// All frames are drawn, but one of the files cannot be made of them: there will be none.
+    /// All frames are drawn, but one of the files cannot be made of them, so there will be none.
     Refused,
-    /// All frames are drawn: there are the files of this generation, or there will be.
+    /// All frames are drawn. The files of this generation exist, or will soon.
     Done,
 }
 
-/// The word that stands for it in the manifest.
+/// Returns its word in the manifest.
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
@@ -143,10 +143,10 @@ impl fmt::Display for Status {
 pub struct Frame {
     /// The script that draws it.
     pub script: ScriptName,
-    /// The entity tag of the script that the frame is drawn from, and of a script that names files, once it has been
-    /// read, a hash of them behind it.
+    /// The entity tag of the script of the frame. If the script names files and has been read, it is followed by a hash
+    /// of them.
     pub version: ETag,
-    /// The frame's number in its script; `None` when the script is one frame, or has not been read yet.
+    /// The frame's number in its script; `None` if the script is one frame, or has not been read yet.
     pub part: Part,
     /// The result of drawing the frame.
     pub state: FrameState,
@@ -162,36 +162,36 @@ pub enum FrameState {
         /// The renderer's pixel version that is used.
         pixels: u32,
     },
-    /// It cannot be drawn before files come that the script names.
+    /// It cannot be drawn before files arrive that the script names.
     Waiting(Fault),
     /// It cannot be drawn.
     Failed(Fault),
 }
 
-/// Why something cannot be had, and the receipt that says so.
+/// The reason why there is no result, and the receipt that contains it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
     /// The entity tag of the receipt.
     pub receipt: ETag,
-    /// The content of the receipt. Never missing in a manifest that is not rendering or waiting.
+    /// The content of the receipt. Always present in a manifest that is not rendering or waiting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<Reason>,
 }
 
-/// A reason for people, with the diagnostics that it rests on; the body of an error receipt.
+/// A reason for people, with the diagnostics behind it: the body of an error receipt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
-    /// One line: of a script's first error `<file>:<line>:<column>: <message>`.
+    /// One line. For a script's first error it is `<file>:<line>:<column>: <message>`.
     pub message: String,
     /// The script's diagnostics, or the first of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub diagnostics: Vec<Diagnostic>,
-    /// The number of diagnostics that are left out.
+    /// The number of diagnostics that are omitted.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub omitted: usize,
 }
 
-/// A file that is meant as a script but cannot be one, or is not called as one.
+/// An object that is meant as a script but cannot be one, or is not named like one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rejected {
     /// The key of the object.
@@ -203,10 +203,10 @@ pub struct Rejected {
 /// The animation's settings as they were found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// The version of `animation.json`; `None` when there is none.
+    /// The version of `animation.json`; `None` if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub version: Option<ETag>,
-    /// The settings; `None` exactly when `fault` says why.
+    /// The settings; `None` if and only if `fault` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<AnimationSettings>,
     /// The error in `animation.json`, if there is one.
@@ -214,42 +214,43 @@ pub struct Settings {
     pub fault: Option<Reason>,
 }
 
-/// A fact that an invocation wants the manifest to show before it may leave.
+/// A fact that the manifest must show before an invocation may stop.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fact {
-    /// Nothing in particular: fold in any case.
+    /// No particular fact: fold in any case.
     Fold,
     /// There is no such script.
     Absent(ScriptName),
     /// The script is known in this version.
     Version(ScriptName, ETag),
-    /// `animation.json` is known in this version.
+    /// The manifest shows this version of `animation.json`.
     Settings(Option<ETag>),
     /// The script's frame, or this part of it, is drawn with this pixel version or a newer one.
     Drawn(ScriptName, ETag, Part, u32),
-    /// The script's frame, or this part of it, cannot be drawn, or not yet, as this receipt says.
+    /// The script's frame, or this part of it, cannot be drawn, or not yet, according to this receipt.
     Faulty(ScriptName, ETag, Part, ETag),
     /// The script has several frames.
     Split(ScriptName, ETag),
 }
 
 impl Head {
-    /// Every expected frame is done or failed: nothing will come unless the user changes something.
+    /// Returns whether every expected frame is done or failed, so that nothing more happens unless the user changes
+    /// something.
     pub fn is_terminal(&self) -> bool {
         !matches!(self.status, Status::Waiting | Status::Rendering)
     }
 
-    /// The files that are to be made of the animation.
+    /// Returns the files that are made of the animation.
     pub fn outputs(&self) -> &[Container] {
         self.settings.outputs()
     }
 
-    /// The settings of the animation, with the number of frames that there are.
+    /// Returns the settings of the animation, with the current number of frames.
     pub(crate) fn counted_settings(&self) -> AnimationSettings {
         self.settings.value.clone().unwrap_or_default().of_frames(self.total)
     }
 
-    /// The version of a file of this generation, if an assembler has seen it.
+    /// Returns the version of a file of this generation, if an assembler has found it.
     pub fn version_of(&self, output: Container) -> Option<&ETag> {
         let made = if output == Container::Gif { self.gif.as_ref() } else { self.outputs.get(&output) };
         made.filter(|made| made.generation == self.generation).map(|made| &made.version)
@@ -265,14 +266,14 @@ impl Head {
         }
     }
 
-    /// Takes over the recorded files of another head: no listing shows them.
+    /// Copies the recorded files of another head, because no listing shows them.
     pub(crate) fn with_files_of(mut self, other: Option<&Head>) -> Self {
         self.gif = other.and_then(|other| other.gif.clone());
         self.outputs = other.map(|other| other.outputs.clone()).unwrap_or_default();
         self
     }
 
-    /// Returns the number of frames that are expected and not there yet.
+    /// Returns the number of frames that are expected and not drawn yet.
     pub fn missing(&self) -> u64 {
         self.pending + self.waiting + self.not_uploaded()
     }
@@ -285,7 +286,7 @@ impl Head {
 }
 
 impl Manifest {
-    /// Returns whether both say the same, regardless of their writers and of the reasons that they repeat.
+    /// Returns whether both manifests say the same, regardless of their writers and of the reasons that they repeat.
     pub fn agrees_with(&self, other: &Manifest) -> bool {
         let (a, b) = (&self.head, &other.head);
         let receipt = |fault: &Option<Fault>| fault.as_ref().map(|fault| fault.receipt.clone());
@@ -300,7 +301,8 @@ impl Manifest {
             && self.frames.iter().zip(&other.frames).all(|(a, b)| a.agrees_with(b))
     }
 
-    /// The parts of a split script's version that are still to come; `None` when it does not show the split.
+    /// Returns the parts of a split script's version that are still to come, or `None` if the manifest does not show
+    /// the split.
     pub fn pending_parts(&self, name: &ScriptName, version: &ETag) -> Option<Vec<NonZeroU64>> {
         let frames = self.frames.iter().filter(|frame| frame.script == *name && frame.version == *version);
         let mut parts = frames.filter_map(|frame| Some((frame.part?, &frame.state))).peekable();
@@ -308,7 +310,7 @@ impl Manifest {
         Some(parts.filter(|(_, state)| **state == FrameState::Pending).map(|(part, _)| part).collect())
     }
 
-    /// Applies a limit on the number of frames: an animation with more is failed, and nothing is waited for.
+    /// Applies a limit on the number of frames. An animation with more is failed, and no invocation waits for anything.
     pub(crate) fn bounded(mut self, most: Option<u64>) -> Self {
         let total = self.head.total;
         if let Some(most) = most.filter(|most| total > *most) {
@@ -322,7 +324,7 @@ impl Manifest {
         self
     }
 
-    /// When a script was last found to be gone, if this manifest is written `now` over `before`.
+    /// Returns the time when a script was last found to be gone, if this manifest is written `now` over `before`.
     pub(crate) fn removed_at(&self, before: Option<&Manifest>, now: Timestamp) -> Option<Timestamp> {
         let before = before?;
         let left: BTreeSet<&ScriptName> = self.frames.iter().map(|frame| &frame.script).collect();
@@ -330,14 +332,14 @@ impl Manifest {
         if is_gone { Some(now) } else { before.head.removed_at }
     }
 
-    /// Whether it shows the fact.
+    /// Returns whether the manifest shows the fact.
     pub fn shows(&self, fact: &Fact) -> bool {
         fact.is_shown_by(&self.head, &self.frames)
     }
 }
 
 impl Fact {
-    /// The script, or the part of it, that the fact is about; `None` when the head says all.
+    /// Returns the script, or the part of it, that the fact is about; `None` if the head is enough to decide.
     pub(crate) fn subject(&self) -> Option<(&ScriptName, Part)> {
         match self {
             Fact::Fold | Fact::Settings(_) => None,
@@ -346,7 +348,7 @@ impl Fact {
         }
     }
 
-    /// Whether a manifest shows the fact, given its head and at least the frames of the fact's subject.
+    /// Returns whether a manifest shows the fact, given its head and at least the frames of the fact's subject.
     pub(crate) fn is_shown_by(&self, head: &Head, frames: &[Frame]) -> bool {
         let of = |name: &ScriptName, version: &ETag| {
             let (name, version) = (name.clone(), version.clone());
@@ -386,12 +388,12 @@ impl Frame {
 }
 
 impl Settings {
-    /// Returns the files that are to be made of the animation; of settings with a fault the usual ones.
+    /// Returns the files that are made of the animation. For faulty settings these are the default ones.
     pub(crate) fn outputs(&self) -> &[Container] {
         self.value.as_ref().map_or(AnimationSettings::DEFAULT_OUTPUTS, AnimationSettings::outputs)
     }
 
-    /// As when there is no `animation.json`.
+    /// Returns the settings of an animation without `animation.json`.
     pub fn absent() -> Self {
         Settings { version: None, value: Some(AnimationSettings::default()), fault: None }
     }
@@ -414,7 +416,7 @@ impl Settings {
 }
 
 impl Reason {
-    /// The text for an error receipt that cannot be read. The sweep deletes it, and has the frame drawn again.
+    /// The text for an error receipt that cannot be read. The sweep deletes the receipt, and has the frame drawn again.
     pub const UNREADABLE: &str =
         "the error receipt cannot be read: the frame is drawn again at the next sweep";
 
@@ -443,7 +445,7 @@ impl Reason {
         Reason { message, diagnostics: errors, omitted }
     }
 
-    /// As the manifest repeats it.
+    /// Returns the reason in the short form of the manifest.
     pub fn shortened(mut self) -> Self {
         self.omitted += self.diagnostics.len().saturating_sub(DIAGNOSTICS_SHOWN);
         self.diagnostics.truncate(DIAGNOSTICS_SHOWN);
@@ -451,7 +453,7 @@ impl Reason {
     }
 }
 
-/// A frame as its line in the document holds it.
+/// A frame in the form of its line in the document.
 #[derive(Serialize, Deserialize)]
 struct FrameLine {
     script: ScriptName,

@@ -15,18 +15,18 @@ use crate::reconcile::{FileFound, MARK_EVERY, ReceiptFound, Results, ScriptFound
 use crate::store::{ETag, ListPage, ListRequest, Listed, Listing, Object, Store};
 use crate::{Clock, Error, Result, Timestamp};
 
-/// The most listings of an animation whose receipts are replaced between the listing and their reading.
+/// The maximum number of listings of an animation whose receipts are replaced between the listing and their reading.
 const LOOKS: u32 = 8;
 
-/// The number of rejected keys that a manifest names. Without this limit a user who may upload could make it as
-/// large as they like.
+/// The maximum number of rejected keys that a manifest names. Without this limit any user who may upload could make it
+/// arbitrarily large.
 const MAX_REJECTED: usize = 100;
 
 /// The receipts of an animation that a listing shows.
 #[derive(Debug, Clone)]
 pub(crate) struct Receipts {
     pub(crate) found: Vec<ReceiptFound>,
-    /// Whether those of the parts of split scripts are among them.
+    /// Whether the receipts of the parts of split scripts are included.
     pub(crate) has_parts: bool,
     has_lease: bool,
     has_sweep_lease: bool,
@@ -39,11 +39,11 @@ pub(crate) struct Observation {
     pub(crate) scripts: Scripts,
     pub(crate) results: Results,
     pub(crate) manifest: Manifest,
-    /// An assembler waits or builds, or died in it.
+    /// The assembler's lease: an assembler waits or builds, or died doing so.
     pub(crate) has_lease: bool,
-    /// A sweep deletes results, or died in it.
+    /// The sweep's lease: a sweep deletes results, or died doing so.
     pub(crate) has_sweep_lease: bool,
-    /// Files of which there may be one, beside the GIF.
+    /// The files, besides the GIF, that may exist.
     pub(crate) marked: BTreeSet<Container>,
 }
 
@@ -65,7 +65,7 @@ impl Receipts {
 }
 
 impl Observation {
-    /// When the newest script, or file beside it, was uploaded.
+    /// The time when the newest script, or file beside it, was uploaded.
     pub(crate) fn newest_script(&self) -> Option<Timestamp> {
         let scripts = self.scripts.found.iter().map(|script| script.modified);
         scripts.chain(self.scripts.files.values().map(|file| file.modified)).max()
@@ -80,12 +80,12 @@ impl Observation {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Lists an animation and reconciles the listing. `known` is the manifest as last read: it saves requests, and
-    /// has no say in the outcome.
+    /// Lists an animation and reconciles the listing. `known` is the manifest as last read. It saves requests, and does
+    /// not affect the outcome.
     ///
     /// # Errors
     ///
-    /// The errors of the store, and [`Error::Conflict`] for a receipt that is never the one that was listed.
+    /// The errors of the store, and [`Error::Conflict`] if a receipt is replaced after each listing.
     pub(crate) async fn observe(&self, animation: &Animation, known: Option<&Known>) -> Result<Observation> {
         let mut pause = self.policy.request_pause;
         for _ in 0..LOOKS {
@@ -101,8 +101,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Err(Error::Conflict { key: animation.frames() })
     }
 
-    /// Observes the animation with receipts that have been listed already. Returns `None` if one of them
-    /// has been replaced since.
+    /// Observes the animation with receipts that have already been listed. Returns `None` if one of them has been
+    /// replaced since.
     pub(crate) async fn observe_with(
         &self,
         animation: &Animation,
@@ -150,7 +150,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.list_receipts(animation, &[]).await.map(|receipts| receipts.found)
     }
 
-    /// The receipts if a page shows them all, also those of parts if `has_parts`.
+    /// Returns the receipts if a page shows them all, including those of parts if `has_parts`.
     pub(crate) async fn receipts_on_a_page(
         &self,
         animation: &Animation,
@@ -177,13 +177,13 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Receipts::of(animation, listed, false))
     }
 
-    /// The objects right below a prefix, the ranges between the bounds side by side.
+    /// Lists the objects directly below a prefix. The ranges between the bounds are listed in parallel.
     async fn list_level(&self, prefix: String, mut bounds: Vec<String>) -> Result<Vec<Listed>> {
         bounds.sort();
         self.list_ranges(ListRequest::level(prefix), bounds).await
     }
 
-    /// Reads a listing to its end, the ranges between the sorted bounds side by side.
+    /// Reads a listing to its end. The ranges between the sorted bounds are read in parallel.
     pub(crate) async fn list_ranges(&self, request: ListRequest, bounds: Vec<String>) -> Result<Vec<Listed>> {
         let starts = std::iter::once(None).chain(bounds.iter().cloned().map(Some));
         let ends = bounds.iter().cloned().map(Some).chain(std::iter::once(None));
@@ -201,8 +201,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Listing::read(request, end.as_deref(), |request| self.list(request)).await?.objects)
     }
 
-    /// Reads `animation.json`, unless the manifest has it in this version and could read it: settings that an older
-    /// function took for faulty need not be.
+    /// Reads `animation.json`, unless the manifest has it in this version and without a fault: settings that an older
+    /// function rejected may be valid.
     async fn settings(
         &self,
         animation: &Animation,
@@ -295,8 +295,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(numbers.filter(|number| !there.contains(number)).collect())
     }
 
-    /// Adds the reasons of faults: those that the manifest has, and when nothing is left to come all others. Says
-    /// whether they could be had; if not, the listing is out of date.
+    /// Adds the reasons of faults: those in the manifest and, if no frame is pending, all others. Returns whether the
+    /// reasons could be read; if not, the listing is out of date.
     async fn add_reasons(
         &self,
         animation: &Animation,
@@ -353,7 +353,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
     }
 }
 
-/// Returns the scripts that a listing of the animation's folder shows, and the version of its settings.
+/// Returns the scripts in a listing of the animation's folder, and the version of its settings.
 fn scripts_of(animation: &Animation, listed: Vec<Listed>) -> (Scripts, Option<ETag>) {
     let (mut scripts, mut rejected, mut warnings) = (Scripts::default(), Vec::new(), Vec::new());
     let mut settings = None;
@@ -394,7 +394,7 @@ pub fn script_versions(
     scripts.found.into_iter().map(|script| (script.name, script.version)).collect()
 }
 
-/// The first ones, and of the others how many there are.
+/// Keeps the first ones, and the number of the others.
 fn bounded(mut rejected: Vec<Rejected>, folder: String, which: &str) -> Vec<Rejected> {
     let more = rejected.len().saturating_sub(MAX_REJECTED);
     rejected.truncate(MAX_REJECTED);
@@ -405,7 +405,7 @@ fn bounded(mut rejected: Vec<Rejected>, folder: String, which: &str) -> Vec<Reje
     rejected
 }
 
-/// Returns the receipt that an object in a listing of the animation's frames is.
+/// Returns the receipt for an object in a listing of the animation's frames.
 fn receipt(animation: &Animation, listed: Listed) -> Option<ReceiptFound> {
     match listed.key.parse() {
         Ok(Key::Receipt { animation: of, receipt }) if of == *animation => {
@@ -431,8 +431,9 @@ fn faults_mut(manifest: &mut Manifest) -> impl Iterator<Item = &mut Fault> {
     frames.chain(&mut manifest.head.refusal)
 }
 
-/// Returns whether it is a result of a script, or of a part of it, with any files. An invocation that leaves for a frame
-/// to come needs more than that the version has no result: another version's may be the one that was to come.
+/// Returns whether the receipt is a result of a script, or of a part of it, with any files. An invocation that stops
+/// for a frame to come must also consider other versions of the script: the result of another version may be the one
+/// that was to come.
 pub(crate) fn is_result_of(found: &ReceiptFound, script: &ScriptName, version: &ETag, part: Part) -> bool {
     match &found.receipt {
         Receipt::Frame { name, tag, part: of } | Receipt::Fault { name, tag, part: of } => {
@@ -482,7 +483,7 @@ pub(crate) enum VersionResult {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Whether there is a frame of a script's version, or of a part of it, an error, or a split.
+    /// Returns whether there is a frame of a script's version or of a part of it, an error, or a split.
     pub(crate) async fn has_result(
         &self,
         animation: &Animation,

@@ -1,8 +1,8 @@
-//! The files that are made of an animation: which there are, and which are to be made or to go.
+//! The files that are made of an animation: those that exist, and those that must be made or deleted.
 //!
-//! The GIF is looked at in each round, as there may always be one. Another file is looked at if the settings ask for it,
-//! or if there is a mark, an object below `frames/`, which an assembler puts before the first such file. A mark stays as
-//! long as the animation: a file may appear after its assembler has died.
+//! Each round checks the GIF, because there may always be one. Another file is checked if the settings ask for it, or
+//! if there is a mark: an object below `frames/` that an assembler puts before the first such file. A mark stays as
+//! long as the animation, because a file may appear after its assembler has died.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,22 +16,22 @@ use crate::observe::Observation;
 use crate::store::{ETag, ObjectInfo, Store};
 use crate::{Clock, Result};
 
-/// The files of an animation, as far as they were looked at.
+/// The files of an animation, as far as they were checked.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Outputs(BTreeMap<Container, Option<ObjectInfo>>);
 
-/// The action that is due for the files of a set.
+/// The next action for the files of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Due {
-    /// They are as they should be, or more is to come.
+    /// The files are as they should be, or frames are still to come.
     Nothing,
-    /// This file is to be made.
+    /// This file must be made.
     File(Container),
-    /// This file is to go.
+    /// This file must be deleted.
     NoFile(Container),
 }
 
-/// Returns the files to look at, as far as a manifest and a listing show.
+/// Returns the files to check, according to a manifest and a listing.
 pub(crate) fn needed(known: Option<&Known>, observation: Option<&Observation>) -> BTreeSet<Container> {
     let observed = observation.map(|observation| &observation.manifest.head);
     let heads = known.map(|known| &known.manifest.head).into_iter().chain(observed);
@@ -56,12 +56,12 @@ impl Outputs {
         self.0.get(&output)?.as_ref()
     }
 
-    /// Returns the kinds of the files that there are.
+    /// Returns the kinds of the existing files.
     pub(crate) fn existing(&self) -> impl Iterator<Item = Container> {
         self.0.iter().filter(|(_, file)| file.is_some()).map(|(output, _)| *output)
     }
 
-    /// Returns the action that is due for the set that the manifest's head stands for.
+    /// Returns the next action for the set in the manifest's head.
     pub(crate) fn due(&self, head: &Head) -> Due {
         let wanted = head.outputs();
         let due = match head.status {
@@ -99,7 +99,7 @@ impl Outputs {
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Looks at those of these files that were not looked at yet.
+    /// Checks those of these files that were not checked yet.
     pub(crate) async fn look_at_outputs(
         &self,
         animation: &Animation,
@@ -165,7 +165,7 @@ mod tests {
         }
     }
 
-    /// In the order in which the settings name them, and the ones that they do not name go last.
+    /// Files are handled in the order of the settings. Files that the settings do not name are deleted last.
     #[test]
     fn all_files_that_are_asked_for_are_made_and_no_others_stay() {
         let current = file(Some(head(Status::Done, &[GIF]).generation.as_str()));
@@ -190,7 +190,7 @@ mod tests {
         assert!(files(&[GIF]).are(&files(&[GIF])) && !files(&[GIF]).are(&files(&[WEBP])));
     }
 
-    /// One of another set, or that was named already, or of a set that is not whole, is not.
+    /// A file is not recorded if it belongs to another set, is recorded already, or its set is not complete.
     #[test]
     fn a_file_is_new_that_is_of_this_set_and_not_written_down() {
         let generation = head(Status::Done, &[GIF]).generation;

@@ -24,7 +24,7 @@ const MAX_MARKS: usize = 200;
 pub struct Scripts {
     /// The scripts, each once.
     pub found: Vec<ScriptFound>,
-    /// Objects that are meant as scripts but cannot be one.
+    /// Objects that are meant as scripts but cannot be scripts.
     pub rejected: Vec<Rejected>,
     /// Objects that are not read because of their names.
     pub warnings: Vec<Rejected>,
@@ -37,10 +37,10 @@ pub struct Scripts {
 pub struct ScriptFound {
     /// The name of the script within its animation.
     pub name: ScriptName,
-    /// The entity tag of the script; of one that names files, with the hash of a set of files behind it if the set
-    /// agrees with the listing.
+    /// The entity tag of the script. If the script names files and a set agrees with the listing, the hash of the set
+    /// follows.
     pub version: ETag,
-    /// When it was uploaded.
+    /// The time of its upload.
     pub modified: Timestamp,
 }
 
@@ -49,7 +49,7 @@ pub struct ScriptFound {
 pub struct FileFound {
     /// A hash of its entity tag.
     pub version: VersionHash,
-    /// When it was uploaded.
+    /// The time of its upload.
     pub modified: Timestamp,
 }
 
@@ -67,7 +67,7 @@ pub struct ReceiptFound {
     pub receipt: Receipt,
     /// The entity tag of the receipt.
     pub etag: ETag,
-    /// When it was written.
+    /// The time when it was written.
     pub modified: Timestamp,
 }
 
@@ -89,7 +89,7 @@ struct Outcome<'a> {
 /// Folds the listings of an animation into its manifest, with revision 0 and no writer. The invocation that
 /// commits it sets both.
 ///
-/// Reasons are left out; the listings do not show them.
+/// Reasons are left out, because listings do not show them.
 pub fn reconcile(
     animation: &Animation,
     scripts: &Scripts,
@@ -227,7 +227,7 @@ impl<'a> Resolution<'a> {
     }
 }
 
-/// Returns the hash of the sorted frames with their states, and of the settings that show in a file.
+/// Returns the hash of the sorted frames with their states, and of the settings that affect a file.
 fn generation(frames: &[Frame], settings: &Settings) -> Generation {
     let mut hash = Sha256::new();
     // Without lengths, different fields could concatenate to the same bytes.

@@ -32,9 +32,9 @@ use bands::{Bands, Woken};
 pub use bands::BandJoiner;
 pub use source::{File, Files, Source};
 
-/// A renderer of scripts. The render function brings a ray tracer, the simulation something smaller.
+/// A renderer of scripts. The render function provides a ray tracer, the simulation something smaller.
 pub trait Renderer: Send + Sync {
-    /// A frame being put together of its bands.
+    /// A frame that is joined from its bands.
     type BandJoiner: BandJoiner;
 
     /// Returns the largest size of a script in bytes. Of a larger script only these bytes and one more are read.
@@ -43,9 +43,9 @@ pub trait Renderer: Send + Sync {
     /// Returns the largest size of a file in bytes. Of a larger file only these bytes and one more are read.
     fn most_file_bytes(&self) -> u64;
 
-    /// Returns the names of the files that the drawing of a script reads, as far as these `files` show it; an absent file is
-    /// `None`. It is asked again with more files until it names no others. The last answer depends on the script and on the
-    /// contents of the files alone: it is a part of the script's version.
+    /// Returns the names of the files that the drawing of a script reads, as far as these `files` show it; an absent
+    /// file is `None`. The caller repeats the call with more files until there are no new names. The last result
+    /// depends only on the script and on the contents of the files, because it is a part of the script's version.
     ///
     /// # Errors
     ///
@@ -62,23 +62,24 @@ pub trait Renderer: Send + Sync {
         None
     }
 
-    /// Keeps a file, so that the next drawing need not read it. Without a file nothing is kept for the key any more.
+    /// Keeps a file, so that the next drawing need not read it. Without a file, drops the one that is kept for the key.
     fn keep(&self, _key: &str, _file: Option<&File>) {}
 
-    /// Draws the script's one frame (`part` is `None`) or one of several, or says that it is too big: that drawing it takes
-    /// most of the time that is `left`, or more memory than there is.
+    /// Draws the script's only frame (`part` is `None`) or one of several. Or returns that it is too big, because
+    /// drawing takes most of the time that is `left`, or more memory than there is.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfTime`] when it was stopped before the deadline. A fault of the script is no
-    /// error but a [`Drawing::Fault`].
+    /// [`Error::OutOfTime`] if it was stopped before the deadline. A fault of the script is no error but a
+    /// [`Drawing::Fault`].
     fn draw(&self, source: Source, left: Option<Duration>) -> impl Future<Output = Result<Drawing>> + Send;
 
-    /// Draws a band of a frame that was found too big, as a file that [`BandJoiner`] reads; the reason if that cannot be done.
+    /// Draws a band of a frame that was found too big, as a file that [`BandJoiner`] reads. Returns the reason if that
+    /// is impossible.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfTime`] when it was stopped before the deadline.
+    /// [`Error::OutOfTime`] if it was stopped before the deadline.
     fn draw_band(
         &self,
         source: Source,
@@ -102,11 +103,11 @@ pub trait Renderer: Send + Sync {
 pub enum Drawing {
     /// The frame, as PNG.
     Frame(Bytes),
-    /// The script is this many frames, two or more; only when no part was asked for.
+    /// The script has this many frames, two or more. Only if no part was requested.
     Split(NonZeroU64),
-    /// The frame is too big for one invocation: it is to be drawn in this many bands, two or more.
+    /// The frame is too big for one invocation. It must be drawn in this many bands, two or more.
     Cut(NonZeroU64),
-    /// There is no frame before files come that the script names; only when no part was asked for.
+    /// There is no frame before files arrive that the script names. Only if no part was requested.
     Waits(Reason),
     /// There is no frame and never will be.
     Fault(Reason),
@@ -134,9 +135,9 @@ pub enum Outcome {
     Gone,
     /// The event was about settings.
     Settings,
-    /// The event was about a file that is not read, because of this fault in its name.
+    /// The event was about an object that is not read, because of this fault in its name.
     NearMiss(&'static str),
-    /// A part of a version that is no longer current: another event draws the current one.
+    /// The event was about a part of a version that is no longer current. Another event draws the current one.
     Superseded,
     /// The result was there already.
     Present,
@@ -144,23 +145,23 @@ pub enum Outcome {
     Drawn,
     /// The script was split into this many parts.
     Split(NonZeroU64),
-    /// The frame is drawn in this many bands, for which invocations were woken.
+    /// The frame is drawn in this many bands, for which invocations were triggered.
     Cut(NonZeroU64),
-    /// This band of the frame is there; others are to come.
+    /// This band of the frame exists; others are to come.
     Band(Band),
-    /// The script gives no frame before files come that it names, as the receipt now says.
+    /// The script gives no frame before the files arrive that it names. The receipt now says so.
     Waits(Reason),
-    /// The script gives no frame, as the receipt now says.
+    /// The script gives no frame. The receipt now says so.
     Faulty(Reason),
-    /// The event was about a file that a script names; the scripts that are to be drawn with it were woken.
+    /// The event was about a file that a script names. The scripts that must be drawn with it were triggered.
     File,
     /// The event was about a file that no script names.
     NoFile,
-    /// Nothing was drawn: the animation has more frames than it may have.
+    /// Nothing was drawn, because the animation has more frames than allowed.
     TooMany,
 }
 
-/// Time by stage of an invocation.
+/// The times of the stages of an invocation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stages {
     /// Reading the script and looking for a result.
@@ -177,8 +178,8 @@ pub struct Stages {
 ///
 /// # Errors
 ///
-/// [`Error::Key`] for a key that wakes no rendering: nothing was done, and a retry would not help. Others are the
-/// store's and the renderer's: the platform should try again.
+/// [`Error::Key`] for a key that triggers no rendering: nothing was done, and a retry would not help. All other errors
+/// are the store's and the renderer's, and the platform should try again.
 pub async fn render_frame<S: Store, C: Clock, R: Renderer>(
     invocation: &Invocation<'_, S, C>,
     renderer: &R,
@@ -208,13 +209,13 @@ pub(crate) struct Subject {
     pub(crate) part: Part,
     /// The rows of it, if not all.
     woken: Option<Woken>,
-    /// The version that a part or a band belongs to: of another one there is nothing to draw.
+    /// The version of a part or a band. If another version is current, there is nothing to draw.
     only: Option<ETag>,
-    /// The retry that woke it, and the version that this was for.
+    /// The retry that triggered the invocation, and the version that it was for.
     pub(crate) retry: Option<(NonZeroU64, ETag)>,
 }
 
-/// A script as it is now, with its files.
+/// The current script, with its files.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Script {
     pub(crate) version: ETag,
@@ -231,17 +232,17 @@ impl Script {
     }
 }
 
-/// The work that a script as it is now asks for.
+/// The work that remains for a script.
 #[derive(Debug, PartialEq)]
 enum Due {
-    /// No result, only that the manifest shows this.
+    /// There is nothing to draw; only the manifest must show this fact.
     Nothing(Outcome, Fact),
-    /// A result of this version, unless there is one.
+    /// A result of this version must be made, unless there is one.
     Version(Script),
 }
 
 impl Subject {
-    /// `None` for a key that is about no script.
+    /// Returns `None` for a key that is about no script.
     fn of(key: Key) -> Option<Self> {
         match key {
             Key::Script { animation, name } => {
@@ -290,7 +291,7 @@ impl Subject {
 }
 
 impl Outcome {
-    /// Returns the age of the fact that the outcome stands for.
+    /// Returns the age of the fact behind the outcome.
     fn age(&self) -> Age {
         match self {
             Outcome::Drawn | Outcome::Split(_) | Outcome::Waits(_) | Outcome::Faulty(_) => Age::New,
@@ -319,7 +320,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Rendered { animation, script: None, outcome: Outcome::Settings, folded, stages })
     }
 
-    /// Folds, so that the manifest warns of the file at once, or no longer does.
+    /// Folds, so that the manifest contains a warning of the object at once, or drops it.
     async fn follow_near_miss(&self, animation: Animation, problem: &'static str) -> Result<Rendered> {
         let start = self.clock.now();
         let folded = self.fold(&animation, &Fact::Fold, Age::Old).await?;
@@ -327,7 +328,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Rendered { animation, script: None, outcome: Outcome::NearMiss(problem), folded, stages })
     }
 
-    /// Wakes the scripts that are to be drawn again because a file has come, changed or gone.
+    /// Triggers the scripts that must be drawn again because a file was added, changed or removed.
     async fn follow_file(&self, animation: Animation, name: &str) -> Result<Rendered> {
         let start = self.clock.now();
         let is_named = self.wake_for_file(&animation, name).await?;
@@ -383,7 +384,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Rendered { animation: subject.animation, script: Some(subject.name), outcome, folded, stages })
     }
 
-    /// Gives a script the version that it has with its files, and returns the receipts of that version. The files are read
+    /// Determines the version of a script with its files, and returns the receipts of that version. The files are read
     /// only if there is no result.
     async fn with_files<R: Renderer>(
         &self,
@@ -427,7 +428,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((script, receipts))
     }
 
-    /// Whether the manifest says that the animation has more frames than it may have.
+    /// Returns whether the manifest says that the animation has more frames than allowed.
     async fn has_too_many(&self, animation: &Animation) -> Result<bool> {
         if self.policy.most_frames.is_none() {
             return Ok(false);
@@ -435,8 +436,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(self.read_prefix(animation).await?.head().is_some_and(|head| head.excess.is_some()))
     }
 
-    /// Works on a frame of which there is no result: on the band that the event is about, or on all of it. An
-    /// invocation that a renderer of other pixels woke for a band looks at the frame again.
+    /// Works on a frame without a result: on the band that the event is about, or on the whole frame. If a renderer of
+    /// another pixel version triggered the invocation for a band, it decides about the frame again.
     async fn work_on<R: Renderer>(
         &self,
         renderer: &R,
@@ -475,7 +476,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(put)
     }
 
-    /// Says that the attempt has begun: the sweep counts those alone, for others may still wait to be tried.
+    /// Records that the attempt has begun. The sweep counts only such attempts, because others may still wait to be
+    /// tried.
     pub(crate) async fn put_begun(
         &self,
         subject: &Subject,
@@ -500,7 +502,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Some(deadline.since(self.clock.now()).saturating_sub(self.policy.draw_margin))
     }
 
-    /// Works, but not beyond the deadline: a killed invocation cannot give a reason.
+    /// Runs work, but not beyond the deadline, because a killed invocation cannot report a reason.
     pub(crate) async fn in_time<T>(
         &self,
         work: impl Future<Output = Result<T>>,
@@ -578,7 +580,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((Outcome::Faulty(reason), fact))
     }
 
-    /// Puts an error receipt; `None` when there is one already.
+    /// Puts an error receipt. Returns `None` if it exists already.
     pub(crate) async fn put_fault(
         &self,
         animation: &Animation,
@@ -592,8 +594,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_receipt(&key, reason_body(&key, reason)?, "application/json").await
     }
 
-    /// Wakes an invocation for each part. Parts that have been put since the script was uploaded have had their event;
-    /// that of older ones may have come while another version was current.
+    /// Triggers an invocation for each part. Parts that were put after the upload of the script have had their event.
+    /// The event of an older part may have come while another version was current.
     async fn put_parts(
         &self,
         animation: &Animation,
@@ -616,8 +618,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stream::iter(parts).map(Ok).try_for_each_concurrent(concurrency, |part| part).await
     }
 
-    /// The script is split already. Parts whose events came while another version was current have drawn nothing:
-    /// those that were put before this upload and have no result are woken again.
+    /// Handles a script that is split already. Parts whose events came while another version was current have drawn
+    /// nothing. So those that were put before this upload, and have no result, are triggered again.
     async fn follow_split(
         &self,
         subject: Subject,
@@ -670,7 +672,7 @@ fn reason_body(key: &str, reason: &Reason) -> Result<Bytes> {
     serde_json::to_vec(reason).map(Bytes::from).map_err(malformed)
 }
 
-/// The object that wakes an invocation for a part.
+/// Returns the object that triggers an invocation for a part.
 fn part_object(
     animation: &Animation,
     name: &ScriptName,

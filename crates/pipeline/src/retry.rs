@@ -1,8 +1,8 @@
 //! Draws frames again, on demand: the effect of `rayfold retry` on the bucket.
 //!
-//! Of each frame the receipts are deleted first, for a receipt is what makes an event find its work done, and the wakings
-//! that the sweep has counted; then the frame is woken again. Everything after that is the render function's. A retry that
-//! was cut off is made whole by one of [`Scope::Failed`]: frames that are missing are among those.
+//! For each frame, it first deletes the receipts, because with a receipt an event finds its work done. It also deletes
+//! the triggers that the sweep has counted. Then it triggers the frame again, and the render function does the rest. If
+//! a retry was cut off, another one of [`Scope::Failed`] completes it, because that scope includes missing frames.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,9 +19,9 @@ use crate::{Clock, Result};
 pub enum Scope<'a> {
     /// Frames that failed or are missing.
     Failed,
-    /// All of them, also those that are drawn.
+    /// All frames, even those that are drawn.
     All,
-    /// This one, also if it is drawn.
+    /// This frame, even if it is drawn.
     Frame(&'a ScriptName, Part),
 }
 
@@ -38,11 +38,11 @@ impl Scope<'_> {
 /// The result of a retry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Retried {
-    /// Receipts that were deleted.
+    /// The number of deleted receipts.
     pub deleted: u64,
-    /// Frames, or whole scripts, that were woken.
+    /// The number of frames, or whole scripts, that were triggered.
     pub woken: u64,
-    /// The set of frames had been refused: it will be assembled again.
+    /// Whether the set of frames had been refused, so that it will be assembled again.
     pub reassembled: bool,
 }
 

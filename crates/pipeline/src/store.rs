@@ -1,18 +1,17 @@
-//! A bucket as the protocol sees it: objects under keys, conditional puts, listings.
+//! A bucket as the protocol needs it: objects under keys, conditional puts, listings.
 //!
-//! The trait has the operations of S3 that the protocol needs, and no more; it knows nothing of animations.
-//! Every call is one request (an [`Upload`] is several), and every `await` of one is a point at which an
-//! invocation may be killed.
+//! The trait has the operations of S3 that the protocol needs, and no more; it knows nothing of animations. Every call
+//! is one request (an [`Upload`] is several). An invocation may be killed at every `await` of one.
 //!
-//! Every store guarantees this, and the suite `conformance` of `crates/simulation` holds it:
+//! Every store guarantees the following, and the suite `conformance` of `crates/simulation` checks it:
 //!
 //! - A read or listing that starts after a put was answered sees that put, or a later one.
 //! - An object appears whole or not at all.
-//! - [`Condition::IfAbsent`] and [`Condition::IfMatch`] are atomic: of two writers with the same condition one wins.
+//! - [`Condition::IfAbsent`] and [`Condition::IfMatch`] are atomic: if two writers have the same condition, one wins.
 //! - Listings come in the byte order of the keys.
 //!
-//! A store may repeat a request whose answer was lost. A conditional put then meets its own success and answers
-//! [`Error::PreconditionFailed`](crate::Error::PreconditionFailed); callers must be ready for that anyway.
+//! A store may repeat a request whose reply was lost. A conditional put may then fail because of its own success, with
+//! [`Error::PreconditionFailed`](crate::Error::PreconditionFailed). Callers must handle that.
 //!
 //! ```
 //! use rayfold_pipeline::store::{MemoryStore, PutOptions, Store};
@@ -51,13 +50,13 @@ pub use s3::{Connection, Notification, S3Store, S3Upload};
 /// The most names that a store returns in one page of a listing.
 pub const PAGE: usize = 1000;
 
-/// An object's entity tag, without the quotes. Opaque: equal tags of one key mean equal bodies, no more.
+/// An object's entity tag, without the quotes. It is opaque: equal tags of one key mean equal bodies, and nothing else.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ETag(String);
 
 impl ETag {
-    /// Takes the tag as a store gives it, with or without quotes.
+    /// Makes a tag from the store's text, with or without quotes.
     pub fn new(text: &str) -> Self {
         ETag(text.trim_matches('"').to_owned())
     }
@@ -82,32 +81,34 @@ pub type Metadata = BTreeMap<String, String>;
 pub struct ObjectInfo {
     /// The entity tag, which identifies the body.
     pub etag: ETag,
-    /// Bytes of the whole body, also when only a range of it was read.
+    /// The number of bytes of the whole body, also if only a range of it was read.
     pub size: u64,
-    /// When it was put, by the store's clock (whole seconds on S3).
+    /// The time of the put, by the store's clock (whole seconds on S3).
     pub modified: Timestamp,
-    /// As it was put.
+    /// The metadata as it was put.
     pub metadata: Metadata,
 }
 
 /// An object, or a range of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Object {
-    /// All but the body.
+    /// All data but the body.
     pub info: ObjectInfo,
     /// The bytes that were asked for.
     pub body: Bytes,
 }
 
-/// When a put takes effect.
+/// The condition under which a put takes effect.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Condition {
-    /// In any case; replaces an existing object.
+    /// The put always takes effect, and replaces an existing object.
     #[default]
     Always,
-    /// Only while there is no such object (`If-None-Match: *`); else `PreconditionFailed`.
+    /// The put takes effect only while there is no such object (`If-None-Match: *`). Otherwise it fails with
+    /// `PreconditionFailed`.
     IfAbsent,
-    /// Only while the object has this tag (`If-Match`); else `PreconditionFailed`, or `NotFound` when it is gone.
+    /// The put takes effect only while the object has this tag (`If-Match`). Otherwise it fails with
+    /// `PreconditionFailed`, or with `NotFound` if the object is gone.
     IfMatch(ETag),
 }
 
@@ -120,7 +121,7 @@ pub struct PutOptions {
     pub content_type: &'static str,
     /// The user metadata of the object.
     pub metadata: Metadata,
-    /// Whether an upload keeps the start of the object back until its end, where it may be [changed](Upload::finish).
+    /// Whether an upload holds back the start of the object until its end, when it may be [changed](Upload::finish).
     pub is_start_last: bool,
 }
 
@@ -150,7 +151,7 @@ impl PutOptions {
         PutOptions { content_type, ..self }
     }
 
-    /// Keeps the start of an upload back until its end.
+    /// Holds back the start of an upload until its end.
     pub fn start_last(self) -> Self {
         PutOptions { is_start_last: true, ..self }
     }
@@ -162,26 +163,26 @@ impl PutOptions {
     }
 }
 
-/// A listing, or where to go on with one.
+/// The parameters of a listing, or of its continuation.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ListRequest {
-    /// Only keys that start so.
+    /// Only keys that begin with this are listed.
     pub prefix: String,
     /// Keys with a further `/` after the prefix are rolled up into one entry of `prefixes`.
     pub delimiter: bool,
-    /// Only keys after this one, in byte order.
+    /// Only keys after this one, in byte order, are listed.
     pub start_after: Option<String>,
-    /// [`ListPage::next`] of the page before.
+    /// The [`ListPage::next`] of the previous page.
     pub continuation: Option<String>,
 }
 
 impl ListRequest {
-    /// All keys below a prefix.
+    /// Lists all keys below a prefix.
     pub fn all(prefix: impl Into<String>) -> Self {
         ListRequest { prefix: prefix.into(), ..Self::default() }
     }
 
-    /// The keys and the folders right below a prefix.
+    /// Lists the keys and the folders directly below a prefix.
     pub fn level(prefix: impl Into<String>) -> Self {
         ListRequest { delimiter: true, ..Self::all(prefix) }
     }
@@ -194,9 +195,9 @@ pub struct Listed {
     pub key: String,
     /// The entity tag, which identifies its body.
     pub etag: ETag,
-    /// Bytes of its body.
+    /// The number of bytes of its body.
     pub size: u64,
-    /// When it was put, by the store's clock.
+    /// The time of the put, by the store's clock.
     pub modified: Timestamp,
 }
 
@@ -211,14 +212,14 @@ pub struct ListPage {
     pub next: Option<String>,
 }
 
-/// An upload that was left before its end, with its progress, for the invocation that resumes it.
+/// An unfinished upload with its progress, for the invocation that resumes it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct UnfinishedUpload {
-    /// The store's name for it; `None` before the first part.
+    /// The store's name for the upload; `None` before the first part.
     pub id: Option<String>,
     /// The entity tags of the parts that the store has, in order.
     pub parts: Vec<ETag>,
-    /// The first part, if it is sent last: empty while it is shorter than a part.
+    /// The first part if it is sent last. It is empty while it is shorter than a part.
     #[serde(skip)]
     pub start: Bytes,
     /// The bytes after the last part: fewer than a part has.
@@ -226,7 +227,7 @@ pub struct UnfinishedUpload {
     pub tail: Bytes,
 }
 
-/// Bytes that take the place of others at the start of an object, before its first 4 KiB end.
+/// Bytes that replace others at the start of an object, within its first 4 KiB.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Patch {
     /// The offset of the first byte.
@@ -252,8 +253,8 @@ pub trait Store: Send + Sync {
     /// Reads a whole object.
     fn get(&self, key: &str) -> impl Future<Output = Result<Object>> + Send;
 
-    /// Reads the bytes `range` of an object; fewer when the object ends before. The range starts inside the
-    /// object or at 0.
+    /// Reads the bytes `range` of an object, or fewer if the object ends before. The range starts inside the object or
+    /// at 0.
     fn get_range(&self, key: &str, range: Range<u64>) -> impl Future<Output = Result<Object>> + Send;
 
     /// Reads all but the body.
@@ -262,7 +263,7 @@ pub trait Store: Send + Sync {
     /// Writes an object whole.
     fn put(&self, key: &str, body: Bytes, options: PutOptions) -> impl Future<Output = Result<ETag>> + Send;
 
-    /// Removes an object; it is no error that there is none.
+    /// Removes an object. It is no error if there is none.
     fn delete(&self, key: &str) -> impl Future<Output = Result<()>> + Send;
 
     /// Reads one page of a listing.
@@ -272,31 +273,32 @@ pub trait Store: Send + Sync {
     /// the condition is checked.
     fn upload(&self, key: &str, options: PutOptions) -> impl Future<Output = Result<Self::Upload>> + Send;
 
-    /// Goes on with an object that was [left](Upload::leave) by this process or another one. `options` are those that
-    /// it began with. No request: whether the upload is still there shows at the next one. An upload that is gone,
-    /// because another process has finished or aborted it, is `NotFound` where a part is sent, and that or
-    /// `Ambiguous` at its end.
+    /// Continues an object that this process or another one has [left](Upload::leave). `options` are those that it
+    /// began with. It sends no request, so only the next request shows whether the upload still exists. If another
+    /// process has finished or aborted it, sending a part fails with `NotFound`, and finishing fails with `NotFound` or
+    /// `Ambiguous`.
     ///
-    /// A process that takes up the same upload twice and writes the same bytes does no harm.
+    /// It does no harm if the same upload is resumed twice with the same bytes.
     fn take_up(&self, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self::Upload;
 }
 
 /// An object being written piece by piece, with memory that does not grow with its size.
 ///
-/// It ends with [`finish`](Upload::finish) or [`abort`](Upload::abort), or is [left](Upload::leave) to be taken up later; one that is merely dropped, as by a killed
-/// process, leaves nothing visible, only parts for the bucket's lifecycle rule to clear.
+/// It ends with [`finish`](Upload::finish) or [`abort`](Upload::abort), or is [left](Upload::leave) to be resumed
+/// later. An upload that is merely dropped, as by a killed process, leaves nothing visible, only parts that the
+/// bucket's lifecycle rule deletes.
 pub trait Upload: Send {
-    /// Adds bytes, of any length. The store gathers them into parts of the size that it likes.
+    /// Adds any number of bytes. The store collects them into parts of its own size.
     fn write(&mut self, bytes: Bytes) -> impl Future<Output = Result<()>> + Send;
 
-    /// Makes the object visible, under the condition that the upload began with. When that does not hold the upload
-    /// is aborted and the error is that of a conditional put. `patch` changes the start of the object, and is for
-    /// uploads that [keep it back](PutOptions::start_last).
+    /// Makes the object visible, under the condition that the upload began with. If the condition does not hold, the
+    /// upload is aborted, and the error is that of a conditional put. `patch` changes the start of the object, in
+    /// uploads that [hold it back](PutOptions::start_last).
     fn finish(self, patch: Option<Patch>) -> impl Future<Output = Result<ETag>> + Send;
 
-    /// Gives up; nothing becomes visible.
+    /// Aborts the upload. Nothing becomes visible.
     fn abort(self) -> impl Future<Output = Result<()>> + Send;
 
-    /// Stops here; [`Store::take_up`] goes on. No request.
+    /// Stops here, without a request. [`Store::take_up`] continues the upload.
     fn leave(self) -> UnfinishedUpload;
 }

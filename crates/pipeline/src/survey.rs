@@ -1,14 +1,14 @@
-//! The decision of a finisher, from one page of a listing with all receipts of an animation: whether it may leave
-//! because a frame is still to come, and otherwise what it commits.
+//! The decision of a finisher, from one page of a listing with all receipts of an animation. It may stop because a
+//! frame is still to come, or commit a manifest.
 //!
-//! A finisher leaves for a frame under two conditions: the page, listed after its own result was put, has no result of
-//! that frame; and a further request shows that the frame's script still has that version. The page serves twice: if
-//! the finisher writes the manifest, the page is half of the listing that this needs. A finisher that finds no manifest
-//! leaves for any script without a result, because a manifest that does not exist covers nothing. The more results
-//! there are, the more likely it leaves, so that few of the finishers before the first manifest write one.
+//! A finisher stops for a frame under two conditions. The page, listed after its own result was put, contains no result
+//! of that frame. And a further request shows that the frame's script still has that version. The page serves twice: if
+//! the finisher writes the manifest, the page is half of the necessary listing. A finisher that finds no manifest stops
+//! for any script without a result, because a missing manifest covers nothing. The more results there are, the more
+//! likely it stops, so that few finishers write a first manifest.
 //!
 //! Invariant: a manifest is written from a page only if the page was listed after the manifest that it replaces was
-//! read. The writer of a manifest leaves for a frame only if the page was listed after that manifest was put.
+//! read. The writer of a manifest stops for a frame only if the page was listed after that manifest was put.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -21,12 +21,12 @@ use crate::reconcile::ReceiptFound;
 use crate::store::{ETag, PAGE, Store};
 use crate::{Clock, Result};
 
-/// The number of results missing from the manifest above which there is a crowd: one listing should then serve many
+/// The number of results missing from the manifest above which a finisher pauses, so that one listing serves many
 /// finishers.
 const CROWD: usize = 8;
 
-/// The number of frames above which the first manifest is worth a pause, in which more of them are drawn. A finisher
-/// that finds in this manifest a frame to come leaves.
+/// The number of frames above which a finisher pauses before it writes the first manifest, so that more frames are
+/// drawn meanwhile. A finisher that finds a frame to come in this manifest stops.
 const MANY: u64 = 300;
 
 /// One page of a listing, with all receipts of an animation.
@@ -40,7 +40,7 @@ pub(crate) struct Page {
 /// The next step of a finisher.
 #[derive(Debug)]
 pub(crate) enum Next {
-    /// The finisher leaves, because another frame is to come.
+    /// The finisher stops, because another frame is to come.
     Leave,
     /// The finisher waits, reads the manifest again, and lists.
     Wait,
@@ -155,8 +155,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(if leaves { Next::Leave } else { Next::Wait })
     }
 
-    /// Returns whether a frame in the beginning of a manifest is to come, if very many finishers have found another one
-    /// drawn. Few of them write the manifest.
+    /// Returns whether a frame in the beginning of a manifest is to come. It is for the case that very many finishers
+    /// found another frame drawn, so that few of them write the manifest.
     async fn is_awaited_by_a_crowd(
         &self,
         animation: &Animation,
@@ -205,7 +205,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(observation.map_or(Next::Wait, |observation| Next::Write(Box::new(observation))))
     }
 
-    /// Lists all receipts of an animation; `None` if they are more than a page.
+    /// Lists all receipts of an animation. Returns `None` if they exceed a page.
     async fn page(&self, animation: &Animation, known: Option<&Known>) -> Result<Option<Page>> {
         let has_parts =
             known.is_some_and(|known| known.manifest.frames.iter().any(|frame| frame.part.is_some()));

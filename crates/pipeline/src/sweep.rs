@@ -1,10 +1,11 @@
-//! The sweep heals what events cannot: events that were lost, retries that ran out, writes that landed after their
+//! The sweep repairs what events cannot: lost events, retries that ran out, and writes that took effect after their
 //! writer was killed.
 //!
 //! It visits every animation that has a script or a manifest, finished or not, and compares the manifest and the GIF
-//! with a listing. It wakes pending frames of an animation in which nothing has happened for a while, by objects below
-//! `retries/`, gives a frame up with an error receipt after a bounded number of wakings, claims wherever manifest or
-//! GIF differ from the listing, and deletes what has long been superseded or set aside. It never writes below `scripts/`.
+//! with a listing. If nothing has happened in an animation for a while, it triggers the pending frames by objects below
+//! `retries/`. After a limited number of triggers it gives a frame up with an error receipt. It writes a claim if
+//! manifest or GIF differ from the listing. It deletes objects that were superseded or set aside long ago. It never
+//! writes below `scripts/`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU64;
@@ -22,7 +23,7 @@ use crate::store::{ETag, ListRequest, Store};
 use crate::wake_count::WakeCount;
 use crate::{Clock, Result, Timestamp};
 
-/// The number of animations that are visited side by side.
+/// The number of animations that are visited in parallel.
 const VISITS: usize = 8;
 
 /// The result of a sweep.
@@ -32,33 +33,34 @@ pub struct Swept {
     pub visits: Vec<(Animation, Result<Visit>)>,
     /// Keys below `scripts/` that are meant as scripts but belong to no animation, with the reason.
     pub rejected: Vec<(String, &'static str)>,
-    /// Old manifests, set aside because they could not be read, that were deleted.
+    /// The number of deleted manifests that had been set aside because they could not be read.
     pub cleared: u64,
-    /// Animations that there was no time left for.
+    /// The number of animations for which there was no time left.
     pub unvisited: usize,
 }
 
 /// The result of a sweep for one animation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Visit {
-    /// Frames that were woken.
+    /// The number of frames that were triggered.
     pub woken: u64,
-    /// Frames that were given up.
+    /// The number of frames that were given up.
     pub given_up: u64,
     /// A claim was put.
     pub claimed: bool,
-    /// Superseded objects that were deleted.
+    /// The number of superseded objects that were deleted.
     pub deleted: u64,
 }
 
-/// The pause between wakings doubles no more than so often.
+/// The maximum number of times that the pause between triggers doubles.
 const MAX_DOUBLINGS: u64 = 6;
 
 /// Visits each animation in the bucket.
 ///
 /// # Errors
 ///
-/// When the animations cannot be listed. An error of one of them is in its visit, and the others go on.
+/// Fails if the animations cannot be listed. An error of one animation is in its visit, and the others are still
+/// visited.
 pub async fn sweep<S: Store, C: Clock>(invocation: &Invocation<'_, S, C>) -> Result<Swept> {
     invocation.sweep().await
 }
@@ -160,7 +162,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(visit)
     }
 
-    /// Returns whether this sweep may delete results that may have to be drawn again: only while it has the lease.
+    /// Returns whether this sweep may delete results that may have to be drawn again, which it may only while it has
+    /// the lease.
     async fn may_delete(&self, animation: &Animation, lease: &mut Option<SweepLease>) -> Result<bool> {
         if lease.is_none() {
             *lease = Some(match self.take_sweep_lease(animation).await? {
@@ -177,8 +180,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.clock.now().since(modified) >= self.policy.superseded_after
     }
 
-    /// Wakes pending frames, or gives them up. A frame that a dead sweep may have deleted is woken however
-    /// new its script is.
+    /// Triggers pending frames, or gives them up. A frame that a dead sweep may have deleted is triggered however new
+    /// its script is.
     async fn wake(
         &self,
         animation: &Animation,
@@ -234,7 +237,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(())
     }
 
-    /// Fails a frame whose files have not come.
+    /// Fails a frame whose files have not arrived.
     async fn give_up_waiting(&self, animation: &Animation, frame: &Frame, fault: &Fault) -> Result<()> {
         let unknown = || Reason::new(format!("{}.txt names a file that has not come", frame.script));
         let reason = fault.reason.clone().unwrap_or_else(unknown);
@@ -242,7 +245,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put_fault(animation, &frame.script, &tag, frame.part, &reason).await.map(drop)
     }
 
-    /// Deletes the receipts that say that attempts at these frames have begun.
+    /// Deletes the receipts of begun attempts at these frames.
     async fn forget_attempts(
         &self,
         animation: &Animation,
@@ -260,7 +263,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         stream::iter(deletions).buffer_unordered(self.policy.concurrency).try_collect().await
     }
 
-    /// When a script was uploaded or a result written last: while that goes on nothing is stuck, only queued.
+    /// Returns the time when a script was last uploaded or a result last written. While that continues, frames are not
+    /// stuck, only queued.
     fn last_progress(&self, observation: &Observation) -> Timestamp {
         let results = observation.results.receipts.iter().map(|found| found.modified).max();
         observation.newest_script().max(results).unwrap_or_default()
@@ -290,7 +294,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(Step::Woken)
     }
 
-    /// Deletes error receipts that cannot be read, and has their frames drawn again; says whether there were any.
+    /// Deletes error receipts that cannot be read, and has their frames drawn again. Returns whether there were any.
     async fn heal_receipts(
         &self,
         animation: &Animation,
@@ -335,7 +339,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(true)
     }
 
-    /// Wakes an invocation for a frame.
+    /// Triggers an invocation for a frame.
     pub(crate) async fn put_retry(
         &self,
         animation: &Animation,
@@ -351,7 +355,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.put(&key, body.to_string().into()).await.map(drop)
     }
 
-    /// Deletes results of versions that are no longer current, once they are old, and the parts that led to them.
+    /// Deletes old results of versions that are no longer current, and the parts that led to them.
     async fn tidy(
         &self,
         animation: &Animation,
@@ -441,8 +445,8 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.wake_returned(animation, &gone, visit).await
     }
 
-    /// A script may have come back to a version while the results of that were being deleted, and its event may have
-    /// found the result still there: wakes each frame that is current again.
+    /// Triggers each frame that is current again. A script may have returned to a version while the results of that
+    /// version were being deleted, and its event may have found the result before it was deleted.
     async fn wake_returned(
         &self,
         animation: &Animation,
@@ -487,7 +491,7 @@ fn used_pixels(manifest: &Manifest) -> BTreeMap<(&ScriptName, Part), u32> {
     drawn.collect()
 }
 
-/// The script and version that a part, or a part's receipt, belongs to.
+/// Returns the script and version of a part, or of a part's receipt.
 fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     match key {
         Key::Part { name, tag, .. } | Key::Band { name, tag, .. } | Key::Wake { name, tag, .. } => {
@@ -506,7 +510,7 @@ fn part_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     }
 }
 
-/// The script and version that a key is about which the sweep may delete.
+/// Returns the script and version of a key that the sweep may delete.
 fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     match key {
         Key::Receipt {
@@ -526,14 +530,14 @@ fn version_of(key: &Key) -> Option<(&ScriptName, &ETag)> {
     }
 }
 
-/// Returns whether the key says that there is something below a script's version, or below `parts/`, that a listing
-/// of the results does not show.
+/// Returns whether the key means that there are objects below a script's version, or below `parts/`, that a listing of
+/// the results does not show.
 fn tells_of_parts(key: &Key) -> bool {
     use Receipt::{Cut, Files, Split};
     matches!(key, Key::Receipt { receipt: Split { .. } | Cut { .. } | Files { .. }, .. })
 }
 
-/// The frame that a cut or a band belongs to.
+/// Returns the frame of a cut or a band.
 fn banded_frame(found: &ReceiptFound) -> Option<(&ScriptName, &ETag, Part)> {
     match &found.receipt {
         Receipt::Cut { name, tag, part, .. } | Receipt::Band { name, tag, part, .. } => {
@@ -543,8 +547,8 @@ fn banded_frame(found: &ReceiptFound) -> Option<(&ScriptName, &ETag, Part)> {
     }
 }
 
-/// Returns the manifest that a claim names when no one commits: the revision that stands, and
-/// the generation that should.
+/// Returns the manifest that a claim names if no invocation commits: the current revision, with the generation that it
+/// should have.
 fn claimable(observed: &Manifest, known: Option<&Known>) -> Manifest {
     let mut head = observed.head.clone();
     head.revision = known.map_or(0, |known| known.manifest.head.revision);

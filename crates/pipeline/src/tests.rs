@@ -1,5 +1,5 @@
-//! Steps on a store in memory in which another client meddles at the worst moment: one test for each rule
-//! that only then shows.
+//! Steps on a memory store in which another client acts at the worst moment. There is one test for each rule that
+//! matters only then.
 
 mod assemblies;
 mod bands;
@@ -41,7 +41,7 @@ use crate::{
     record_failure, render_frame,
 };
 
-/// Jumps to each moment that a task waits for.
+/// A clock that jumps to each time that a task waits for.
 #[derive(Debug, Clone)]
 struct JumpingClock(Arc<AtomicU64>);
 
@@ -57,10 +57,10 @@ impl Clock for JumpingClock {
 
 type Meddler = Box<dyn FnMut(&str, &mut Bucket, Timestamp) + Send>;
 
-/// Answers a request that is named like `put frames/…` with an error, and nothing is done.
+/// Answers a request with a name such as `put frames/…` with an error. The request has no effect.
 type Refuser = Box<dyn FnMut(&str) -> Option<Error> + Send>;
 
-/// A bucket in which another client acts before a request that is named like `put frames/…`.
+/// A bucket in which another client acts before a request with a name such as `put frames/…`.
 struct Meddled {
     bucket: Arc<Mutex<Bucket>>,
     clock: JumpingClock,
@@ -122,7 +122,7 @@ impl Store for Meddled {
     }
 }
 
-/// Bytes of a part of an upload.
+/// The number of bytes of a part of an upload.
 const PART: usize = 8;
 
 /// An upload in pieces. Its requests are named `part`, `finish` and `abort`.
@@ -188,7 +188,7 @@ impl Upload for Pieces {
 /// The bands of a frame that is too big.
 const BANDS: NonZeroU64 = NonZeroU64::new(3).unwrap();
 
-/// Lists frames, and takes its time.
+/// A renderer that lists frames, and takes time for it.
 #[derive(Clone)]
 struct Joiner {
     clock: JumpingClock,
@@ -201,7 +201,7 @@ struct Joiner {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trouble {
     Begin,
-    /// At the beginning of this kind of file.
+    /// The encoder refuses at the beginning of this kind of file.
     Output(Container),
     Suspend,
     Finish,
@@ -267,7 +267,7 @@ struct World {
     random: Randomness,
     policy: Policy,
     requests: AtomicU64,
-    /// When the platform ends whatever runs.
+    /// The time at which the platform ends the invocation.
     deadline: Option<Timestamp>,
 }
 
@@ -295,7 +295,7 @@ impl World {
         bucket.put(self.store.clock.now(), key, body, PutOptions::always()).unwrap()
     }
 
-    /// A GIF that says of which set it is.
+    /// Puts a GIF with the generation of a set.
     fn put_gif(&self, generation: &str) {
         let metadata: Metadata = [("generation".to_owned(), generation.to_owned())].into();
         let options = PutOptions { metadata, ..PutOptions::always() };
@@ -342,7 +342,7 @@ impl World {
             .await
     }
 
-    /// Takes no time, and has no trouble.
+    /// Returns a joiner that takes no time and never fails.
     fn joiner(&self) -> Joiner {
         Joiner { clock: self.store.clock.clone(), takes: Duration::ZERO, trouble: None }
     }
@@ -352,7 +352,7 @@ impl World {
         Ok(assembled.expect("nobody else is at it"))
     }
 
-    /// `None` if another assembler is at it.
+    /// Returns `None` if another assembler works on it.
     async fn try_assemble(&self, joiner: &Joiner, claim: &str) -> Result<Option<Assembled>> {
         self.with(async |invocation| assemble(invocation, joiner, claim).await).await
     }
@@ -396,7 +396,7 @@ async fn a_gif_skips_no_frame_that_is_gone() {
     assert_eq!((assembled.built, assembled.status), (0, Status::Rendering));
 }
 
-/// Deletes everything but this.
+/// Deletes all objects but this one.
 fn delete_all_but(bucket: &mut Bucket, kept: &str) {
     let keys: Vec<String> = bucket.keys().filter(|key| *key != kept).map(str::to_owned).collect();
     for key in keys {
@@ -501,7 +501,7 @@ async fn a_retry_counts_anew_and_the_manifest_says_so_at_once() {
     assert_eq!((head.status, head.pending), (Status::Rendering, 1), "not failed any more");
 }
 
-/// Their events came while another version of the script was current, and drew nothing.
+/// The events of these parts came while another version of the script was current, and drew nothing.
 #[tokio::test]
 async fn parts_from_before_the_upload_are_put_again() {
     let world = World::new();

@@ -1,4 +1,5 @@
-//! The number of times that frames were woken, by the objects below `retries/` and the receipts of those that began.
+//! The number of times that frames were triggered, from the objects below `retries/` and the receipts of those that
+//! began.
 
 use std::collections::BTreeMap;
 
@@ -8,18 +9,18 @@ use crate::observe::Observation;
 use crate::store::{ETag, ListRequest, Listed, Store};
 use crate::{Clock, Result, Timestamp};
 
-/// The number of times that a frame was woken, and the last of them.
+/// The number of times that a frame was triggered, and the last of them.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct WakeCount {
     /// The last one's number.
     pub(crate) attempts: u64,
     pub(crate) last: Timestamp,
-    /// To how many of them an invocation has begun. The others may wait behind a thousand frames.
+    /// The number of triggers for which an invocation has begun. The others may wait behind a thousand frames.
     pub(crate) begun: u64,
 }
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Returns how often each frame of an animation was woken.
+    /// Returns how often each frame of an animation was triggered.
     pub(crate) async fn wakings(
         &self,
         animation: &Animation,
@@ -41,7 +42,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok(wakings)
     }
 
-    /// The objects below `retries/<animation>/` that are this animation's, not one's below it.
+    /// Lists the objects below `retries/<animation>/` that belong to this animation, and not to one below it.
     pub(crate) async fn retries(&self, animation: &Animation) -> Result<Vec<Listed>> {
         let mut listed = self.list_ranges(ListRequest::all(animation.retries()), Vec::new()).await?;
         listed.retain(|listed| listed.key.parse::<Key>().is_ok_and(|key| key.animation() == animation));

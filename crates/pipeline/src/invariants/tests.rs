@@ -22,7 +22,7 @@ fn frame(script: &str, number: u64, state: FrameState) -> Frame {
     Frame { script: ScriptName::new(script).unwrap(), version: ETag::new("v"), part: part(number), state }
 }
 
-/// Three scripts, one of them two frames, of which one is drawn, two are to come, and one cannot be drawn.
+/// Three scripts, one of which has two frames. One frame is drawn, two are to come, and one cannot be drawn.
 fn sound() -> Manifest {
     let nothing = (&Scripts::default(), &Results::default());
     let mut manifest = reconcile(&animation("film"), nothing.0, nothing.1, &Settings::absent());
@@ -46,7 +46,7 @@ fn broken(next: &Manifest, before: Option<&Manifest>) -> Option<&'static str> {
     }
 }
 
-/// The rule that a sound manifest breaks once it is changed so, over the one before it.
+/// Returns the rule that a valid manifest breaks after this change, given its predecessor.
 fn broken_by(change: impl FnOnce(&mut Manifest)) -> Option<&'static str> {
     let (mut before, mut next) = (sound(), sound());
     before.head.revision = 4;

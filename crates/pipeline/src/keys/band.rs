@@ -5,7 +5,7 @@ use std::fmt;
 use std::num::NonZeroU64;
 use std::ops::Range;
 
-/// One of the bands that a frame is cut into, which are as high as each other but for a row.
+/// One of the bands into which a frame is cut. Their heights differ by at most one row.
 ///
 /// ```
 /// use rayfold_pipeline::keys::Band;
@@ -26,7 +26,7 @@ impl Band {
         (1..=count.get()).filter_map(NonZeroU64::new).map(move |number| Band { number, of: count })
     }
 
-    /// Its place from the top, counted from 1.
+    /// Returns its number, counted from 1 at the top.
     pub fn number(self) -> NonZeroU64 {
         self.number
     }

@@ -1,4 +1,4 @@
-//! Keys as events carry them: form-encoded, with `+` for a blank.
+//! Keys in events: form-encoded, with `+` for a space.
 
 use percent_encoding::percent_decode;
 

@@ -10,21 +10,21 @@ use crate::store::ETag;
 /// The digits of the hash in a version.
 const SET_DIGITS: usize = 16;
 
-/// A hash of a file's name: ten hexadecimal digits.
+/// The hash of a file's name: ten hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NameHash(String);
 
-/// A hash of a file's entity tag: eight hexadecimal digits.
+/// The hash of a file's entity tag: eight hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VersionHash(String);
 
 /// A file in a receipt, and its version, or `None` if it was absent.
 pub type Entry = (NameHash, Option<VersionHash>);
 
-/// A part of a set, as the end of a receipt's key has it: `files-<i>-of-<n>-<entries>`.
+/// A part of a set, in the form of the end of a receipt's key: `files-<i>-of-<n>-<entries>`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FileList {
-    /// The place of the receipt among those of its set, from 1.
+    /// The number of the receipt within its set, from 1.
     pub number: NonZeroU64,
     /// The number of receipts of the set.
     pub of: NonZeroU64,
@@ -58,13 +58,13 @@ fn is_hash(text: &str) -> bool {
 }
 
 impl ETag {
-    /// Returns the version of a script with this entity tag that is drawn from a set of files.
+    /// Returns the version of a script with this entity tag, drawn from a set of files.
     pub(crate) fn with_files(&self, set: &[Entry]) -> Self {
         let text: String = set.iter().map(entry_text).collect();
         ETag::new(&format!("{self}+{}", digits(text.as_bytes(), SET_DIGITS)))
     }
 
-    /// Returns the entity tag of the script that this is a version of, without the hash of its files.
+    /// Returns the entity tag of the script in a version, without the hash of its files.
     ///
     /// ```
     /// use rayfold_pipeline::store::ETag;
@@ -78,7 +78,7 @@ impl ETag {
         }
     }
 
-    /// Whether it is the version of a script with a set of files.
+    /// Returns whether the version is that of a script with a set of files.
     pub fn has_files(&self) -> bool {
         self.script() != self.as_str()
     }

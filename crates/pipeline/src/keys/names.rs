@@ -1,5 +1,5 @@
-//! Keys that users and their programs write: one that is no script or settings has no [`Key`], but may
-//! still have a meaning.
+//! Keys that users and their programs write. A key that is no script or settings has no [`Key`], but may still have a
+//! meaning.
 
 use rayfold_scene::Name;
 use rayfold_scene::assets::file_name;
@@ -14,21 +14,22 @@ pub enum Uploaded {
     Script(Animation, ScriptName),
     /// The settings of an animation.
     Settings(Animation),
-    /// An object that is meant as a script of an animation but has a key that the pipeline cannot
-    /// take: the animation fails.
+    /// An object that is meant as a script of an animation but has a key that the pipeline cannot use. The animation
+    /// fails.
     Rejected(Animation, &'static str),
-    /// An object that is not named as scripts and settings are: it is not read, and the manifest warns of it.
+    /// An object with almost the name of a script or of the settings. It is not read, and the manifest contains a
+    /// warning.
     NearMiss(Animation, &'static str),
     /// An object that belongs to no animation although it is meant as a part of one.
     Misplaced(&'static str),
     /// An object in an animation's folder that its scripts may name.
     File(Animation, String),
-    /// An object without meaning: a leftover of a system in a folder.
+    /// An object without meaning, such as a file that an operating system leaves in a folder.
     Nothing,
 }
 
 impl Uploaded {
-    /// Classifies an object by its key and size. An object that is not below `scripts/` is nothing.
+    /// Classifies an object by its key and size. An object that is not below `scripts/` has no meaning here.
     ///
     /// ```
     /// use rayfold_pipeline::keys::Uploaded;
@@ -64,12 +65,12 @@ impl Uploaded {
         }
     }
 
-    /// Whether a key is that of a file that scripts may name.
+    /// Returns whether a key is that of a file that scripts may name.
     pub fn is_file(key: &str) -> bool {
         matches!(Self::of(key, 1), Self::File(..))
     }
 
-    /// The animation to which it makes a difference.
+    /// Returns the animation that it concerns.
     pub fn animation(self) -> Option<Animation> {
         match self {
             Self::Script(animation, _)
@@ -91,7 +92,7 @@ fn with(animation: Result<Animation>, class: impl FnOnce(Animation) -> Uploaded)
 }
 
 /// Returns the problem with the place of an object that is meant as a part of an animation but belongs to none,
-/// wherever it lies in the bucket.
+/// wherever in the bucket it is.
 pub fn misplaced(key: &str, bytes: u64) -> Option<&'static str> {
     if key.starts_with(SCRIPTS) {
         return match Uploaded::of(key, bytes) {
@@ -109,9 +110,9 @@ pub fn misplaced(key: &str, bytes: u64) -> Option<&'static str> {
     (is_like_scripts && is_meant).then_some("expected a key that begins with scripts/, in small letters")
 }
 
-/// Returns whether an object below `scripts/` goes when the animation is removed: its scripts and settings,
-/// also those that are misnamed, and leftovers of systems beside them. An object in the folder of one of
-/// the `others` does not.
+/// Returns whether an object below `scripts/` is deleted when the animation is removed. These are its scripts and
+/// settings, also misnamed ones, and files that operating systems leave beside them. An object in the folder of one of
+/// the `others` is not deleted.
 pub fn goes_with(animation: &Animation, key: &str, others: &[Animation]) -> bool {
     let Some(path) = key.strip_prefix(&animation.scripts()) else { return false };
     let Some((folders, file)) = path.rsplit_once('/') else {

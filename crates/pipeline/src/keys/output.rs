@@ -1,4 +1,4 @@
-//! The parts of keys that name a file which is made of an animation.
+//! The parts of keys that name an output of an animation.
 
 use rayfold_scene::Container;
 
@@ -7,12 +7,12 @@ use super::Generation;
 /// The start of the name of a mark.
 const MARK: &str = "@output.";
 
-/// Returns the name of the object that says that there may be such a file.
+/// Returns the name of the mark object: it records that there may be such a file.
 pub(super) fn mark(output: Container) -> String {
     format!("{MARK}{}", output.ending())
 }
 
-/// Reads `<animation>/@output.<ending>`. A script's receipt has a tag after the `@`, which holds a dash.
+/// Parses `<animation>/@output.<ending>`. A script's receipt has a tag after the `@`, which contains a hyphen.
 pub(super) fn of_mark(rest: &str) -> Option<(&str, Container)> {
     let (animation, file) = rest.rsplit_once('/')?;
     Some((animation, file.strip_prefix(MARK)?.parse().ok()?))

@@ -106,7 +106,8 @@ fn every_kind_of_key_reads_back() {
     }
 }
 
-/// An error receipt of a script whose name starts with `@` was taken for a refusal, and the script was pending for ever.
+/// An error receipt of a script whose name starts with `@` was mistaken for a refusal, and the script stayed pending
+/// for ever.
 #[test]
 fn names_that_start_with_an_at_sign_have_receipts_like_all_others() {
     let generation = "0a".repeat(16);
@@ -166,7 +167,8 @@ fn tags_may_hold_anything() {
     }
 }
 
-/// A script that was called like another one's cut, and was split, was never done: its own receipt was not understood.
+/// A script whose name looks like another script's cut, and which was split, was never done, because its own receipt
+/// was not recognised.
 #[test]
 fn names_that_end_like_receipts_have_receipts_of_their_own() {
     let two = NonZeroU64::new(2).unwrap();

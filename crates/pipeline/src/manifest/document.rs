@@ -1,8 +1,7 @@
-//! The manifest as bytes: the contents of its first line, and the position of a frame's line, so that neither
-//! needs all of it.
+//! The manifest as bytes. A reader can read the first line, or find the line of a frame, without all of the document.
 //!
-//! The first line is the [`Head`] and the `places`: for a script every so many bytes, the byte after the second
-//! line's end at which the lines about it begin. A reader that needs one frame reads the beginning, and then the few
+//! The first line is the [`Head`] with the `places`. At regular distances, a place is a script and the offset of its
+//! lines, counted from the end of the second line. A reader that needs one frame reads the beginning, and then the few
 //! lines between two places.
 
 use std::ops::Range;
@@ -17,14 +16,15 @@ use crate::{Error, Result};
 /// The second line, after which the frames follow.
 const FRAMES: &str = "\"frames\":[\n";
 
-/// The most frames to come that a large manifest lists at its beginning, if they take no more than an eighth of the
-/// bytes that a reader begins with.
+/// The maximum number of pending frames that a large manifest lists at its beginning. They also take at most an eighth
+/// of the bytes that a reader reads first.
 const MAX_AWAITED: usize = 32;
 
-/// The most places that a manifest tells: with them its head does not grow with the number of frames.
+/// The maximum number of places in a manifest, so that its head does not grow with the number of frames.
 const MAX_PLACES: usize = 200;
 
-/// The last revision that every reader of JSON counts to. At a thousand a second it is 285,000 years away.
+/// The largest revision that every reader of JSON represents exactly. At a thousand revisions per second it is 285,000
+/// years away.
 const LAST_REVISION: u64 = 1 << 53;
 
 /// The offset at which the lines of a frame begin.
@@ -39,10 +39,10 @@ struct Place {
 /// The content of the first bytes of a document.
 #[derive(Debug, Clone)]
 pub(crate) struct Beginning {
-    /// All but the frames.
+    /// All data but the frames.
     pub(crate) head: Head,
     places: Vec<Place>,
-    /// Some of the frames to come.
+    /// Some of the pending frames.
     pub(crate) awaited: Vec<Frame>,
     frames_at: u64,
 }
@@ -67,12 +67,12 @@ struct Places {
 }
 
 impl Manifest {
-    /// The document. If its frames take more than half of `glimpse`, the bytes that a reader begins with, the head tells
-    /// places, at least an eighth of it apart, and some frames to come.
+    /// Encodes the document. If its frames take more than half of `glimpse`, the number of bytes that a reader reads
+    /// first, the head contains places, at least an eighth of `glimpse` apart, and some pending frames.
     ///
     /// # Errors
     ///
-    /// [`Error::Malformed`] when it cannot be written as JSON.
+    /// [`Error::Malformed`] if it cannot be written as JSON.
     pub fn encode(&self, glimpse: u64) -> Result<Bytes> {
         let key = self.head.animation.manifest();
         let malformed =
@@ -117,7 +117,7 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// [`Error::Malformed`] when it is none, or of a later schema.
+    /// [`Error::Malformed`] if it is no manifest, or of a later schema.
     pub fn decode(animation: &Animation, body: &[u8]) -> Result<Self> {
         let malformed = |source| Error::Malformed { key: animation.manifest(), source };
         let beginning = Beginning::decode(animation, body)?;
@@ -137,11 +137,11 @@ impl Manifest {
 }
 
 impl Beginning {
-    /// Reads the first bytes of a document; `None` when the head is longer.
+    /// Decodes the first bytes of a document. Returns `None` if the head is longer.
     ///
     /// # Errors
     ///
-    /// [`Error::Malformed`] when they are none, or of a later schema.
+    /// [`Error::Malformed`] if they are no manifest, or of a later schema.
     pub(crate) fn decode(animation: &Animation, body: &[u8]) -> Result<Option<Self>> {
         let malformed = |source| Error::Malformed { key: animation.manifest(), source };
         let Some(end) = body.iter().position(|byte| *byte == b'\n') else { return Ok(None) };
@@ -166,8 +166,8 @@ impl Beginning {
         Ok(Some(Beginning { head, places, awaited, frames_at: frames_at as u64 }))
     }
 
-    /// The bytes in which the lines about a script's frame are, if there are any, in a document of `size` bytes; without a
-    /// number those about its first or only frame.
+    /// Returns the range of bytes that contains the lines about a script's frame, if there are any, in a document of
+    /// `size` bytes. Without a number these are the lines about its first or only frame.
     pub(crate) fn lines_of(&self, name: &ScriptName, part: Part, size: u64) -> Range<u64> {
         let number = part.map_or(1, std::num::NonZeroU64::get);
         let is_before = |place: &Place| {
@@ -182,11 +182,11 @@ impl Beginning {
     }
 }
 
-/// The frames of whole lines of a document.
+/// Decodes the frames in whole lines of a document.
 ///
 /// # Errors
 ///
-/// [`Error::Malformed`] when they are no frames.
+/// [`Error::Malformed`] if they are no frames.
 pub(crate) fn frames_of(animation: &Animation, lines: &[u8]) -> Result<Vec<Frame>> {
     let lines = lines.split(|byte| *byte == b'\n').map(|line| line.strip_suffix(b",").unwrap_or(line));
     lines
@@ -205,7 +205,7 @@ mod tests {
     use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
     use crate::store::ETag;
 
-    /// Scripts of all lengths of names, some with parts.
+    /// Scripts with names of all lengths, some of them with parts.
     fn manifest(scripts: usize) -> Manifest {
         let animation = Animation::new("film").unwrap();
         let found = (0..scripts).map(|n| ScriptFound {
@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// The frames are spread over all of them, and never so many that the head does not fit the first read.
+    /// The listed frames are spread over all frames, and never so many that the head exceeds the first read.
     #[test]
     fn the_beginning_of_a_large_document_tells_some_frames_to_come() {
         let manifest = manifest(60);

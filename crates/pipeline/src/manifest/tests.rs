@@ -1,4 +1,4 @@
-//! The text of a manifest, its summary, and the facts that it carries over.
+//! Tests of the text of a manifest, its head, and the facts that are carried over.
 
 use super::*;
 use crate::reconcile::{Results, ScriptFound, Scripts, reconcile};
@@ -38,7 +38,7 @@ fn a_manifest_remembers_when_a_script_was_last_gone() {
     assert!(manifest(&["1"], Some(4)).agrees_with(&manifest(&["1"], None)));
 }
 
-/// Each with one thing changed, and whether that makes it another manifest.
+/// Manifests with one change each, and whether they then count as different.
 fn changes() -> Vec<(&'static str, bool, Manifest)> {
     let fault = |receipt: &str, reason: Option<&str>| Fault {
         receipt: ETag::new(receipt),
@@ -75,7 +75,7 @@ fn changes() -> Vec<(&'static str, bool, Manifest)> {
     changes
 }
 
-/// One that has some of everything.
+/// A manifest with some of everything.
 fn full() -> Manifest {
     let mut manifest = manifest(&["1", "2"], Some(4));
     let fault = |receipt: &str| Fault { receipt: ETag::new(receipt), reason: None };
@@ -189,7 +189,7 @@ fn of_many_diagnostics_the_first_are_repeated_and_the_others_counted() {
     assert_eq!(shortened.clone().shortened(), shortened);
 }
 
-/// People read each line, and each reader of a large manifest pays for it.
+/// Each line must stay short, because people read it, and each reader of a large manifest fetches it.
 #[test]
 fn a_document_leaves_out_what_says_nothing() {
     let json = |reason: &Reason| serde_json::to_string(reason).unwrap();

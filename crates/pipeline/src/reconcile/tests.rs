@@ -1,7 +1,7 @@
 //! The rules of `docs/pipeline.md`, row by row: each test turns a listing into a manifest.
 //!
-//! A listing is the keys as they lie in the bucket, with a version after each script: `1.txt a`. The manifest is
-//! written in short: its status, and for each frame script, version, part and state.
+//! A listing is written as the keys in the bucket, with a version after each script: `1.txt a`. The manifest is written
+//! in short: its status, and for each frame script, version, part and state.
 
 use super::*;
 use crate::Randomness;
@@ -84,7 +84,7 @@ fn a_version_resolves_to_a_split_a_frame_or_an_error_in_this_order() {
     check(all, "", "rendering, 1/1 a pending, 1/2 a pending");
 }
 
-/// A frame that waits is no failure, and one that came after all beats the receipt that says so.
+/// A waiting frame is no failure. A frame that is drawn after all takes precedence over the receipt that it waits.
 #[test]
 fn a_frame_that_waits_for_files_counts_as_neither_failed_nor_pending() {
     let waits = "1.txt a\n1@a-p1.waits.json\n2.txt b\n";

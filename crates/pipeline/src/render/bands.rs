@@ -1,19 +1,19 @@
-//! A frame that is too big for one invocation is drawn in bands by several. The invocation that finds all
-//! bands puts them together.
+//! A frame that is too big for one invocation is drawn in bands by several. The invocation that finds all bands joins
+//! them.
 //!
-//! 1. An invocation that finds a frame too big records it in a receipt, `cut-<k>`, and wakes an invocation for each
-//!    band by an object below `parts/`. An invocation that sees that receipt does not measure or cut again; of two
-//!    cuts that were made at once the finer one counts.
-//! 2. Each puts its band below `frames/`, only if absent, and lists what there is of the frame. If all bands of its cut are
-//!    there it puts them together, and puts the frame as if it had been drawn in one piece: nothing behind that knows of bands.
-//! 3. An invocation that is woken for the frame itself wakes the bands that are missing, or puts
-//!    together what is there.
+//! 1. An invocation that finds a frame too big records it in a receipt, `cut-<k>`, and triggers an invocation for each
+//!    band by an object below `parts/`. An invocation that sees that receipt does not measure or cut again. If two cuts
+//!    were made at once, the finer one counts.
+//! 2. Each invocation puts its band below `frames/`, only if absent, and lists the receipts of the frame. If all bands
+//!    of its cut exist, it joins them, and puts the frame as if it had been drawn in one piece. Later steps do not know
+//!    of bands.
+//! 3. An invocation that is triggered for the frame itself triggers the missing bands, or joins them if all exist.
 //!
-//! A band's key has its script's version and the pixel version, so that bands of different pictures cannot meet; and
-//! a band is never cut. The renderer alone knows the rows of a band and its contents.
+//! A band's key contains the script's version and the pixel version, so bands of different pictures are never joined. A
+//! band is never cut. Only the renderer knows the rows and the contents of a band.
 //!
-//! Invariant: an invocation that leaves has listed after its own band was put, so the last one to put its band
-//! finds all of them.
+//! Invariant: an invocation stops only after a listing that it started after its own band was put. So the last one to
+//! put its band finds all bands.
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -31,30 +31,30 @@ use crate::reconcile::ReceiptFound;
 use crate::store::Store;
 use crate::{Clock, Error, Result};
 
-/// A frame being put together: bands in from the top, the frame's file out.
+/// Joins a frame: takes the bands from the top, and returns the frame's file.
 pub trait BandJoiner: Send {
     /// Adds the next band, as it was drawn.
     ///
     /// # Errors
     ///
-    /// Why it is no such band; then nothing was added.
+    /// Returns the reason if it is no such band; then nothing was added.
     fn push(&mut self, band: Bytes) -> impl Future<Output = Result<(), Reason>> + Send;
 
-    /// Gives the frame: the very bytes that it has when it is drawn in one piece.
+    /// Returns the frame's file: the same bytes as if it had been drawn in one piece.
     ///
     /// # Errors
     ///
-    /// The reason why there is none; it would be the same next time.
+    /// Returns the reason if there is none, which would be the same next time.
     fn finish(self) -> impl Future<Output = Result<Bytes, Reason>> + Send;
 }
 
-/// The rows that an event is about, and the retry that woke it.
+/// The rows that an event is about, and the retry that triggered it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Woken {
     pub(crate) band: Band,
     /// The pixel version of the renderer that cut the frame.
     pub(crate) pixels: u32,
-    /// The number of the retry's attempt; 0 if the invocation that cut the frame woke it.
+    /// The number of the retry's attempt; 0 if the invocation that cut the frame triggered it.
     pub(crate) attempt: u64,
 }
 
@@ -83,7 +83,7 @@ impl Bands {
         bands
     }
 
-    /// Into how many bands the frame is cut.
+    /// The number of bands into which the frame is cut.
     pub(crate) fn cut(&self) -> Option<NonZeroU64> {
         self.cut
     }
@@ -93,11 +93,11 @@ impl Bands {
     }
 }
 
-/// The result of a band's event: there is nothing to fold as long as others are to come.
+/// Returns the result of a band's event. As long as other bands are to come, there is nothing to fold.
 type Came = (Outcome, Option<Fact>);
 
 impl<S: Store, C: Clock> Invocation<'_, S, C> {
-    /// Says that a frame is cut, and wakes an invocation for each band.
+    /// Records that a frame is cut, and triggers an invocation for each band.
     pub(crate) async fn cut(&self, subject: &Subject, tag: &Tag, count: NonZeroU64) -> Result<()> {
         let Subject { animation, name, part, .. } = subject;
         let cut = Receipt::Cut { name: name.clone(), tag: tag.clone(), part: *part, count };
@@ -105,7 +105,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         self.wake_bands(subject, tag, Band::all(count).collect(), 0).await
     }
 
-    /// Works on an event of a frame that is cut already: wakes its missing bands, or puts it together.
+    /// Works on an event of a frame that is cut already: triggers its missing bands, or joins it.
     pub(crate) async fn follow_cut<R: Renderer>(
         &self,
         renderer: &R,
@@ -132,7 +132,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         Ok((Outcome::Cut(count), Some(fact)))
     }
 
-    /// Draws a band, unless it is there, and puts the frame together if it was the last one.
+    /// Draws a band, unless it exists, and joins the frame if it was the last one.
     pub(crate) async fn work_on_band<R: Renderer>(
         &self,
         renderer: &R,
@@ -190,7 +190,7 @@ impl<S: Store, C: Clock> Invocation<'_, S, C> {
         drawn
     }
 
-    /// Puts the frame together of all its bands. A band that cannot be read is drawn again, here.
+    /// Joins the frame from all its bands. A band that cannot be read is drawn again here.
     async fn put_together<R: Renderer>(
         &self,
         renderer: &R,

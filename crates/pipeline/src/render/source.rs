@@ -16,7 +16,7 @@ pub type Files = Arc<BTreeMap<String, Option<File>>>;
 pub struct File {
     /// The entity tag of the file.
     pub version: ETag,
-    /// The content; of a file that is larger than the renderer reads, its beginning.
+    /// The content. If the file is larger than the renderer reads, only its beginning.
     pub body: Bytes,
 }
 
@@ -29,6 +29,6 @@ pub struct Source {
     pub script: Bytes,
     /// The files that the script names, and those that they refer to.
     pub files: Files,
-    /// The frame in the script; `None` when the script is one frame, or the number of its frames is not known yet.
+    /// The frame in the script; `None` if the script is one frame, or the number of its frames is not known yet.
     pub part: Part,
 }

@@ -1,5 +1,5 @@
-//! A bucket's contents and rules as a plain value, one request at a time. The memory store and the simulation share
-//! it. It has no clock: every write passes the time.
+//! A bucket's contents and rules as a plain value, which handles one request at a time. The memory store and the
+//! simulation share it. It has no clock: every write passes the time.
 
 use std::collections::BTreeMap;
 use std::ops::{Bound, Range};
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Default)]
 pub struct Bucket {
     objects: BTreeMap<String, Object>,
-    /// By id; parts by number, counted from 1.
+    /// The uploads by id, and their parts by number, counted from 1.
     uploads: BTreeMap<u64, BTreeMap<usize, Bytes>>,
     last_upload: u64,
 }
@@ -59,14 +59,14 @@ impl Bucket {
         Ok(etag)
     }
 
-    /// Begins an upload, and names it.
+    /// Begins an upload, and returns its id.
     pub fn begin_upload(&mut self) -> u64 {
         self.last_upload += 1;
         self.uploads.insert(self.last_upload, BTreeMap::new());
         self.last_upload
     }
 
-    /// Takes a part of an upload, in the place of one with the same number.
+    /// Stores a part of an upload, in place of one with the same number.
     pub fn put_part(&mut self, key: &str, id: u64, number: usize, body: Bytes) -> Result<ETag> {
         let gone = || Error::NotFound { key: key.to_owned() };
         let etag = etag_of(&body);
@@ -74,8 +74,8 @@ impl Bucket {
         Ok(etag)
     }
 
-    /// Makes an object of an upload's parts and the bytes after them. When the condition does not hold
-    /// the upload is gone.
+    /// Makes an object of an upload's parts and the bytes after them. If the condition does not hold, the upload is
+    /// removed.
     pub fn complete_upload(
         &mut self,
         now: Timestamp,
@@ -98,7 +98,7 @@ impl Bucket {
         self.put(now, key, body.into(), options)
     }
 
-    /// Gives up an upload; it is no error that it is gone.
+    /// Aborts an upload. It is no error if it is gone.
     pub fn abort_upload(&mut self, id: u64) {
         self.uploads.remove(&id);
     }
@@ -108,7 +108,7 @@ impl Bucket {
         self.uploads.len()
     }
 
-    /// Removes an object; says whether there was one.
+    /// Removes an object. Returns whether there was one.
     pub fn delete(&mut self, key: &str) -> bool {
         self.objects.remove(key).is_some()
     }
@@ -160,12 +160,12 @@ impl Bucket {
     }
 }
 
-/// A text after every key below `prefix`, which ends in `/`, and before every other later key.
+/// Returns a text that sorts after every key below `prefix`, which ends in `/`, and before every later key.
 fn end_of(prefix: &str) -> String {
     format!("{prefix}{}", char::MAX)
 }
 
-/// Depends on the body alone, as S3's does.
+/// Returns an entity tag that depends only on the body, as S3's does.
 fn etag_of(body: &[u8]) -> ETag {
     let digest = Sha256::digest(body);
     ETag(digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect())

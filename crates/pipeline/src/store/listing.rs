@@ -1,4 +1,4 @@
-//! A listing read to its end: the one place where pages are put together.
+//! Reading a listing to its end. Pages are joined only here.
 
 use std::future::Future;
 
@@ -15,7 +15,7 @@ pub struct Listing {
 }
 
 impl Listing {
-    /// Reads page by page, by `page`, up to and including `end`; without one, to the listing's end.
+    /// Reads page by page with `page`, up to and including `end`, or to the listing's end without one.
     ///
     /// # Errors
     ///

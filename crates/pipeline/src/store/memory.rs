@@ -20,7 +20,7 @@ pub struct MemoryStore<C> {
 }
 
 impl<C: Clock> MemoryStore<C> {
-    /// An empty bucket whose objects are dated by `clock`.
+    /// Makes an empty bucket. `clock` dates its objects.
     pub fn new(clock: C) -> Self {
         MemoryStore { bucket: Arc::default(), clock }
     }
@@ -73,7 +73,7 @@ impl<C: Clock + Clone + 'static> Store for MemoryStore<C> {
     }
 }
 
-/// Bytes of a part.
+/// The number of bytes of a part.
 const PART: usize = 1 << 20;
 
 /// An object being written to a [`MemoryStore`].

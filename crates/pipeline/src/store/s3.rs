@@ -1,12 +1,13 @@
-//! A bucket of S3, or of another server that speaks S3.
+//! A bucket of S3, or of another server with S3's API.
 //!
-//! AWS's types end here: callers see the [`Store`] trait and the pipeline's errors. Credentials and endpoint are
-//! taken from the standard AWS environment (variables, profile, the function's role). Whenever an endpoint is set,
-//! buckets are addressed by path, as MinIO requires.
+//! AWS's types are used only in this module: callers see the [`Store`] trait and the pipeline's errors. Credentials and
+//! endpoint are taken from the standard AWS environment (variables, profile, the function's role). Whenever an endpoint
+//! is set, buckets are addressed by path, as MinIO requires.
 //!
-//! The client repeats a request up to three times, with exponential backoff and jitter, when the store is busy (503,
-//! 429), fails (500) or gives no answer. So a conditional put whose answer was lost may meet its own success and answer
-//! [`Error::PreconditionFailed`]. 409 and 412 are never repeated here: what to write next is the caller's decision.
+//! The client sends a request up to three times, with exponential backoff and jitter, if the store is busy (503, 429),
+//! fails (500) or does not reply. So a conditional put whose reply was lost may fail because of its own success, with
+//! [`Error::PreconditionFailed`]. After 409 and 412 no request is repeated here, because the caller decides what to
+//! write next.
 //!
 //! ```no_run
 //! use rayfold_pipeline::store::{ListRequest, S3Store, Store};
@@ -50,7 +51,7 @@ pub use upload::S3Upload;
 use answers::{decoded, error_of, status};
 use upload::headers;
 
-/// The timeout of one request, the repetitions not counted in: longer than any object of the pipeline takes.
+/// The timeout of one request, not counting repetitions: longer than any object of the pipeline takes.
 const READ_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// The first try and its repetitions.
@@ -63,10 +64,10 @@ pub struct S3Store {
     bucket: String,
 }
 
-/// The credentials and the endpoint, when the environment does not name them.
+/// The credentials and the endpoint, if the environment does not name them.
 #[derive(Clone)]
 pub struct Connection {
-    /// With its scheme: `http://127.0.0.1:9000`.
+    /// The URL with its scheme: `http://127.0.0.1:9000`.
     pub endpoint: String,
     /// The region for which requests are signed.
     pub region: String,
@@ -79,10 +80,10 @@ pub struct Connection {
 }
 
 impl S3Store {
-    /// The bucket as the standard AWS environment reaches it.
+    /// Connects to a bucket by the standard AWS environment.
     ///
     /// # Errors
-    /// [`Error::NoRegion`]. Missing or wrong credentials show at the first request.
+    /// [`Error::NoRegion`]. Missing or wrong credentials are reported by the first request.
     pub async fn from_environment(bucket: &str) -> Result<Self> {
         let http = https_client();
         let sdk = aws_config::defaults(BehaviorVersion::latest()).http_client(http).load().await;
@@ -100,7 +101,7 @@ impl S3Store {
         Ok(Self::new(aws_sdk_s3::config::Builder::from(&sdk), endpoint.as_deref(), bucket))
     }
 
-    /// The bucket at an endpoint, as the standard AWS environment reaches it; us-east-1 if that names no region.
+    /// Connects to a bucket at an endpoint, by the standard AWS environment. Without a region there it uses us-east-1.
     pub async fn from_environment_at(endpoint: &str, bucket: &str) -> Self {
         let loader = aws_config::defaults(BehaviorVersion::latest()).http_client(https_client());
         let sdk = loader.load().await;
@@ -111,7 +112,7 @@ impl S3Store {
         Self::new(config, Some(endpoint), bucket)
     }
 
-    /// The bucket at an endpoint, with these credentials.
+    /// Connects to a bucket at an endpoint, with these credentials.
     pub fn at(connection: &Connection, bucket: &str) -> Self {
         let Connection { endpoint, region, access_key, secret_key, session_token } = connection;
         let config = aws_sdk_s3::Config::builder()

@@ -1,4 +1,4 @@
-//! The work of an assembler: the GIFs that it builds, waits for, leaves to the next one, refuses and takes away.
+//! The work of an assembler: the GIFs that it builds, waits for, leaves to the next one, refuses and deletes.
 
 use super::*;
 use crate::fakes::film;
@@ -12,7 +12,7 @@ pub(super) fn seconds(seconds: u64) -> Duration {
 }
 
 impl World {
-    /// So many frames are drawn, as many as were announced. Gives the claim.
+    /// Draws this many frames, as many as the settings announce. Returns the claim.
     pub(super) async fn announced(&self, frames: u64) -> String {
         self.put("scripts/film/animation.json", &format!(r#"{{"frames": {frames}}}"#));
         for number in 1..=frames {
@@ -39,7 +39,7 @@ impl World {
         Joiner { takes, ..self.joiner() }
     }
 
-    /// Returns whether no lease is held, nothing is unfinished, and the manifest names the files that there are.
+    /// Returns whether no lease is held, nothing is unfinished, and the manifest records the existing files.
     pub(super) fn is_at_rest(&self) -> bool {
         let head = self.manifest().head;
         let bucket = self.store.bucket.lock().unwrap();
@@ -98,7 +98,7 @@ async fn an_assembler_whose_time_does_not_do_for_the_quiet_wakes_the_next_one() 
     assert_eq!(world.assemble(&world.joiner(), &claim).await.unwrap().built, 1);
 }
 
-/// An invocation has time for five frames, and keeps that of one free.
+/// An invocation has time for five frames, of which it keeps that of one free.
 #[tokio::test]
 async fn a_gif_that_takes_too_long_is_left_where_it_stands_and_gone_on_with() {
     let mut world = World::new();
@@ -124,7 +124,7 @@ async fn a_gif_that_takes_too_long_is_left_where_it_stands_and_gone_on_with() {
     assert!(world.is_at_rest());
 }
 
-/// The last frame needs no time for one more.
+/// After the last frame, no time for one more is needed.
 #[tokio::test]
 async fn a_gif_that_has_all_its_frames_is_finished_unless_it_is_too_late() {
     for (frames, expected) in [(5, (None, 1)), (6, (Some(5), 0))] {
@@ -213,7 +213,7 @@ async fn a_frame_that_is_none_is_drawn_again_until_that_has_been_tried_often_eno
     }
 }
 
-/// Its assembler died before it could write down which it is.
+/// The assembler of the GIF died before it could record its version.
 #[tokio::test]
 async fn a_gif_of_this_set_that_nobody_has_named_is_named_and_one_in_its_place_is_built_anew() {
     let world = World::new();
@@ -260,7 +260,7 @@ async fn an_assembler_leaves_the_gif_to_the_holder_of_the_lease() {
     assert_eq!(world.store.bucket.lock().unwrap().get(LEASE).unwrap().body, lease);
 }
 
-/// It began after the first look at the lease, which was free then.
+/// The other assembler began after the first check of the lease, which was free then.
 #[tokio::test]
 async fn an_assembler_leaves_the_gif_to_one_that_has_just_taken_the_lease() {
     let world = World::new();
@@ -302,7 +302,7 @@ async fn a_restarted_platform_waits_for_no_assembler_of_before() {
     }
 }
 
-/// Otherwise the retry that a user asks for waits until its time is up.
+/// Otherwise a retry by the user would wait until the lease expires.
 #[tokio::test]
 async fn an_assembler_that_the_platform_has_given_up_holds_nobody_off() {
     for (assembler, is_freed) in [("given-up", true), ("another", false), ("", false)] {
@@ -320,7 +320,7 @@ async fn an_assembler_that_the_platform_has_given_up_holds_nobody_off() {
     }
 }
 
-/// It died when the GIF was put.
+/// The earlier attempt died when it had put the GIF.
 #[tokio::test]
 async fn the_lease_of_an_earlier_attempt_is_given_back_when_there_is_nothing_left_to_do() {
     let world = World::new();
@@ -359,7 +359,7 @@ async fn an_unfinished_gif_that_nobody_needs_any_more_is_given_up() {
     }
 }
 
-/// The assembler that found the lease taken was woken for a manifest that the holder had not seen.
+/// The assembler that found the lease taken was invoked for a manifest that the holder had not read.
 #[tokio::test]
 async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
     let world = World::new();
@@ -383,8 +383,8 @@ async fn an_assembler_looks_once_more_after_it_has_given_the_lease_back() {
     assert!(world.gif().unwrap().contains("frame 2"));
 }
 
-/// Another assembler looked when a frame could not be drawn. It has taken away the GIF of the set that came next, found the
-/// lease taken, and left.
+/// Another assembler ran when a frame could not be drawn. It deleted the GIF of the next set, found the lease taken,
+/// and exited.
 #[tokio::test]
 async fn a_gif_that_goes_while_its_assembler_gives_the_lease_back_is_built_again() {
     let world = World::new();
@@ -401,7 +401,7 @@ async fn a_gif_that_goes_while_its_assembler_gives_the_lease_back_is_built_again
     assert!(world.is_at_rest());
 }
 
-/// The manifest says so, however it was before; only where there is no manifest either nothing is written.
+/// The manifest records an empty set, whatever it said before. Only if there is no manifest either, nothing is written.
 #[tokio::test]
 async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_one() {
     let world = World::new();
@@ -420,8 +420,8 @@ async fn a_set_whose_scripts_are_gone_is_empty_and_one_without_a_manifest_gets_o
     assert_eq!(world.manifest().head.status, Status::Done);
 }
 
-/// A frame was gone when it looked, and was there again when it had written that down: no other invocation
-/// is woken for that.
+/// When the assembler looked, a frame was gone. When it had committed that, the frame was there again. No other
+/// invocation is triggered for this.
 #[tokio::test]
 async fn an_assembler_that_has_written_something_looks_again() {
     let world = World::new();
@@ -456,7 +456,7 @@ async fn a_lease_that_the_listing_does_not_show_is_not_asked_for() {
     assert_eq!(asked.load(Ordering::Relaxed), 1, "the look with which every assembler begins");
 }
 
-/// Another client has put half of it in its place, and then the set was another one for a moment.
+/// Another client replaced the GIF by half of it, and then the set was another one for a moment.
 #[tokio::test]
 async fn the_gif_of_a_set_is_remembered_while_the_set_changes_and_changes_back() {
     let world = World::new();
@@ -469,7 +469,7 @@ async fn the_gif_of_a_set_is_remembered_while_the_set_changes_and_changes_back()
     assert_eq!(world.gif(), Some(world.film_of(2)));
 }
 
-/// A GIF that is put, and one that is found.
+/// Both for a GIF that the assembler puts, and for one that it finds.
 #[tokio::test]
 async fn a_gif_is_named_in_no_manifest_but_the_one_that_was_read() {
     for is_found in [false, true] {
@@ -491,7 +491,7 @@ async fn a_gif_is_named_in_no_manifest_but_the_one_that_was_read() {
     }
 }
 
-/// The one that cannot be read goes, though this renderer would draw another one.
+/// The unreadable frame is deleted, although this renderer would draw another one.
 #[tokio::test]
 async fn a_frame_of_older_pixels_that_is_none_is_drawn_again() {
     let mut world = World::new();

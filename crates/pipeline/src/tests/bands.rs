@@ -1,4 +1,5 @@
-//! Frames that are too big for one invocation, and their bands, when another client meddles and when events are lost.
+//! Tests of frames that are too big for one invocation, and of their bands, when another client acts in between and
+//! when events are lost.
 
 use super::*;
 use crate::manifest::Frame;
@@ -9,7 +10,7 @@ const NAME: &str = "1@0-p1";
 const STUCK: Duration = Duration::from_secs(16 * 60);
 
 impl World {
-    /// Uploads a script, and delivers the event of nothing that comes of it. Gives its version.
+    /// Uploads a script, and delivers its event, but not the events that follow. Returns its version.
     async fn upload_big(&self, text: &str) -> ETag {
         let key = format!("scripts/film/{NAME}.txt");
         let version = self.put(&key, text);
@@ -30,7 +31,7 @@ impl World {
         assert!(self.store.bucket.lock().unwrap().delete(key), "{key}");
     }
 
-    /// Delivers the events of these bands, by the keys that woke them.
+    /// Delivers the events of these bands, given the keys that trigger them.
     async fn draw_bands(&self, keys: &[String]) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
         for key in keys {
@@ -100,7 +101,7 @@ async fn each_frame_of_a_script_may_be_big() {
     assert_eq!(world.keys("frames/").len(), 3, "{:?}", world.keys("frames/"));
 }
 
-/// The last one is killed when its band is put; the platform's next attempt at its event finds all bands.
+/// The last invocation is killed when it has put its band. The platform's next attempt at its event finds all bands.
 #[tokio::test]
 async fn bands_that_are_not_put_together_are_by_the_next_invocation() {
     let world = World::new();
@@ -114,7 +115,7 @@ async fn bands_that_are_not_put_together_are_by_the_next_invocation() {
     }
 }
 
-/// Otherwise a frame whose putting together kills the process would be woken for ever.
+/// Otherwise a frame whose joining kills the process would be triggered for ever.
 #[tokio::test]
 async fn putting_together_counts_as_an_attempt() {
     let world = World::new();
@@ -180,7 +181,7 @@ async fn a_band_is_put_once() {
     assert_eq!(world.manifest().head.revision, manifest);
 }
 
-/// Attempts count when a band of theirs has begun, not when they only wait behind others.
+/// An attempt counts when one of its bands has begun, not while they only wait in the queue.
 #[tokio::test]
 async fn the_sweep_wakes_what_is_missing_and_gives_up_only_what_was_tried() {
     let world = World::new();
@@ -241,7 +242,7 @@ async fn a_band_that_cannot_be_read_is_drawn_anew() {
     assert_eq!(world.store.bucket.lock().unwrap().get(&band).unwrap().body, before);
 }
 
-/// A band goes between the listing and its reading.
+/// A band is deleted between the listing and its reading.
 #[tokio::test]
 async fn no_frame_is_put_together_without_a_band_that_is_gone() {
     let world = World::new();
@@ -281,7 +282,7 @@ async fn a_failure_record_names_the_band_and_blames_nobody_who_only_woke_others(
     assert!(matches!(recorded, Recorded::Resolved(_)), "{recorded:?}");
 }
 
-/// Each of them would wake all the others.
+/// Each of the old bands would trigger all the others.
 #[tokio::test]
 async fn bands_that_are_too_old_wake_the_frame_no_more_often_than_a_few_times() {
     let world = World::new();
@@ -340,7 +341,8 @@ async fn a_retry_of_what_failed_begins_anew_and_of_what_is_on_its_way_goes_on() 
     assert_eq!(world.keys("frames/"), Vec::<String>::new());
 }
 
-/// An invocation that a renderer of other pixels woke cuts again: no frame is put together of both.
+/// An invocation that a renderer of another pixel version triggered cuts again, so no frame is joined from bands of
+/// both.
 #[tokio::test]
 async fn bands_of_different_renderers_never_meet() {
     let mut world = World::new();
@@ -362,7 +364,7 @@ async fn bands_of_different_renderers_never_meet() {
     assert_eq!(world.keys("frames/"), [frame]);
 }
 
-/// Two found at once that the frame is too big, and were not of one mind.
+/// Two invocations found at once that the frame is too big, and chose different numbers of bands.
 #[tokio::test]
 async fn of_two_cuts_each_is_whole_by_itself() {
     let world = World::new();
@@ -396,7 +398,7 @@ async fn many_bands_are_put_together_from_the_top() {
     assert_eq!(world.frame(&version).unwrap(), picture(&name(), b"big frame 1", None));
 }
 
-/// Each had listed before the other one put its band.
+/// Each invocation had listed before the other one put its band.
 #[tokio::test]
 async fn of_those_who_put_the_last_bands_at_once_one_finds_all() {
     let world = World::new();

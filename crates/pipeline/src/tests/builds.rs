@@ -1,4 +1,4 @@
-//! A GIF whose upload meets with errors, and one that was left unfinished by an assembler before.
+//! Tests of a GIF whose upload fails, and of one that an earlier assembler left unfinished.
 
 use super::assemblies::{CHECKPOINT, GIF, seconds};
 use super::*;
@@ -18,7 +18,7 @@ fn refused() -> Error {
     Error::Refused { key: "k".into(), source: "no".into() }
 }
 
-/// Whether two errors are of a kind.
+/// Returns whether two errors are of the same kind.
 fn is_like(error: &Error, other: &Error) -> bool {
     std::mem::discriminant(error) == std::mem::discriminant(other)
 }
@@ -35,7 +35,7 @@ impl World {
         claim
     }
 
-    /// The requests of this name are answered so, from the `nth` on, counted from 1, `times` times.
+    /// Makes the requests of this name fail with this error, from the `nth` on, counted from 1, `times` times.
     fn answers(&self, request: &'static str, nth: u32, times: u32, error: fn() -> Error) {
         let mut count = 0;
         self.refuse(move |asked| {
@@ -48,13 +48,13 @@ impl World {
         self.store.bucket.lock().unwrap().unfinished_uploads()
     }
 
-    /// The next assembler is the platform's next attempt at the last one's event.
+    /// Makes the next assembler the platform's next attempt at the last one's event.
     fn try_again(&self) {
         self.requests.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-/// Returns the number of parts that the GIF of so many frames has, if the first are sent already.
+/// Returns the number of parts of the GIF, if the first ones are sent already.
 async fn parts(is_begun: bool) -> u32 {
     let mut world = World::new();
     let claim = if is_begun { world.unfinished().await } else { world.announced(2).await };
@@ -92,7 +92,7 @@ async fn a_gif_that_somebody_else_may_have_put_is_looked_at_anew() {
     assert!(is_like(&error, &refused()), "{error:?}");
 }
 
-/// In the middle of a GIF, and at its last part.
+/// Tested in the middle of a GIF, and at its last part.
 #[tokio::test]
 async fn a_gif_whose_parts_cannot_be_sent_is_given_up_and_why_is_said() {
     let last = parts(false).await;
@@ -114,7 +114,7 @@ async fn a_gif_whose_parts_cannot_be_sent_is_given_up_and_why_is_said() {
     }
 }
 
-/// At any part, also of one that is gone on with.
+/// Tested at any part, also of a file that is continued.
 #[tokio::test]
 async fn a_file_that_is_larger_than_an_upload_may_be_is_refused() {
     let too_large = || Error::TooLarge { key: "animations/film.gif".into(), limit_gb: 83 };
@@ -131,8 +131,8 @@ async fn a_file_that_is_larger_than_an_upload_may_be_is_refused() {
     }
 }
 
-/// A transient error leaves it to the next attempt, an upload that is gone is begun again, and all
-/// other errors are reported.
+/// After a transient error the next attempt continues it. If the upload is gone, it is started again. All other errors
+/// are reported.
 #[tokio::test]
 async fn an_unfinished_gif_is_gone_on_with_unless_its_upload_is_gone() {
     let last = parts(true).await;
@@ -161,7 +161,7 @@ async fn an_unfinished_gif_is_gone_on_with_unless_its_upload_is_gone() {
     }
 }
 
-/// A frame cannot be read, however often it is asked for; and an invocation had no time left for its first frame.
+/// Either a frame cannot be read, however often it is requested, or an invocation had no time left for its first frame.
 #[tokio::test]
 async fn an_unfinished_gif_stands_when_an_invocation_comes_no_further() {
     let mut world = World::new();
@@ -207,7 +207,7 @@ async fn only_what_makes_the_same_gif_is_gone_on_with() {
     }
 }
 
-/// It is put only over the GIF that was read.
+/// The GIF is put only over the GIF that was read.
 #[tokio::test]
 async fn a_gif_that_comes_while_another_is_built_is_not_written_over_unseen() {
     for has_one in [false, true] {

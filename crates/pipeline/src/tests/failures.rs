@@ -10,7 +10,7 @@ impl World {
         self.put(SCRIPT, "frame 1")
     }
 
-    /// Puts `attempts` retries of a frame, to `begun` of which an invocation has begun.
+    /// Puts `attempts` retries of a frame, and the receipts that `begun` of them have begun.
     fn tried(&self, of: &str, attempts: u64, begun: u64) {
         for attempt in 1..=attempts {
             self.put(&format!("retries/film/{of}/{attempt}"), "");
@@ -84,8 +84,8 @@ async fn other_failed_events_are_about_what_is_there_now() {
     assert!(matches!(recorded, Err(Error::Key { .. })), "{recorded:?}");
 }
 
-/// A transient error is tried again a few times, and then left to the sweep; a frame that an invocation has begun in
-/// vain as often as that is given up. A frame that no invocation has tried is never given up.
+/// After a transient error a frame is tried again a few times, and then left to the sweep. If invocations have begun it
+/// that many times without a result, it is given up. A frame that no invocation has tried is never given up.
 #[tokio::test]
 async fn a_frame_is_woken_left_or_given_up_as_its_attempts_say() {
     for (end, attempts, begun, expected) in [
@@ -137,7 +137,7 @@ async fn attempts_at_other_frames_do_not_count() {
 }
 
 impl World {
-    /// A set of frames without a GIF, and its claim.
+    /// Makes a set of frames without a GIF, and its claim.
     async fn claimed(&self) -> String {
         self.upload("1.txt", "frame 1").await;
         self.upload("2.txt", "frame 2").await;
@@ -188,7 +188,7 @@ async fn a_failed_assembly_is_left_to_the_sweep_when_another_may_do() {
     assert_eq!(world.manifest().head.status, Status::Failed);
 }
 
-/// So that the user sees that it is there, and to come.
+/// The user must see that the frame is known and pending.
 #[tokio::test]
 async fn the_manifest_shows_a_frame_that_is_left_to_the_sweep() {
     let world = World::new();
@@ -198,7 +198,7 @@ async fn the_manifest_shows_a_frame_that_is_left_to_the_sweep() {
     assert_eq!(world.manifest().frames[0].state, FrameState::Pending);
 }
 
-/// Another client has put half of it in its place, with its metadata.
+/// Another client replaced the GIF by half of it, with its metadata.
 #[tokio::test]
 async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
     let world = World::new();
@@ -210,7 +210,7 @@ async fn a_set_is_refused_though_there_is_what_looks_like_its_gif() {
     assert!(matches!(recorded, Recorded::Refused(_)), "{recorded:?}");
 }
 
-/// No manifest shows yet that there is another script.
+/// No manifest shows the other script yet.
 #[tokio::test]
 async fn no_set_is_refused_that_is_another_one_by_now() {
     let world = World::new();

@@ -1,4 +1,4 @@
-//! Scripts that name files: which files wake what, and which frames are drawn again.
+//! Tests of scripts that name files: the files that trigger a script, and the frames that are drawn again.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ impl World {
 
 const DRAWER: InstantRenderer = InstantRenderer { bands: BANDS };
 
-/// A function's process that keeps the files that it has read, and what they refer to.
+/// A process of a function, which keeps the files that it has read and those to which they refer.
 #[derive(Default)]
 struct Warm(Mutex<BTreeMap<String, File>>);
 
@@ -55,7 +55,7 @@ impl Renderer for Warm {
         DRAWER.most_file_bytes()
     }
 
-    /// Files that were kept stand in for those that are not read yet.
+    /// Kept files replace those that are not read yet.
     async fn needed(&self, name: &ScriptName, script: Bytes, files: Files) -> Result<Vec<String>> {
         let kept = self.0.lock().unwrap().clone();
         let kept =
@@ -95,8 +95,8 @@ impl World {
         self.with(async |invocation| render_frame(invocation, process, key).await.unwrap().outcome).await
     }
 
-    /// Renders the events of new objects below `parts/` until there are none: those that are woken for whole scripts
-    /// by the first process, those of parts and bands by the processes in turn.
+    /// Renders the events of new objects below `parts/` until there are none. The first process handles those for whole
+    /// scripts; the processes take turns with those of parts and bands.
     async fn render_woken(&self, processes: &[&Warm], seen: &mut Vec<String>) {
         loop {
             let mut keys = self.keys("parts/");
@@ -113,7 +113,7 @@ impl World {
     }
 }
 
-/// A process that still had the older file took the part's version for superseded, and the frame was drawn by nobody.
+/// A process that still had the older file treated the part's version as superseded, and no invocation drew the frame.
 #[tokio::test]
 async fn a_process_that_keeps_an_older_file_draws_the_frames_of_the_newer_one() {
     for script in ["with earth split 3 1", "big with earth frame 1", "big with earth split 2 1"] {
@@ -141,7 +141,7 @@ async fn a_process_that_keeps_an_older_file_draws_the_frames_of_the_newer_one() 
     }
 }
 
-/// The set of a process that had known the older model had a file that the newer one no longer refers to, so that no
+/// The set of a process that had read the older model contained a file to which the newer one no longer refers, so no
 /// other process could read the files of that version.
 #[tokio::test]
 async fn a_set_has_no_file_that_only_an_older_model_refers_to() {
@@ -285,7 +285,7 @@ async fn a_file_that_changes_before_its_version_is_put_is_read_again() {
     assert_eq!(world.status(), (Status::Done, 1, 0, 0));
 }
 
-/// A present frame costs a look at the folder more than one without files, and no more.
+/// For a frame that exists, a script with files costs only one request more: a listing of the folder.
 #[tokio::test]
 async fn an_event_again_costs_four_requests() {
     let world = World::new();
@@ -321,7 +321,7 @@ async fn the_sweep_gives_up_waiting_after_its_patience() {
     assert_eq!(world.status(), (Status::Done, 1, 0, 0));
 }
 
-/// Keys of many files would be too long for some stores.
+/// Otherwise the keys of sets with many files would be too long for some stores.
 #[tokio::test]
 async fn a_set_of_many_files_has_several_receipts() {
     let world = World::new();

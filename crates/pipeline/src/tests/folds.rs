@@ -1,4 +1,4 @@
-//! When a fold leaves, waits, lists, writes and claims, by the requests that it sends.
+//! Tests of when a fold stops, waits, lists, writes and claims, by the requests that it sends.
 
 use super::*;
 use crate::fold::{Age, Folded};
@@ -28,7 +28,7 @@ fn name() -> ScriptName {
     ScriptName::new("1").unwrap()
 }
 
-/// Another invocation writes the next revision, which says the same.
+/// Writes the next revision as another invocation, with the same content.
 pub(super) fn write_next(bucket: &mut Bucket, now: Timestamp) {
     let mut manifest = Manifest::decode(&World::film(), &bucket.get(MANIFEST).unwrap().body).unwrap();
     manifest.head.revision += 1;
@@ -36,8 +36,8 @@ pub(super) fn write_next(bucket: &mut Bucket, now: Timestamp) {
     bucket.put(now, MANIFEST, manifest.encode(32 * 1024).unwrap(), PutOptions::always()).unwrap();
 }
 
-/// The lines of a manifest that is larger than what is read at once are looked up, but not by the invocation that has
-/// just put the result.
+/// If a manifest is larger than the first read, its lines are looked up, except by the invocation that has just put the
+/// result.
 #[tokio::test]
 async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
     for (glimpse, age, leaves) in [
@@ -66,7 +66,7 @@ async fn a_fold_leaves_at_once_when_the_manifest_shows_the_fact() {
     }
 }
 
-/// An unreadable manifest shows nothing, not even that something is not there.
+/// An unreadable manifest shows nothing, not even that something is absent.
 #[tokio::test]
 async fn a_manifest_that_cannot_be_read_is_made_anew_whatever_the_fact_is() {
     for fact in [Fact::Absent(name()), Fact::Settings(None), Fact::Fold] {
@@ -78,7 +78,8 @@ async fn a_manifest_that_cannot_be_read_is_made_anew_whatever_the_fact_is() {
     }
 }
 
-/// The manifest is replaced between the look at its beginning and that at its lines: the lines may be others'.
+/// The manifest is replaced between the read of its beginning and that of its lines, so the lines may belong to another
+/// one.
 #[tokio::test]
 async fn lines_of_another_manifest_show_nothing() {
     for is_replaced in [false, true] {
@@ -101,7 +102,7 @@ async fn lines_of_another_manifest_show_nothing() {
     }
 }
 
-/// The listing of the second revision after the one that was read has seen the fact, or a later one.
+/// The listing of the second revision after the one that was read shows the fact, or a later one.
 #[tokio::test]
 async fn a_fold_leaves_when_the_second_revision_is_written_and_not_before() {
     let version = Fact::Version(name(), ETag::new("never shown"));
@@ -128,7 +129,7 @@ async fn a_fold_leaves_when_the_second_revision_is_written_and_not_before() {
     }
 }
 
-/// It was killed between its commit and its claim, and the platform tries its event again.
+/// The finisher was killed between its commit and its claim, and the platform tries its event again.
 #[tokio::test]
 async fn a_finisher_that_finds_its_own_commit_claims() {
     let world = World::new();
@@ -173,7 +174,7 @@ async fn what_is_uploaded_while_the_manifest_is_written_is_listed_again_for() {
     assert_eq!((head.total, head.revision), (2, 2));
 }
 
-/// After 16 commits it is others' turn for a while, and then this one's again.
+/// After 16 commits the fold lets others commit for a while, and then continues.
 #[tokio::test]
 async fn a_fold_goes_on_for_as_long_as_scripts_come() {
     let world = World::new();
@@ -219,7 +220,7 @@ async fn a_manifest_that_somebody_else_has_just_written_is_not_written_over() {
     assert_eq!((head.total, head.revision), (2, 3));
 }
 
-/// Returns the fold and the requests of a finisher of whom another frame's result is `to come`.
+/// Returns the fold and the requests of a finisher. Another frame is `to come`.
 async fn finishes(world: &World) -> (Folded, Vec<String>) {
     let requests = Arc::new(Mutex::new(Vec::new()));
     let noted = requests.clone();
@@ -233,7 +234,7 @@ async fn finishes(world: &World) -> (Folded, Vec<String>) {
     (folded, requests)
 }
 
-/// Three scripts; the manifest shows that the first is drawn.
+/// Makes three scripts, and a manifest that shows the first one as drawn.
 async fn one_of_three() -> World {
     let world = World::new();
     for number in 1..=3 {
@@ -244,7 +245,7 @@ async fn one_of_three() -> World {
     world
 }
 
-/// Each wrote a manifest, and listed all for it: 15 to 17 requests a frame with two places.
+/// Each finisher wrote a manifest, and listed everything for it: 15 to 17 requests per frame with two places.
 #[tokio::test]
 async fn a_finisher_leaves_while_another_frame_is_to_come_and_the_last_one_lists() {
     let world = one_of_three().await;
@@ -257,7 +258,7 @@ async fn a_finisher_leaves_while_another_frame_is_to_come_and_the_last_one_lists
     assert_eq!((world.manifest().head.done, world.manifest().head.revision), (3, 2));
 }
 
-/// The invocation that draws it has looked already, or draws another version, or none draws it.
+/// The invocation that draws the frame has already listed, or draws another version, or no invocation draws it.
 #[tokio::test]
 async fn a_frame_that_is_there_or_is_no_longer_current_is_left_for_by_nobody() {
     for (key, text) in [
@@ -285,7 +286,7 @@ async fn a_frame_that_is_there_or_is_no_longer_current_is_left_for_by_nobody() {
     }
 }
 
-/// A part's receipts are looked for with this renderer's pixels alone: another one may have drawn it.
+/// Only receipts of this renderer's pixel version are searched for a part, so another renderer may have drawn it.
 #[tokio::test]
 async fn a_part_that_another_renderer_may_have_drawn_is_left_for_by_nobody() {
     for (other, folded) in
@@ -304,7 +305,7 @@ async fn a_part_that_another_renderer_may_have_drawn_is_left_for_by_nobody() {
     }
 }
 
-/// Settings, deletions and splits change the set that people wait for.
+/// Settings, deletions and splits change the set, so the manifest must show them soon.
 #[tokio::test]
 async fn what_is_no_frames_result_is_written_down_whatever_is_to_come() {
     for (key, text) in [
@@ -322,7 +323,7 @@ async fn what_is_no_frames_result_is_written_down_whatever_is_to_come() {
     }
 }
 
-/// People want to see how far it is.
+/// People want to see the progress.
 #[tokio::test]
 async fn a_manifest_that_is_old_is_written_anew_whatever_is_to_come() {
     for (seconds, folded) in [(9, Folded::Awaited), (10, Folded::Committed)] {
@@ -364,7 +365,7 @@ async fn the_pause_is_the_longer_the_longer_a_look_takes() {
     }
 }
 
-/// With pauses in between, each of which may be twice as long as the one before.
+/// Between the attempts there are pauses, each of which may be twice as long as the one before.
 #[tokio::test]
 async fn a_request_is_sent_five_times_before_it_fails() {
     let throttled = || Error::Throttled { key: "k".into(), source: "busy".into() };
@@ -395,7 +396,7 @@ async fn a_request_is_sent_five_times_before_it_fails() {
     }
 }
 
-/// So many scripts, of which the first ones after the second are drawn, and no manifest.
+/// Makes this many scripts and no manifest. The first ones after the second script are drawn.
 fn drawn_without_a_manifest(scripts: usize, drawn: usize) -> World {
     let world = World::new();
     for number in 1..=scripts {
@@ -407,7 +408,7 @@ fn drawn_without_a_manifest(scripts: usize, drawn: usize) -> World {
     world
 }
 
-/// The others would write the same, one after the other.
+/// Otherwise the others would write the same manifest, one after the other.
 #[tokio::test]
 async fn of_those_who_find_no_manifest_the_first_one_writes_it_and_few_others() {
     for (drawn, writers) in [(0, 30..=30), (1, 10..=20), (5, 1..=9)] {
@@ -440,7 +441,7 @@ async fn the_last_one_writes_the_manifest_whatever_the_lot_says() {
     }
 }
 
-/// With many finishers one listing should serve all; with few there is none to wait for.
+/// With many finishers one listing should serve all; with few there is no reason to wait.
 #[tokio::test]
 async fn a_finisher_pauses_before_it_lists_only_in_a_crowd() {
     for (others, looks) in [(0, 1), (7, 1), (8, 2)] {
@@ -485,7 +486,7 @@ async fn a_page_is_written_down_only_over_the_manifest_that_was_read_before_it()
     assert_eq!((head.done, head.revision), (1, 3));
 }
 
-/// Another frame comes between the page and the commit. Its finisher may leave because of that commit.
+/// Another frame is drawn between the page and the commit. Its finisher may stop because of that commit.
 #[tokio::test]
 async fn the_writer_of_a_manifest_leaves_for_no_frame_because_of_an_older_page() {
     let world = World::new();
@@ -528,7 +529,7 @@ async fn a_finisher_looks_at_one_frame_where_there_is_more_than_a_page() {
     assert_eq!(requests[3..], looks);
 }
 
-/// Half of a thousand finishers find that the frame is drawn which they look at first.
+/// Half of a thousand finishers find that the first frame that they check is drawn.
 #[tokio::test]
 async fn of_a_crowd_that_finds_its_first_frame_drawn_few_list() {
     let (mut left_at_once, mut left_by_the_page, mut listed) = (0, 0, 0);

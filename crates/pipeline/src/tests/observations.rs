@@ -1,4 +1,4 @@
-//! The requests by which an animation is observed, and the conclusions from the answers.
+//! Tests of the requests by which an animation is observed, and of the conclusions from the replies.
 
 use super::*;
 use crate::fold::fold;
@@ -9,7 +9,7 @@ use crate::reconcile::ReceiptFound;
 const SETTINGS: &str = "scripts/film/animation.json";
 
 impl World {
-    /// Observes and writes the manifest, and says how many requests started so.
+    /// Observes and writes the manifest. Returns how many requests began with this text.
     async fn asks(&self, request: &'static str) -> u64 {
         let counted = Arc::new(AtomicU64::new(0));
         let counter = counted.clone();
@@ -45,7 +45,8 @@ async fn of_many_keys_that_no_script_can_have_the_first_are_named_and_the_others
     }
 }
 
-/// An editor's copy failed the animation, and a script in capitals made it shorter without a word.
+/// A backup file of an editor failed the animation, and a script with a name in capitals was left out without a
+/// message.
 #[tokio::test]
 async fn what_systems_leave_counts_for_nothing_and_what_is_misnamed_is_a_warning() {
     let world = World::new();
@@ -118,7 +119,8 @@ async fn settings_are_read_when_they_are_new_or_could_not_be_read() {
     }
 }
 
-/// In ranges side by side, a thousand names each; those of a version that is no longer current are not.
+/// The parts are listed in parallel ranges of a thousand names each. Parts of a version that is no longer current are
+/// not listed.
 #[tokio::test]
 async fn the_parts_of_a_split_script_are_listed() {
     for (count, ranges) in [(2, 1), (1_000, 1), (1_001, 2), (2_000, 3)] {
@@ -135,7 +137,7 @@ async fn the_parts_of_a_split_script_are_listed() {
     }
 }
 
-/// They are read when nothing is left to come, each once.
+/// Reasons are read when no frame is pending, each once.
 #[tokio::test]
 async fn reasons_are_read_when_all_has_been_tried() {
     let world = World::new();
@@ -162,7 +164,7 @@ async fn reasons_are_read_when_all_has_been_tried() {
     assert_eq!(reasons, ["reason 1", "reason 2"]);
 }
 
-/// The assembler of a refused set finds the reason in the manifest, too.
+/// The assembler of a refused set also finds the reason in the manifest.
 #[tokio::test]
 async fn the_reason_of_a_refusal_is_read_once() {
     let world = World::new();

@@ -1,5 +1,5 @@
-//! The order of requests: a request that comes too early meets the state before the other, and an invocation that is
-//! killed between two of them leaves a state that heals.
+//! The order of requests. A request that comes too early sees the old state, and an invocation that is killed between
+//! two requests must leave a state that can be repaired.
 
 use super::assemblies::{CHECKPOINT, GIF, LEASE, seconds};
 use super::*;
@@ -12,7 +12,7 @@ const MANIFEST: &str = "manifests/film.json";
 struct Sent(Arc<Mutex<Vec<String>>>);
 
 impl Sent {
-    /// The places of those that start so, and have this in them.
+    /// Returns the positions of the requests that begin with one text and contain another.
     fn places(&self, start: &str, within: &str) -> Vec<usize> {
         let sent = self.0.lock().unwrap();
         let is_it = |request: &String| request.starts_with(start) && request.contains(within);
@@ -22,7 +22,7 @@ impl Sent {
         places
     }
 
-    /// The last of the first kind comes before the first of the other one.
+    /// Checks that the last request of the first kind comes before the first request of the other kind.
     #[track_caller]
     fn comes_before(&self, (start, within): (&str, &str), (next, within_next): (&str, &str)) {
         let (first, then) = (self.places(start, within), self.places(next, within_next));
@@ -46,7 +46,7 @@ impl World {
     }
 }
 
-/// An invocation that finds that a script is split asks for no more of its parts than are late.
+/// An invocation that finds a script split triggers only parts that are late.
 #[tokio::test]
 async fn a_script_is_split_when_its_parts_are_there() {
     let world = World::new();
@@ -55,7 +55,7 @@ async fn a_script_is_split_when_its_parts_are_there() {
     sent.comes_before(("put parts/", ".json"), ("put frames/", ".split-3"));
 }
 
-/// A band that comes before the cut finds no invocation that wakes the others.
+/// A band that comes before the cut finds no invocation that triggers the others.
 #[tokio::test]
 async fn a_frame_is_cut_before_its_bands_are_woken() {
     let world = World::new();
@@ -64,7 +64,7 @@ async fn a_frame_is_cut_before_its_bands_are_woken() {
     sent.comes_before(("put frames/", ".cut-3"), ("put parts/", ".band-0.json"));
 }
 
-/// A GIF that comes after the listing is that of a later one, and would be built over.
+/// A GIF that appears after the listing belongs to a later one, and would be overwritten.
 #[tokio::test]
 async fn an_assembler_reads_the_manifest_then_the_gif_and_then_lists() {
     let world = World::new();
@@ -76,7 +76,7 @@ async fn an_assembler_reads_the_manifest_then_the_gif_and_then_lists() {
     sent.comes_before(("head ", GIF), ("list ", "film/"));
 }
 
-/// An invocation that comes in between has a manifest that it can read, or one that is set aside already.
+/// An invocation in between either reads a valid manifest, or one that is already set aside.
 #[tokio::test]
 async fn what_cannot_be_read_is_set_aside_before_its_place_is_taken() {
     let world = World::new();
@@ -88,7 +88,7 @@ async fn what_cannot_be_read_is_set_aside_before_its_place_is_taken() {
     assert_eq!(sent.places("put manifests/", ".json~"), puts[..1]);
 }
 
-/// An assembler that is woken before finds the lease taken, and leaves.
+/// An assembler that is invoked too early finds the lease taken, and exits.
 #[tokio::test]
 async fn the_next_assembler_is_woken_when_the_lease_is_free() {
     let mut world = World::new();
@@ -110,7 +110,7 @@ async fn the_next_assembler_is_woken_when_the_lease_is_free() {
     sent.comes_before(("delete ", LEASE), ("put assemblies/", ""));
 }
 
-/// Once the lease is free the checkpoint may be another's.
+/// Once the lease is free, the checkpoint may belong to another assembler.
 #[tokio::test]
 async fn what_is_unfinished_is_given_up_before_the_lease() {
     let mut world = World::new();
@@ -126,7 +126,7 @@ async fn what_is_unfinished_is_given_up_before_the_lease() {
     sent.comes_before(("abort ", GIF), ("delete ", LEASE));
 }
 
-/// An invocation that is woken before finds the result that is to go, and draws nothing.
+/// An invocation that is triggered too early finds the result that is about to be deleted, and draws nothing.
 #[tokio::test]
 async fn what_is_to_be_drawn_again_is_deleted_before_it_is_woken() {
     let world = World::new();

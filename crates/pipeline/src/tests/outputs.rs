@@ -1,4 +1,4 @@
-//! Several files that are made of an animation, as `animation.json` asks for them.
+//! Tests of several files that are made of an animation, as `animation.json` requests.
 
 use super::assemblies::seconds;
 use super::*;
@@ -13,7 +13,7 @@ impl World {
         self.upload("animation.json", settings).await;
     }
 
-    /// Lets the assembler work on the newest claim.
+    /// Runs the assembler on the newest claim.
     async fn make(&self) -> Assembled {
         self.assemble(&self.joiner(), &self.newest_claim()).await.unwrap()
     }
@@ -38,7 +38,7 @@ fn film_of_two(output: Container) -> String {
     film(&AnimationSettings::default(), output, &pictures)
 }
 
-/// Uploads two frames, and asks for these files.
+/// Uploads two frames, and settings that request these files.
 async fn two_frames(outputs: &str) -> World {
     let world = World::new();
     world.ask_for(&format!(r#"{{"frames": 2, "outputs": [{outputs}]}}"#)).await;
@@ -63,7 +63,7 @@ async fn each_file_that_is_asked_for_is_made_once() {
     assert_eq!(world.visit().await, Visit::default(), "the sweep finds nothing to do");
 }
 
-/// Not the frames, and not the files that are there.
+/// The frames and the existing files are not made again.
 #[tokio::test]
 async fn a_file_more_is_all_that_is_made_when_the_settings_ask_for_it() {
     let world = two_frames(r#""gif""#).await;
@@ -85,7 +85,7 @@ async fn a_file_more_is_all_that_is_made_when_the_settings_ask_for_it() {
     assert_eq!(world.files(), ["animations/film.gif"]);
 }
 
-/// The mark says that there may be one, whatever the manifest knew.
+/// The mark records that there may be such a file, whatever the manifest says.
 #[tokio::test]
 async fn a_file_of_before_goes_also_when_the_manifest_is_gone() {
     let world = two_frames(r#""gif", "webp""#).await;
@@ -115,7 +115,7 @@ async fn all_files_go_with_the_last_script() {
     assert_eq!(world.files(), [""; 0]);
 }
 
-/// While more is to come they stay.
+/// While frames are pending, the old files stay.
 #[tokio::test]
 async fn a_changed_frame_makes_each_file_anew() {
     let world = two_frames(r#""gif", "webp""#).await;
@@ -131,7 +131,7 @@ async fn a_changed_frame_makes_each_file_anew() {
     }
 }
 
-/// Until it is not asked for any more.
+/// The animation stays refused until that file is no longer requested.
 #[tokio::test]
 async fn a_file_that_cannot_be_made_is_named_and_no_other_one_stays() {
     let world = two_frames(r#""gif", "y4m""#).await;
@@ -147,7 +147,7 @@ async fn a_file_that_cannot_be_made_is_named_and_no_other_one_stays() {
     assert_eq!(world.files(), ["animations/film.gif"]);
 }
 
-/// A file is begun without alpha, and anew when the first frame comes that has it.
+/// A file is begun without alpha, and begun again when the first frame with alpha comes.
 #[tokio::test]
 async fn a_frame_with_alpha_costs_one_more_beginning() {
     let world = World::new();
@@ -160,7 +160,7 @@ async fn a_frame_with_alpha_costs_one_more_beginning() {
     assert!(world.is_at_rest());
 }
 
-/// Each file in turn; a WebP's length stands at its start, which is kept until the end.
+/// The files are built in turn. A WebP's length is at its start, which is held back until the end.
 #[tokio::test]
 async fn files_that_take_too_long_are_gone_on_with_in_turn() {
     let mut world = two_frames(r#""webp", "apng""#).await;
@@ -185,7 +185,7 @@ async fn files_that_take_too_long_are_gone_on_with_in_turn() {
     assert!(world.is_at_rest());
 }
 
-/// What shows in a file is part of its generation: the order there and back, and the times of frames.
+/// Settings that affect a file are part of its generation: the order there and back, and the times of frames.
 #[tokio::test]
 async fn settings_that_show_make_the_file_anew() {
     let world = two_frames(r#""gif""#).await;

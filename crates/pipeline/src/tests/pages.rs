@@ -1,4 +1,4 @@
-//! Listings of more than a page: objects on the second one count as much.
+//! Listings of more than a page: objects on the second page count, too.
 
 use super::*;
 use crate::store::PAGE;
@@ -13,14 +13,14 @@ const MANY: usize = PAGE + 100;
 const LAST: u64 = 999;
 
 impl World {
-    /// A script of many frames, and its version.
+    /// Makes a split script of many frames, and returns its version.
     fn split_in_many(&self) -> ETag {
         let version = self.put(SCRIPT, &format!("split {MANY} 1"));
         self.put(&format!("frames/film/1@{version}-p1.split-{MANY}"), "");
         version
     }
 
-    /// All frames of the script but these.
+    /// Draws all frames of the script but these.
     fn drawn_but(&self, version: &ETag, missing: &[usize]) {
         for number in (1..=MANY).filter(|number| !missing.contains(number)) {
             self.put(&format!("frames/film/1@{version}-p1/{number}.png"), "frame");
@@ -66,7 +66,7 @@ async fn retries_are_counted_behind_many_others() {
     assert_eq!(recorded, Recorded::Woken { attempt: 8 });
 }
 
-/// The script was uploaded once more: only parts without a result are woken.
+/// The script was uploaded once more, so only parts without a result are triggered.
 #[tokio::test]
 async fn parts_that_are_there_are_seen_behind_many_others() {
     let world = World::new();

@@ -1,11 +1,11 @@
-//! The reaction of a step to a store that refuses: a transient error is tried again, a permanent one
-//! is reported at once.
+//! Tests of how steps react to a store that refuses: a transient error is tried again, a permanent one is reported at
+//! once.
 
 use super::*;
 use crate::fold::Folded;
 use crate::lease::HeldLease;
 
-/// Returns each of the errors after which a conditional put may succeed when all is read again.
+/// Returns the errors after which a conditional put may succeed once everything is read again.
 fn passing() -> [Error; 5] {
     let (key, source) = ("k".to_owned(), || "x".into());
     [
@@ -22,7 +22,7 @@ fn refused() -> Error {
 }
 
 impl World {
-    /// The `nth` request of this name, counted from 1, is answered so.
+    /// Makes the `nth` request of this name, counted from 1, fail with this error.
     fn answer(&self, request: &'static str, nth: u32, error: Error) {
         let (mut count, mut error) = (0, Some(error));
         self.refuse(move |asked| {
@@ -36,7 +36,7 @@ const LEASE: &str = "frames/film/@assembler.json";
 const PUT_LEASE: &str = "put frames/film/@assembler.json";
 const PUT_MANIFEST: &str = "put manifests/film.json";
 
-/// The first put is that of a new lease, the second one takes over an existing one.
+/// The first put is that of a new lease; the second one takes over an existing one.
 #[tokio::test]
 async fn a_lease_that_is_over_is_taken_though_the_first_attempt_at_it_fails() {
     for error in passing() {
@@ -71,8 +71,8 @@ async fn ones_own_lease_need_not_be_renewed() {
     assert!(taken.unwrap().is_some());
 }
 
-/// The put took place and its answer was lost. An assembler that takes the lease for another's leaves, and
-/// holds off all others.
+/// The put succeeded and its reply was lost. An assembler that mistook this lease for another's would exit, and the
+/// lease would keep all others from working.
 #[tokio::test]
 async fn a_left_lease_that_was_taken_without_an_answer_is_ones_own() {
     const TAKEN: &str = r#"{"assembler":"request-0","until":9000000,"checkpoint":true}"#;
@@ -115,8 +115,8 @@ async fn a_manifest_that_may_not_be_put_is_said_at_once() {
     assert_eq!(world.keys("assemblies/"), [""; 0]);
 }
 
-/// The platform's next attempt at an event runs until later: no other assembler is to take the lease
-/// over from it before.
+/// The platform's next attempt at an event runs until a later time. No other assembler may take the lease from it
+/// before that.
 #[tokio::test]
 async fn a_lease_is_ones_own_for_as_long_as_one_may_run() {
     for there in

@@ -1,4 +1,4 @@
-//! The results of an event of the render function, its time limit, and the work of a retry on demand.
+//! Tests of the results of a render event, of its time limit, and of a retry by the user.
 
 use super::*;
 use crate::fakes::Paste;
@@ -8,11 +8,11 @@ use crate::retry::Retried;
 
 const SCRIPT: &str = "scripts/film/1.txt";
 
-/// Draws for as long as `takes` says, or for ever.
+/// A renderer that draws for as long as `takes` says, or for ever.
 struct Painter {
     clock: JumpingClock,
     takes: Option<Duration>,
-    /// The time limits that it was given, in order.
+    /// The time limits that the renderer was given, in order.
     limits: Mutex<Vec<Option<Duration>>>,
 }
 
@@ -67,7 +67,7 @@ impl World {
         self.with(async |invocation| render_frame(invocation, painter, key).await).await
     }
 
-    /// Each request takes as many milliseconds as this says; pauses take none.
+    /// Makes each request take as many milliseconds as `takes` says; pauses take none.
     fn time(&mut self, takes: impl Fn(&str) -> u64 + Send + 'static) {
         self.policy.pause_cap = Duration::ZERO;
         let clock = self.store.clock.clone();
@@ -193,7 +193,7 @@ async fn a_script_has_at_most_as_many_frames_as_an_animation_may() {
     }
 }
 
-/// Their events came while another version of the script was current, and drew nothing.
+/// The events of these parts came while another version of the script was current, and drew nothing.
 #[tokio::test]
 async fn parts_of_a_split_from_before_the_upload_are_woken_anew_if_nothing_came_of_them() {
     let world = World::new();
@@ -231,7 +231,7 @@ async fn parts_are_listed_only_while_some_are_to_come() {
     }
 }
 
-/// A film of a frame, a fault, and a frame that is to come, and of a script with a frame and a fault.
+/// Makes an animation of a frame, a fault and a pending frame, and of a script with a frame and a fault.
 async fn mixed(world: &World) {
     world.upload("1.txt", "frame 1").await;
     world.upload("2.txt", "bad 2").await;
@@ -242,7 +242,7 @@ async fn mixed(world: &World) {
     world.put(&format!("frames/film/4@{version}-p1/2.error.json"), r#"{"message":"why"}"#);
 }
 
-/// Returns the results that are left, without versions.
+/// Returns the remaining results, without versions.
 fn results(world: &World) -> Vec<String> {
     let short = |key: String| {
         let (name, rest) = key["frames/film/".len()..].split_once('@').unwrap();
@@ -286,7 +286,7 @@ async fn a_refusal_goes_when_the_set_is_to_be_assembled_again() {
     assert!(!world.keys("frames/").contains(&refusal));
 }
 
-/// If no result was deleted, the manifest is as it was, and the invocation that draws folds.
+/// If no result was deleted, the manifest is unchanged, and the invocation that draws folds.
 #[tokio::test]
 async fn a_retry_folds_only_what_it_has_changed() {
     let world = World::new();
@@ -296,7 +296,7 @@ async fn a_retry_folds_only_what_it_has_changed() {
     assert_eq!(world.keys("manifests/"), [""; 0]);
 }
 
-/// Another invocation drew it meanwhile.
+/// Another invocation has drawn the frame meanwhile.
 #[tokio::test]
 async fn a_frame_is_put_only_where_there_is_none() {
     let world = World::new();
@@ -312,7 +312,7 @@ async fn a_frame_is_put_only_where_there_is_none() {
     assert_eq!(world.store.bucket.lock().unwrap().get(&frame).unwrap().body, "another's");
 }
 
-/// Otherwise a frame that ends each invocation that draws it would be woken for ever.
+/// Otherwise a frame that ends each invocation that draws it would be triggered for ever.
 #[tokio::test]
 async fn an_attempt_counts_when_it_has_begun_however_it_ends() {
     let mut world = World::new();
@@ -338,7 +338,7 @@ async fn of_an_animation_with_too_many_frames_no_parts_are_drawn_either() {
     }
 }
 
-/// There is an error of it.
+/// The part has an error receipt.
 #[tokio::test]
 async fn parts_that_cannot_be_drawn_are_not_woken_anew() {
     let world = World::new();
@@ -380,7 +380,8 @@ async fn the_attempts_at_other_parts_are_still_counted_when_one_is_drawn_again()
     assert_eq!(world.keys(&format!("frames/film/1@{version}-p1/")), [begun(2)]);
 }
 
-/// All receipts were deleted before the first frame was woken: after an interruption none was drawn before a sweep.
+/// Formerly all receipts were deleted before the first frame was triggered. After an interruption no frame was drawn
+/// before a sweep.
 #[tokio::test]
 async fn a_retry_that_is_cut_off_leaves_few_frames_that_nobody_draws_and_the_next_one_draws_those() {
     let mut world = World::new();

@@ -1,5 +1,5 @@
-//! The work of the sweep: the frames that it wakes and gives up, its claims, repairs and deletions, and the
-//! things it leaves alone.
+//! Tests of the sweep: the frames that it triggers and gives up, its claims, repairs and deletions, and the objects
+//! that it leaves alone.
 
 use super::*;
 use crate::sweep::{Swept, sweep};
@@ -16,14 +16,14 @@ impl World {
         self.with(async |invocation| sweep(invocation).await.unwrap()).await
     }
 
-    /// Waits until an object is so old.
+    /// Waits until an object has this age.
     async fn until(&self, key: &str, age: Duration) {
         let then = self.modified(key).after(age);
         self.later(then.since(self.store.clock.now())).await;
         assert_eq!(self.store.clock.now(), then);
     }
 
-    /// Returns the keys that are left below these prefixes.
+    /// Returns the remaining keys below these prefixes.
     fn left(&self, prefixes: &[&str]) -> Vec<String> {
         prefixes.iter().flat_map(|prefix| self.keys(prefix)).collect()
     }
@@ -95,7 +95,7 @@ async fn a_claim_is_put_where_manifest_or_gif_are_not_as_they_should_be() {
     assert!(claimed(&world).await, "the manifest shows scripts that are gone");
 }
 
-/// Makes two frames that no invocation draws, a manifest that says so, and returns their versions.
+/// Makes two frames that no invocation draws, and a manifest that shows them as pending. Returns their versions.
 async fn stuck(world: &World) -> [ETag; 2] {
     let versions = [1, 2].map(|number| world.put(&format!("scripts/film/{number}.txt"), "hang 1"));
     world.with(async |invocation| crate::fold::fold(invocation, &World::film()).await.unwrap()).await;
@@ -159,7 +159,7 @@ async fn where_attempts_do_not_count_those_at_pending_frames_are_forgotten() {
     assert_eq!(world.keys("frames/"), [other], "of another version");
 }
 
-/// The sweep at the start of the functions failed a frame whose file had not come yet.
+/// The sweep at the start of the functions failed a frame whose file had not arrived yet.
 #[tokio::test]
 async fn a_fresh_start_wakes_pending_frames_at_once_and_fails_none_that_waits() {
     let mut world = World::new();
@@ -271,7 +271,7 @@ async fn frames_of_older_pixels_go_after_a_week_where_there_is_a_newer_one() {
     assert_eq!(world.visit().await.deleted, 0);
 }
 
-/// The script was two frames, then one, and another script is two frames.
+/// The script was two frames, then one; another script is two frames.
 #[tokio::test]
 async fn what_came_of_older_versions_goes_after_a_week_and_all_else_stays() {
     let world = World::new();
@@ -339,7 +339,8 @@ async fn what_came_late_of_an_older_version_goes_too() {
     assert!(!left.iter().any(|key| key.contains(before.as_str())), "{left:?}");
 }
 
-/// The object that says that there are parts goes last: a sweep that has found it gone does not look for them.
+/// The object that records that there are parts is deleted last, because a sweep that does not find it does not search
+/// for parts.
 #[tokio::test]
 async fn what_a_sweep_could_not_delete_the_next_one_does() {
     let world = World::new();
@@ -382,7 +383,7 @@ async fn an_attempt_counts_once_however_often_its_script_was_split() {
     assert_eq!(world.visit().await, woken(2));
 }
 
-/// Scripts that were uploaded at once are drawn one after the other: a frame that is not drawn yet is not stuck.
+/// Scripts that were uploaded at once are drawn one after the other, so a frame that is not drawn yet is not stuck.
 #[tokio::test]
 async fn as_long_as_frames_are_drawn_nothing_is_stuck() {
     let world = World::new();
@@ -397,7 +398,7 @@ async fn as_long_as_frames_are_drawn_nothing_is_stuck() {
     assert_eq!(world.visit().await.woken, 2);
 }
 
-/// The invocation that has begun last may still be at it, or wait to be tried again.
+/// The invocation that began last may still be running, or wait to be tried again.
 #[tokio::test]
 async fn a_frame_is_not_given_up_before_the_next_attempt_would_be_due() {
     let world = World::new();
@@ -440,7 +441,7 @@ async fn attempts_at_a_part_that_is_drawn_are_not_forgotten() {
     assert!(left.contains(&begun(1)) && !left.contains(&begun(2)), "{left:?}");
 }
 
-/// Another renderer's error of the same frame can be read.
+/// Another renderer's error receipt of the same frame can be read.
 #[tokio::test]
 async fn of_two_error_receipts_only_that_goes_which_cannot_be_read() {
     let world = World::new();
@@ -453,7 +454,7 @@ async fn of_two_error_receipts_only_that_goes_which_cannot_be_read() {
     assert_eq!(world.keys("frames/"), [key(1)]);
 }
 
-/// An assembler that fails at it in each attempt refuses the set that the claim names.
+/// If an assembler fails at the set in each attempt, it refuses the set that the claim names.
 #[tokio::test]
 async fn a_claim_of_the_sweeps_names_the_set_that_is_there_now() {
     let world = World::new();
@@ -468,7 +469,7 @@ async fn a_claim_of_the_sweeps_names_the_set_that_is_there_now() {
     assert!(claims.contains(&claim), "{claims:?}");
 }
 
-/// Whatever came of it: an error, frames of its own, or a cut.
+/// This holds for any result of the script: an error, frames of its own, or a cut.
 #[tokio::test]
 async fn whatever_goes_of_a_script_that_comes_back_the_script_is_woken() {
     for text in ["bad 1", "split 2 1", "big frame 1"] {
@@ -486,7 +487,7 @@ async fn whatever_goes_of_a_script_that_comes_back_the_script_is_woken() {
     }
 }
 
-/// Its scripts were uploaded before the others.
+/// The scripts of these frames were uploaded before the others.
 #[tokio::test]
 async fn frames_are_woken_while_more_are_to_be_uploaded() {
     let world = World::new();
@@ -497,7 +498,7 @@ async fn frames_are_woken_while_more_are_to_be_uploaded() {
     assert_eq!(world.visit().await, woken(2));
 }
 
-/// Another client has put half of it in its place, with its metadata.
+/// Another client replaced the GIF by half of it, with its metadata.
 #[tokio::test]
 async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
     let world = World::new();
@@ -508,8 +509,8 @@ async fn a_claim_is_put_where_the_gif_is_not_the_one_that_was_built() {
     assert!(world.visit().await.claimed);
 }
 
-/// Its assembler died when it had put it; the manifest named that of an older set, and a GIF that was
-/// cut off later stayed.
+/// The assembler died after it had put the GIF. The manifest recorded that of an older set, and a GIF that was
+/// truncated later stayed.
 #[tokio::test]
 async fn a_gif_that_a_dead_assembler_has_put_is_named_so_that_one_in_its_place_is_noticed() {
     let world = World::new();
@@ -527,7 +528,7 @@ async fn a_gif_that_a_dead_assembler_has_put_is_named_so_that_one_in_its_place_i
     assert!(world.visit().await.claimed);
 }
 
-/// They stayed for ever.
+/// Formerly such manifests stayed for ever.
 #[tokio::test]
 async fn a_manifest_that_was_set_aside_goes_after_a_week() {
     let world = World::new();
@@ -554,7 +555,8 @@ async fn a_claim_is_put_where_the_manifest_does_not_show_that_the_set_is_refused
 }
 
 impl World {
-    /// A sweep deletes the results of the script that is `text` again by then, and dies before its next request.
+    /// Runs a sweep that deletes the results of a script, which is `text` again by then, and dies before its next
+    /// request.
     async fn dies_deleting(&self, text: &'static str, request_id: &str) {
         let (bucket, clock, mut has_deleted) = (self.store.bucket.clone(), self.store.clock.clone(), false);
         self.refuse(move |request| {
@@ -577,7 +579,7 @@ impl World {
     }
 }
 
-/// Its script was too new to be taken for stuck, and the frame stayed pending until a later sweep.
+/// The script was too new to count as stuck, and the frame stayed pending until a later sweep.
 #[tokio::test]
 async fn what_comes_back_while_a_sweep_dies_over_its_results_the_next_attempt_wakes() {
     for text in ["frame 1", "bad 1", "split 2 1", "big frame 1"] {

@@ -1,4 +1,4 @@
-//! Sets a bucket up where no other program does: on AWS that is Terraform's part, on a laptop it is ours.
+//! Sets up a bucket where no other program does. On AWS Terraform sets it up; on a laptop this module does.
 
 use aws_sdk_s3::types::{
     CorsConfiguration, CorsRule, Event, FilterRule, FilterRuleName, NotificationConfiguration,
@@ -10,7 +10,7 @@ use super::answers::error_of;
 use crate::store::{ListRequest, Store};
 use crate::{Error, Result};
 
-/// Events of keys below a prefix go to a queue.
+/// A rule that sends events of keys below a prefix to a queue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notification {
     /// The prefix of the keys whose events are sent.
@@ -22,10 +22,10 @@ pub struct Notification {
 }
 
 impl S3Store {
-    /// Makes the bucket; it is no error that it is there and ours.
+    /// Creates the bucket. It is no error if it exists and is ours.
     ///
     /// # Errors
-    /// [`Error::Refused`] when the name is not allowed or another account has it.
+    /// [`Error::Refused`] if the name is not allowed, or another account has it.
     pub async fn create_bucket(&self) -> Result<()> {
         match self.client.create_bucket().bucket(&self.bucket).send().await {
             Ok(_) => Ok(()),
@@ -42,10 +42,10 @@ impl S3Store {
         }
     }
 
-    /// Sets the bucket's notifications, instead of those it had.
+    /// Sets the bucket's notifications in place of the former ones.
     ///
     /// # Errors
-    /// [`Error::Refused`] when a queue is unknown or two prefixes overlap.
+    /// [`Error::Refused`] if a queue is unknown or two prefixes overlap.
     pub async fn notify(&self, notifications: &[Notification]) -> Result<()> {
         let mut queues = Vec::new();
         for (number, notification) in notifications.iter().enumerate() {
@@ -72,7 +72,7 @@ impl S3Store {
     /// all others are.
     ///
     /// # Errors
-    /// Fails like the store.
+    /// Fails if the store does.
     pub async fn allow_page(&self, origin: &str) -> Result<()> {
         let refused = |source: aws_sdk_s3::error::BuildError| Error::Refused {
             key: self.bucket.clone(),
@@ -92,10 +92,10 @@ impl S3Store {
         request.send().await.map(drop).map_err(|error| error_of(&self.bucket, error))
     }
 
-    /// Whether the bucket can be listed: the cheapest request that fails where the others would.
+    /// Checks that the bucket can be listed: the cheapest request that fails if the others would.
     ///
     /// # Errors
-    /// [`Error::Refused`] when there is no such bucket or it is not ours.
+    /// [`Error::Refused`] if there is no such bucket, or it is not ours.
     pub async fn check(&self) -> Result<()> {
         let nothing = ListRequest { start_after: Some("~".into()), ..ListRequest::all("~") };
         self.list(nothing).await.map(drop)

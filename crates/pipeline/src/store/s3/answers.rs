@@ -6,12 +6,12 @@ use percent_encoding::percent_decode_str;
 
 use crate::Error;
 
-/// The status of the answer, where there was one.
+/// Returns the status of the reply, if there was one.
 pub(super) fn status<E>(error: &SdkError<E, HttpResponse>) -> Option<u16> {
     error.raw_response().map(|response| response.status().as_u16())
 }
 
-/// Sorts a failed request by the action that the caller may take.
+/// Maps a failed request to the error that says what the caller may do.
 pub(super) fn error_of<E>(key: &str, error: SdkError<E, HttpResponse>) -> Error
 where
     E: ProvideErrorMetadata + std::error::Error + Send + Sync + 'static,
@@ -74,7 +74,7 @@ where
     }
 }
 
-/// A name of a listing with `encoding-type=url`: form-encoded.
+/// Decodes a name in a listing with `encoding-type=url`: form-encoded.
 pub(super) fn decoded(text: &str) -> String {
     percent_decode_str(&text.replace('+', " ")).decode_utf8_lossy().into_owned()
 }

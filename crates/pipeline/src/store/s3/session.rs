@@ -7,7 +7,7 @@ use super::Connection;
 use crate::{Error, Result};
 
 impl Connection {
-    /// Returns credentials that are of use for some seconds, with the rights of a policy, for a role of this name.
+    /// Returns credentials that are valid for some seconds, with the rights of a policy, for a role of this name.
     ///
     /// # Errors
     /// [`Error::Refused`] if the server gives none.

@@ -1,4 +1,4 @@
-//! Multipart uploads: a part's worth of memory, however long the object.
+//! Multipart uploads. They take the memory of one part, however long the object is.
 //!
 //! An object shorter than a part is put in one request at the end.
 
@@ -11,8 +11,8 @@ use super::answers::error_of;
 use crate::store::{Condition, ETag, Patch, PutOptions, Store, UnfinishedUpload, Upload};
 use crate::{Error, Result};
 
-/// The size of all parts but the last, in bytes. S3 allows 10,000 parts of at least 5 MiB: this allows
-/// objects of 78 GiB.
+/// The size of all parts but the last, in bytes. S3 allows 10,000 parts of at least 5 MiB; with this size an object may
+/// have 78 GiB.
 const PART: usize = 8 << 20;
 
 /// The most parts of an upload.
@@ -26,13 +26,13 @@ pub struct S3Upload {
     options: PutOptions,
     gathered: BytesMut,
     id: Option<String>,
-    /// The first part, if it is sent last and has its length; its number is kept free.
+    /// The first part if it is sent last and is complete. Its number is reserved.
     start: Option<BytesMut>,
     parts: Vec<CompletedPart>,
 }
 
 impl S3Upload {
-    /// As far as it has come already.
+    /// The first part as far as it has been received.
     pub(super) fn new(store: S3Store, key: &str, options: PutOptions, unfinished: UnfinishedUpload) -> Self {
         let UnfinishedUpload { id, parts, start, tail } = unfinished;
         let start = Some(BytesMut::from(start)).filter(|start| !start.is_empty());
@@ -90,7 +90,7 @@ impl S3Upload {
         Ok(part(number, answer.e_tag))
     }
 
-    /// Sends what is left: the last part, and the first one if it is sent last.
+    /// Sends the rest: the last part, and the first one if it is sent last.
     async fn send_rest(&mut self, patch: Option<Patch>) -> Result<()> {
         let last = self.gathered.split().freeze();
         if !last.is_empty() {
