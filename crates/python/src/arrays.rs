@@ -1,7 +1,7 @@
-//! Files of arrays: binary PLY of meshes, PNG of levels, OpenEXR of light.
+//! Files made of arrays: binary PLY for meshes, PNG for levels, OpenEXR for light.
 //!
-//! Python (`_arrays.py`) has checked the arrays, and hands over their bytes: little-endian, row by row. The files are what
-//! any program reads, and hold each number as it was given.
+//! Python (`_arrays.py`) has checked the arrays, and passes their bytes: little-endian, row by row. Any program can
+//! read the files, and they hold each number unchanged.
 
 use std::fmt::Write as _;
 
@@ -19,10 +19,10 @@ use crate::place::Place;
 /// A property of a vertex: its name, its type in PLY and the bytes of a value.
 type Column<'a> = (&'a [&'a str], &'static str, usize, &'a [u8]);
 
-/// The vertices or faces that are written in one piece: few enough to stay in the cache.
+/// The number of vertices or faces that are written in one piece: few enough to stay in the cache.
 const PIECE: usize = 1 << 13;
 
-/// Returns the type in PLY of one of NumPy, and the bytes of a value.
+/// Returns the PLY type for a NumPy type, and the number of bytes of a value.
 fn type_of(name: &str) -> PyResult<(&'static str, usize)> {
     Ok(match name {
         "u1" => ("uchar", 1),
@@ -106,7 +106,7 @@ fn ply(columns: &[Column<'_>], count: usize, faces: &[u8], corners: u8) -> Vec<u
     file
 }
 
-/// Writes the attributes of vertices from the `first` on, unless they are places alone, which are there already.
+/// Writes the attributes of vertices, starting at vertex `first`. Positions alone are in the right form already.
 fn write_vertices(rows: &mut [u8], columns: &[Column<'_>], of_vertex: usize, first: usize) {
     if columns.len() == 1 {
         return;
@@ -239,7 +239,7 @@ fn check_length(width: u32, height: u32, of_pixel: usize, bytes: &Bound<'_, PyBy
     Ok(())
 }
 
-/// Returns the file of an array of pixels, made by `function` of `_arrays.py`; nothing for what is no array.
+/// Returns the file for an array of pixels, made by `function` of `_arrays.py`, or `None` for any other value.
 ///
 /// # Errors
 /// Fails if the array is no picture.

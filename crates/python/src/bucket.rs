@@ -1,8 +1,8 @@
-//! An animation in a bucket: its scripts up, its GIF back, by the client that the command line has.
+//! An animation in a bucket: uploads its scripts and downloads its GIF, by the same client as the command line.
 //!
-//! Python's lock is released meanwhile. Between two looks at the bucket's answers the run looks for Ctrl-C, and takes
-//! Python's lock for that and for a report of the progress. Nothing is remembered here: a run that was interrupted goes on
-//! from what the bucket shows.
+//! Python's lock is released meanwhile. Between two polls of the bucket the run checks for Ctrl-C and reports the
+//! progress, for which it takes Python's lock. It keeps no state: an interrupted run continues from the contents of the
+//! bucket.
 
 use std::cell::RefCell;
 use std::error::Error as StdError;
@@ -44,10 +44,10 @@ struct Order {
     is_awaited: bool,
 }
 
-/// The callable that is given the kind, the number done and the total of what is being done.
+/// The callable for progress, which gets the kind of work, the number done and the total.
 struct Reports {
     report: Option<Py<PyAny>>,
-    /// The exception of a report, such as a warning that is an error. It ends the run.
+    /// The exception of a progress report, such as a warning that is an error. It ends the run.
     failed: RefCell<Option<PyErr>>,
 }
 
@@ -119,7 +119,7 @@ fn parse_place(place: &str) -> PyResult<(String, Animation)> {
     Ok((bucket.to_owned(), animation))
 }
 
-/// Does the work on a runtime of its own, until it is done or Ctrl-C comes.
+/// Runs the work on a tokio runtime of its own, until it is done or Ctrl-C comes.
 fn run(order: &Order, reports: Reports) -> PyResult<Option<Vec<u8>>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let result = runtime.block_on(async {
@@ -172,7 +172,7 @@ async fn deliver(
     }
 }
 
-/// Ends with the exception of a signal, or of a report.
+/// Ends with the exception of a signal or of a report.
 async fn interrupted(reports: &Reports) -> PyErr {
     loop {
         tokio::time::sleep(LOOK).await;
@@ -209,7 +209,7 @@ impl Reports {
     }
 }
 
-/// Makes the exception of an animation of which there is no GIF.
+/// Makes the exception for an animation without a GIF.
 fn failed(manifest: &Manifest) -> PyErr {
     let head = &manifest.head;
     let obstacles = obstacles(manifest);
@@ -227,7 +227,7 @@ fn failed(manifest: &Manifest) -> PyErr {
     PyRuntimeError::new_err(text)
 }
 
-/// Makes the exception of an error of the client.
+/// Makes the exception for an error of the client.
 fn client_error(error: &Error, order: &Order) -> PyErr {
     let folder = address(&order.bucket, &order.animation.scripts());
     if let Error::WouldDelete { keys } = error {

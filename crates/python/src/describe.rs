@@ -8,7 +8,7 @@ use rayfold_scene::{Clause, Command, Curve, Field, Form, Kind, Mode, Names, Quot
 
 use crate::signature::{CLAUSES, Keyword, METHODS, Parameter, Role, Signature, aligns, is_color};
 
-/// The parts of the stub that are written by hand, with lines in place of what the table gives.
+/// The handwritten parts of the stub, with placeholder lines for the parts from the table.
 const TEMPLATE: &str = include_str!("stub.pyi");
 
 /// Returns the text of `__init__.pyi`.

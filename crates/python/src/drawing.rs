@@ -1,7 +1,7 @@
 //! Drawing: frames on the pool of threads, without Python's lock.
 //!
-//! The caller waits for a frame and looks for Ctrl-C meanwhile. `Ahead` draws frames before they are asked for, as many as
-//! memory is set aside for, and hands them out in order.
+//! The caller waits for a frame and checks for Ctrl-C meanwhile. `Ahead` draws frames before they are requested, as
+//! many as fit into reserved memory, and returns them in order.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,14 +24,14 @@ use crate::script::Script;
 /// The time between two looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(30);
 
-/// Memory that frames ahead may take, in bytes, as in `rayfold render`.
+/// The memory in bytes for frames ahead, as in `rayfold render`.
 const AHEAD: u64 = 192 << 20;
 
-/// Bytes of a pixel while it is drawn, and of an object.
+/// The number of bytes per pixel while a frame is drawn, and per object.
 const OF_PIXEL: u64 = 48;
 const OF_OBJECT: u64 = 400;
 
-/// The fewest frames at once: one is drawn while another is encoded.
+/// The minimum number of frames at once: one is drawn while another is encoded.
 const FEWEST: usize = 2;
 
 /// A drawn frame.
@@ -44,7 +44,7 @@ pub(crate) struct Image {
 pub(crate) enum Pixels {
     /// Eight bits per channel: three, or four with alpha.
     Levels(DynamicImage),
-    /// Light before it becomes levels: three channels of each pixel, or four with its cover.
+    /// Light before it is converted to levels: three channels per pixel, or four with its cover.
     Light((u32, u32), Vec<f32>),
 }
 
@@ -115,7 +115,7 @@ impl Image {
 }
 
 type Drawn = Result<Pixels, RenderError>;
-/// The index of a frame and its picture; none after a panic.
+/// The index of a frame and its picture; `None` after a panic.
 type Message = (usize, Option<Drawn>);
 
 /// Frames that are drawn ahead, in order.
@@ -232,7 +232,7 @@ fn draw(script: &Parsed, frame: usize, linear: bool, cancel: &AtomicBool) -> Dra
     rayfold_tracer::picture_of_frame(script, frame, &options).ok_or_else(missing)?.map(Pixels::Levels)
 }
 
-/// Returns the summary of the `Trace` of a frame, counted from 0.
+/// Returns the summary of the `Trace` that draws a frame, counted from 0.
 fn shot_of(script: &Parsed, frame: usize) -> Option<rayfold_scene::ShotSummary> {
     let mut before = 0;
     script.shots().find(|shot| {

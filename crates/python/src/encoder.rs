@@ -13,7 +13,7 @@ use rayfold_movie::{Container, Encoding, Finished, Movie, Plays};
 use crate::drawing::{Image, Pixels};
 use crate::error::{guarded, os_error};
 
-/// Bytes that are collected before they are written.
+/// The number of bytes that are collected before they are written.
 const BUFFER: usize = 1 << 20;
 
 /// An animation that is being written. A file appears when it is complete.
@@ -135,7 +135,7 @@ impl Write for Sink {
 }
 
 impl Destination {
-    /// Writes what belongs to the start of the file.
+    /// Writes the bytes that belong to the start of the file.
     fn complete(&mut self, finished: Finished) -> io::Result<()> {
         match (self, finished.length) {
             (Self::File(file), Some((at, length))) => file.overwrite(at, &length)?,
@@ -160,7 +160,7 @@ fn movie_error(error: rayfold_movie::Error) -> PyErr {
     }
 }
 
-/// An error of the format is one of the value; all others are the system's.
+/// An error of the format becomes a `ValueError`; all others are errors of the system.
 fn io_error(error: io::Error) -> PyErr {
     if error.kind() == io::ErrorKind::Other { PyValueError::new_err(error.to_string()) } else { error.into() }
 }

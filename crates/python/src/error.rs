@@ -112,7 +112,7 @@ pub(crate) fn os_error(error: rayfold_files::Error) -> PyErr {
     PyOSError::new_err(format!("{error}{source}"))
 }
 
-/// Does `work`, and makes an exception of a panic, which is a bug of this package.
+/// Runs `work`, and makes an exception of a panic, which is a bug of this package.
 ///
 /// # Errors
 /// Fails if there was a panic.

@@ -1,11 +1,11 @@
-//! Files that are on no disk: meshes and pictures that were handed over as arrays.
+//! Files that are not on disk: meshes and pictures that were passed as arrays.
 //!
-//! Such a file is named by the hash of its content, so that what is the same in two frames is one file: on disk, in a bucket
-//! and in memory, where it is decoded once. A script that has any finds them beside those of its folder, by the trait for
-//! files in folders. What a script draws is the same before and after the files are written beside it.
+//! Such a file is named by the hash of its content. So equal arrays in two frames are one file on disk, in a bucket and
+//! in memory, where it is decoded once. A script finds these files like those in its folder, by the same trait. Its
+//! picture is the same before and after the files are written beside it.
 //!
-//! Invariants: a file is in memory while a scene or a material has it, and the latest few, within a bound. The content of a
-//! name never changes.
+//! Invariants: a file is in memory while a scene or a material uses it. The latest few, within a bound, stay longer.
+//! The content of a name never changes.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write as _;
@@ -25,14 +25,15 @@ use sha2::{Digest, Sha256};
 use crate::error::{guarded, os_error};
 use crate::place::quoted;
 
-/// The latest files, which stay although nothing has them: a frame may be drawn and thrown away before the next is made.
+/// The latest files, which stay although nothing uses them: a frame may be drawn and discarded before the next one is
+/// made.
 const LATEST: usize = 8;
 const LATEST_BYTES: usize = 64 << 20;
 
-/// The bytes of a hash that are part of a name.
+/// The number of bytes of a hash in a name.
 const BYTES_OF_HASH: usize = 10;
 
-/// The bytes that are hashed in one piece. Another number gives other names.
+/// The number of bytes that are hashed in one piece. Another number would give other names.
 const PIECE: usize = 1 << 20;
 
 /// A file that was made of arrays.
@@ -53,8 +54,8 @@ struct Content {
 struct Known {
     all: BTreeMap<String, Weak<Content>>,
     latest: VecDeque<Arc<Content>>,
-    /// The names of files that are gone. Libraries forget them when one is asked for next: not where the last owner lets
-    /// go, which may be a library at work.
+    /// The names of files that are gone. Libraries drop them at the next request for a library. They do not do so when
+    /// the last owner of a file is dropped, because that may be a library at work.
     gone: Vec<String>,
 }
 
@@ -80,7 +81,7 @@ impl Drop for Content {
 }
 
 impl Given {
-    /// Makes a file, or returns the one with this content. `kind` begins its name, `ending` ends it.
+    /// Makes a file, or returns an existing one with this content. `kind` begins its name, `ending` ends it.
     pub(crate) fn new(kind: &str, ending: &str, bytes: Vec<u8>) -> Self {
         let name = format!("{kind}-{}{ending}", hash(&bytes));
         Self::of(name, bytes)
@@ -111,12 +112,12 @@ impl Given {
         &self.0.name
     }
 
-    /// Returns the file as the client sends it.
+    /// Returns the file in the form that the client uploads.
     pub(crate) fn file(&self) -> Result<File, rayfold_client::Error> {
         File::new(Sent::Bytes(self.0.bytes.clone().into()))
     }
 
-    /// Returns those of a script's text that are in memory, and not in its folder.
+    /// Returns the files that a script names and that are in memory, but not in its folder.
     pub(crate) fn in_text(text: &str, script: &Path) -> Givens {
         let folder = script.parent().unwrap_or(Path::new(""));
         let mut found = Givens::new();
@@ -132,8 +133,8 @@ impl Given {
     }
 }
 
-/// Returns the digits that stand for a content in its name: those of the hash of the hashes of its pieces, which are made side
-/// by side.
+/// Returns the digits of a content's hash for its name. It is the hash of the hashes of its pieces, which are computed
+/// in parallel.
 fn hash(bytes: &[u8]) -> String {
     let pieces: Vec<_> = bytes.par_chunks(PIECE).map(Sha256::digest).collect();
     let mut whole = Sha256::new();
@@ -187,7 +188,7 @@ impl Given {
     }
 }
 
-/// Files in memory before those of a folder.
+/// A source that looks for files in memory first, and then in a folder.
 struct Both<F> {
     folder: F,
 }
@@ -214,7 +215,7 @@ fn content(name: &str) -> Option<Arc<Content>> {
     known().all.get(name)?.upgrade()
 }
 
-/// Returns the library of a script that has such files.
+/// Returns the library for a script with such files.
 pub(crate) fn library_with_given(script: &Path) -> Arc<Library> {
     let folder = script.parent().unwrap_or(Path::new("")).to_path_buf();
     let gone = std::mem::take(&mut known().gone);

@@ -1,15 +1,15 @@
 //! The extension module of the Python package: scenes as text, pictures, animations.
 //!
 //! Python's side (`python/rayfold`) is small: it makes a method of each command in `signature::METHODS`, gives arrays
-//! their shape, and takes scenes from functions and iterators. All checks, texts and pictures are made here. A scene is the
-//! text of its script (`script`), so what Python draws is what `rayfold render` draws of that text.
+//! their shape, and takes scenes from functions and iterators. This crate makes all checks, texts and pictures. A scene
+//! is the text of its script (`script`), so Python draws the same picture as `rayfold render` does from that text.
 //!
-//! `unsafe`: this crate writes none. PyO3's attributes expand to it where Python calls a function of Rust, for pointers that
-//! CPython passes. The lint allows that in code of other crates' macros, so that `forbid` holds here as in the whole
-//! workspace.
+//! `unsafe`: this crate writes none. PyO3's attributes expand to `unsafe` for the pointers that CPython passes when
+//! Python calls a Rust function. The lint allows that in code from other crates' macros, so `forbid` holds here as in
+//! the whole workspace.
 //!
-//! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. No panic leaves the module as one. The
-//! library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
+//! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. A panic becomes a Python exception.
+//! The library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
 
 mod arrays;
 mod bucket;

@@ -34,14 +34,14 @@ struct Clauses {
     other: Option<(usize, Other)>,
     /// Whether the material may be the other one of a pattern.
     is_plain: bool,
-    /// The picture that was handed over as an array.
+    /// The picture that was passed as an array.
     given: Option<Given>,
 }
 
 /// The other material of a pattern.
 #[derive(Debug)]
 enum Other {
-    /// The name, and the keyword that gives it.
+    /// The name, and the keyword for which it was given.
     Named(String, &'static str),
     Surface(Arc<Surface>),
 }
@@ -50,7 +50,7 @@ enum Other {
 pub(crate) type Value<'py> = (usize, Bound<'py, PyAny>);
 
 impl Surface {
-    /// Returns the picture of its pattern, if it was handed over. The other material of a pattern has none.
+    /// Returns the picture of its pattern, if it was passed as an array. The other material of a pattern has none.
     pub(crate) fn given(&self) -> Option<&Given> {
         self.clauses.given.as_ref()
     }
@@ -90,9 +90,9 @@ impl Material {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Materials {
     defined: HashMap<Arc<str>, Defined>,
-    /// The names of those without one of their own, by their clauses.
+    /// The generated names of materials without a name of their own, by their clauses.
     unnamed: HashMap<Arc<str>, Arc<str>>,
-    /// The last one that was used, and its name.
+    /// The material that was used last, and its name.
     last: Option<(Arc<Surface>, Arc<str>)>,
     count: usize,
 }
@@ -107,7 +107,7 @@ struct Defined {
 }
 
 impl Materials {
-    /// Notes the name of a material whose clauses are not known.
+    /// Records the name of a material whose clauses are not known.
     pub(crate) fn note(&mut self, name: &str) {
         self.defined.insert(name.into(), Defined { text: None, is_plain: true });
     }
@@ -120,7 +120,7 @@ impl Materials {
     /// `definitions`, if they are not there yet.
     ///
     /// # Errors
-    /// Fails if its name is that of another material, or its pattern names one that is not there or not fit.
+    /// Fails if its name is that of another material, or if its pattern names a material that is missing or unsuitable.
     pub(crate) fn define(
         &mut self,
         method: &str,
@@ -311,7 +311,7 @@ fn read_clauses(method: &str, mut given: Vec<Value<'_>>) -> PyResult<Clauses> {
     Ok(clauses)
 }
 
-/// Adds a clause to the text of others. Returns the other material of a pattern.
+/// Adds a clause to the text of the others. Returns the other material of a pattern.
 fn read_clause(
     method: &str,
     keyword: &'static Keyword,
@@ -358,7 +358,7 @@ fn read_clause(
     Ok(other)
 }
 
-/// Adds a picture to `text`: its file, the way in which it lies, and the width and axes of a flat one. Returns a file that was
+/// Adds a picture to `text`: its file, its mapping, and the width and axes of a flat one. Returns the file if it was
 /// made of an array.
 fn read_image(
     value: &Bound<'_, PyAny>,

@@ -1,4 +1,5 @@
-//! Places of values in calls, values as messages show them, and what several kinds of values share.
+//! The position of a value in a call, for messages; values as messages show them; and functions that several kinds of
+//! values share.
 
 use std::borrow::Cow;
 use std::fmt::{self, Display, Formatter};
@@ -8,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyDict, PyFrozenSet, PyIterator, PySet, PyString};
 use rayfold_scene::color_levels;
 
-/// The place of a value, for messages: `sphere(): radius`.
+/// The position of a value, for messages: `sphere(): radius`.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a> {
     pub(crate) method: &'a str,
@@ -49,15 +50,15 @@ pub(crate) fn color_text<'a>(name: &'a Bound<'_, PyString>, place: Place<'_>) ->
 /// Returns a value that is True or False.
 ///
 /// # Errors
-/// Fails for others, also if Python takes them for true.
+/// Fails for other values, even if Python treats them as true.
 pub(crate) fn flag_of(value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<bool> {
     value
         .extract::<bool>()
         .map_err(|_| PyTypeError::new_err(format!("{place} is True or False, not {}", shown(value))))
 }
 
-/// Returns the items of an array or an iterator; nothing for what holds no numbers in order, although Python iterates over
-/// it.
+/// Returns the items of an array or an iterator, or `None` for a value that holds no numbers in order, although Python
+/// can iterate over it.
 pub(crate) fn items_of<'py>(value: &Bound<'py, PyAny>) -> Option<Bound<'py, PyIterator>> {
     let has_no_numbers = value.is_instance_of::<PyString>()
         || value.is_instance_of::<PyBytes>()

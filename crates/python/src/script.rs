@@ -1,9 +1,10 @@
 //! A scene as the text of its script, line by line.
 //!
-//! The text is the only copy: what is drawn is what `rayfold render` would draw of it. Each call checks its arguments and
-//! adds a line. The text is parsed when frames are asked for, and the parsed script is kept until the next line.
+//! The text is the only copy of the scene, and Python draws the same as `rayfold render` from it. Each call checks its
+//! arguments and adds a line. The text is parsed when frames are requested, and the parsed script is kept until the
+//! next line.
 //!
-//! Invariants: a call that fails adds nothing but, perhaps, a material that nothing uses. A material is defined outside of
+//! Invariants: a call that fails adds nothing, except perhaps an unused material. A material is defined outside of
 //! groups and before its use.
 
 use std::path::Path;
@@ -95,7 +96,7 @@ impl Script {
         }
     }
 
-    /// Parses a text, with the files of the script's folder and those that were handed over.
+    /// Parses a text, with the files of the script's folder and those that were passed as arrays.
     fn parse(&self, py: Python<'_>, text: &str) -> PyResult<rayfold_scene::Parsed> {
         let name = &self.name;
         let of_script = if self.given.is_empty() { library_beside } else { library_with_given };
@@ -142,7 +143,7 @@ impl Script {
         self.parsed = None;
     }
 
-    /// Notes what a line that was added has changed.
+    /// Records the changes by a line that was added.
     fn note(&mut self, command: Command, name: Option<String>) {
         self.is_open = command != Command::Trace;
         match command {
@@ -246,7 +247,7 @@ impl Script {
     /// Returns the name that a line defines or refers to.
     ///
     /// # Errors
-    /// Fails for a name that is not valid, is there already, or is not there yet.
+    /// Fails if the name is invalid, is already defined, or is not yet defined.
     fn name_of(&mut self, kind: Subject, value: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
         if matches!(kind, Subject::Quotes(Quotes::File)) {
             if let Ok(file) = value.cast::<Handed>() {
@@ -289,7 +290,7 @@ impl Script {
         }
     }
 
-    /// Takes a file that was handed over, and returns its name as a script has it.
+    /// Takes a file that was passed as an array, and returns its name for the script.
     ///
     /// # Errors
     /// Fails if a script may have no more.
@@ -591,7 +592,7 @@ impl Script {
 /// Returns the words that make a mesh smooth.
 ///
 /// # Errors
-/// Fails for an angle that is none.
+/// Fails if the value is no such angle.
 fn smooth(angle: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
     let degrees: f64 = angle.extract().map_err(|_| {
         PyTypeError::new_err(format!("{place} takes a number of degrees, not {}", shown(angle)))
@@ -604,7 +605,7 @@ fn smooth(angle: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<String> {
     Ok(words)
 }
 
-/// Returns the word for the place of the lines of a text, which is one of those that the command takes before `font`.
+/// Returns the word for the alignment of the lines of a text: one of those that the command takes before `font`.
 ///
 /// # Errors
 /// Fails for another word.

@@ -1,7 +1,7 @@
-//! The commands and clauses as Python sees them: methods, parameters and keywords, from the table of the language.
+//! The commands and clauses in their Python form: methods, parameters and keywords, from the table of the language.
 //!
-//! Knows no Python object. A command that the table gains appears here by itself, with names that are made of the table's;
-//! [`chosen`] holds only names that read better.
+//! Knows no Python object. A new command of the table appears here by itself, with names derived from the table.
+//! [`chosen`] holds only better names.
 //!
 //! Invariants: the names of a signature are unique, and none is a keyword of Python.
 
@@ -25,7 +25,7 @@ pub(crate) struct Signature {
 pub(crate) struct Keyword {
     pub(crate) clause: Clause,
     pub(crate) name: String,
-    /// The names of the entries of the value, one for each field, then that of another material.
+    /// The names of the entries of the value, one per field, then that of another material.
     pub(crate) entries: Vec<String>,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Parameter {
     pub(crate) is_required: bool,
 }
 
-/// The place of a parameter in a line of a script.
+/// The position of a parameter in a line of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// The name that the line defines or refers to.
@@ -50,7 +50,7 @@ pub(crate) enum Role {
     Smooth,
     /// Whether a mesh is flat.
     Flat,
-    /// The place of the lines of a text.
+    /// The alignment of the lines of a text.
     Align,
     /// The file of the font of a text.
     Font,
@@ -169,7 +169,7 @@ fn field_name(form: &Form, field: &Field) -> String {
     }
 }
 
-/// Returns the name of a parameter that has a better one than the table's.
+/// Returns the better name of a parameter, if it has one besides the table's.
 fn chosen(field: &Field) -> Option<&'static str> {
     Some(match field.parameter {
         Meaning::ScreenWidth => "width",
@@ -209,12 +209,12 @@ fn chosen(field: &Field) -> Option<&'static str> {
     })
 }
 
-/// Returns the words for the place of the lines of a text: those that stand alone behind its surface.
+/// Returns the words for the alignment of the lines of a text: those that stand alone after its surface.
 pub(crate) fn aligns(form: &Form) -> &'static [&'static str] {
     form.options.split_last().map_or(&[], |(_font, words)| words)
 }
 
-/// Returns the table's words for a parameter, without the article and the letter behind it.
+/// Returns the table's words for a parameter, without the article and the letter after it.
 fn described(meaning: Meaning) -> String {
     let words = meaning.to_string();
     let words = words.strip_prefix("the ").unwrap_or(&words).replace("'s", "");

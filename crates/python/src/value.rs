@@ -23,7 +23,7 @@ pub(crate) struct Numbers {
     values: [f64; MOST],
     count: usize,
     pub(crate) moves: bool,
-    /// Whether the last number is of a colour that is written as `#rrggbb`.
+    /// Whether the last number belongs to a colour that is written as `#rrggbb`.
     is_behind_color: bool,
 }
 
@@ -159,7 +159,7 @@ impl Numbers {
         if self.count == before + length { Ok(()) } else { Err(wrong()) }
     }
 
-    /// Adds a colour as it is written: what it means may depend on the tone of the picture.
+    /// Adds a colour as it is written, because its meaning may depend on the tone of the picture.
     fn color(
         &mut self,
         text: &mut String,
@@ -237,7 +237,8 @@ pub(crate) fn write_number(text: &mut String, x: f64) {
         if x == 0.0 || (1e-5..1e16).contains(&x.abs()) { write!(text, "{x}") } else { write!(text, "{x:e}") };
 }
 
-/// Adds a number with few decimals, such as people write: faster, with the same digits. Returns false for others.
+/// Adds a number with few decimals, such as people write. It is faster and gives the same digits. Returns `false` for
+/// other numbers.
 fn write_short(text: &mut String, x: f64) -> bool {
     const PLACES: usize = 6;
     const SCALE: f64 = 1e6;
@@ -316,7 +317,7 @@ pub(crate) fn refused(
 /// Checks the constant numbers and the keys of a line with curves. Values between keys are checked with the frames.
 ///
 /// # Errors
-/// Fails for a number that its field never takes.
+/// Fails for a number that its field never allows.
 pub(crate) fn check_alone(method: &str, form: &Form, names: &[&str], values: &[f64]) -> PyResult<()> {
     let mut end = 0;
     for (field, name) in form.fields.iter().zip(names) {
