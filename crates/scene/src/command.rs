@@ -1,7 +1,7 @@
 //! The commands of the language, and the correction of misspelt ones.
 //!
-//! This is the only list of commands, but for the shapes, whose list is in [`shapes`]. Each command refers to its [`Form`], which is defined beside the type
-//! that the command makes.
+//! This is the only list of commands, except that the list of shapes is in [`shapes`]. Each command refers to its
+//! [`Form`], which is defined beside the type that the command makes.
 
 use std::fmt;
 use std::ops::Range;
@@ -192,7 +192,8 @@ impl Command {
         self.form().name
     }
 
-    /// Returns the command with this name, in any letter case: of the two named `Sky`, the one with colours.
+    /// Returns the command with this name, in any letter case. For `Sky`, which is the name of two commands, it returns
+    /// the one with colours.
     pub fn from_name(name: &str) -> Option<Self> {
         let letter = name.bytes().next()?.to_ascii_lowercase().wrapping_sub(b'a');
         let first = *INDEX.first.get(usize::from(letter))?;
@@ -204,8 +205,8 @@ impl Command {
         chain().find(|c| c.name() == name).or_else(|| chain().find(|c| c.name().eq_ignore_ascii_case(name)))
     }
 
-    /// Returns the command whose line begins with this word behind its name: of the two named `Sky`, one takes the name of a
-    /// file.
+    /// Returns the command whose line has this word after its name. One of the two commands named `Sky` takes the name
+    /// of a file.
     pub fn with_first_word(self, word: Option<&str>) -> Self {
         match (self, word) {
             (Self::Sky, Some(word)) if names_file(word) => Self::SkyPicture,
@@ -213,8 +214,8 @@ impl Command {
         }
     }
 
-    /// Returns whether a colour as `#rrggbb` may stand after these parameters, without the name before them. A colour
-    /// is three equal words.
+    /// Returns whether a colour in the form `#rrggbb` may follow these parameters, which are given without the name
+    /// before them. A colour counts as three equal words.
     pub fn takes_color(self, words: &[&str]) -> bool {
         let is_behind_color = words.last().is_some_and(|word| word.starts_with('#'));
         if !matches!(self.effect(), Effect::Material) {
@@ -225,7 +226,7 @@ impl Command {
     }
 
     /// Returns the errors in the numbers of a line without curves, each with the range of the numbers that it is about.
-    /// `numbers` are as many as the form takes, those from [`Form::surface`] on left out if a material is named.
+    /// `numbers` has as many numbers as the form takes, without those from [`Form::surface`] on if a material is named.
     pub fn check(self, numbers: &[f64]) -> Vec<(InvalidValue, Range<usize>)> {
         let form = self.form();
         let mut values = [0.0; MAX_NUMBERS];

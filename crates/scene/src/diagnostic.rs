@@ -39,7 +39,7 @@ pub enum Code {
     TextTooLarge,
     /// Bytes that are not UTF-8.
     NotUtf8,
-    /// A carriage return that no line feed follows.
+    /// A carriage return without a line feed after it.
     LoneCarriageReturn,
     /// The first word of a line is no command.
     UnknownCommand,
@@ -105,7 +105,7 @@ pub enum Code {
     NeedsSamples,
     /// Colours that need light in a scene without lights.
     NoLight,
-    /// Surfaces have light from nowhere beside that of `Indirect`.
+    /// Surfaces have ambient light in addition to that of `Indirect`.
     AmbientLight,
     /// Several triangles of glass, which do not refract.
     GlassPanes,

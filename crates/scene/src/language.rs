@@ -166,7 +166,7 @@ fn entry(form: &'static Form, about: &'static str) -> CommandEntry {
     }
 }
 
-/// Returns the entry of a parameter, before which there are so many numbers.
+/// Returns the entry of a parameter that comes after this many numbers.
 fn parameter(form: &Form, field: &Field, first: usize) -> ParameterEntry {
     let presence = match field.presence {
         // Ambient and diffuse stand or are omitted together.

@@ -1,7 +1,7 @@
 //! Parser and writer of scene scripts: text to typed scenes and back, with all diagnostics.
 //!
-//! Does no I/O: text comes in, scenes and diagnostics go out. Of the other crates it knows `rayfold-assets` alone, which
-//! decodes the files that scripts name; their bytes come from the caller ([`parse_with_files`]).
+//! Does no I/O: text comes in, scenes and diagnostics go out. It uses only one other crate of the project,
+//! `rayfold-assets`, which decodes the files that scripts name. The caller provides their bytes ([`parse_with_files`]).
 //!
 //! ```
 //! use rayfold_scene::{Limits, parse};

@@ -30,7 +30,7 @@ impl Limits {
     pub const SCRIPT_BYTES: usize = 256 << 20;
     /// As many objects as fit into a few gigabytes together with the acceleration structures.
     pub const OBJECTS: usize = 4_000_000;
-    /// The triangles of models that a frame draws, each model as often as it is drawn.
+    /// The triangles of models that a frame draws. Each model counts as often as it is drawn.
     pub(crate) const DRAWN_TRIANGLES: usize = 16_000_000;
     /// The largest number of drawn groups per allowed object: groups that only use others cost time, too.
     pub(crate) const USES_PER_OBJECT: usize = 4;

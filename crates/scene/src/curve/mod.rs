@@ -53,7 +53,8 @@ pub(crate) struct Moment {
     pub(crate) value: f64,
 }
 
-/// The share of an exposure below which a few moments can miss the time between two keys. An exposure takes at most a frame.
+/// A time between two keys is short if it is below this share of an exposure: then a few moments of the exposure can
+/// miss it. An exposure takes at most a frame.
 pub(crate) const QUICK: f64 = 0.125;
 
 /// The distance by which computed values may lie outside of the values at the ends of an interval without

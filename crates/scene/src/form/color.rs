@@ -1,4 +1,4 @@
-//! Colours that are written as `#rrggbb`, and where one may stand.
+//! Colours that are written as `#rrggbb`, and the positions where they are allowed.
 
 use super::{Field, Form, Kind, Presence};
 
@@ -31,8 +31,8 @@ impl Field {
 }
 
 impl Form {
-    /// Returns whether a colour as `#rrggbb` may stand after `count` numbers: where a colour must stand, and where one
-    /// may stand right behind another that is written so. A colour counts as three numbers.
+    /// Returns whether a colour in the form `#rrggbb` may follow `count` numbers. It may for a required colour, and for
+    /// an optional colour directly after another that is written in this form. A colour counts as three numbers.
     pub fn takes_color(&self, count: usize, is_behind_color: bool) -> bool {
         let mut start = 0;
         self.fields.iter().any(|field| {

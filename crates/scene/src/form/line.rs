@@ -24,7 +24,7 @@ impl<'a> Numbers<'a> {
         Self { rest: values, written, surface }
     }
 
-    /// Returns whether the form's word stands in place of all numbers.
+    /// Returns whether the form's word replaces all numbers.
     pub(crate) fn is_word(&self) -> bool {
         self.written == 0
     }

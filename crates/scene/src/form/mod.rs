@@ -1,4 +1,4 @@
-//! The syntax of a command: its name and its parameters, apart from its effect.
+//! The syntax of a command: its name and its parameters, but not its effect.
 //!
 //! Each type that a line of a script can hold defines its syntax once ([`Scripted`]). The parser, the writer, the
 //! hints, editors and the documentation's test use only this definition. [`crate::Command`] lists all commands;
@@ -47,11 +47,11 @@ pub struct Form {
     may_be_bare: bool,
     /// The words among the numbers of a clause.
     pub words: Option<Words>,
-    /// The words that may stand behind the numbers, each with what belongs to it.
+    /// The words that may follow the numbers, each with its own arguments.
     pub options: &'static [&'static str],
     /// The count of numbers at the start that are never curves.
     fixed: usize,
-    /// The usage, where it is not derived from the parameters.
+    /// The usage, if it is not derived from the parameters.
     usage: Option<&'static str>,
 }
 
@@ -71,7 +71,7 @@ pub enum Subject {
 pub enum Quotes {
     /// The plain name of a file in the script's own folder.
     File,
-    /// Words that are drawn.
+    /// Words that are drawn as letters.
     Words,
 }
 
@@ -84,12 +84,12 @@ pub enum Names {
     Groups,
 }
 
-/// The words among the numbers of a clause: one before them, and one behind them.
+/// The words among the numbers of a clause: one before them, and one after them.
 #[derive(Debug)]
 pub struct Words {
     /// The word before the numbers.
     pub before: Field,
-    /// The only value of `before` behind which there are more words and numbers.
+    /// The only value of `before` after which there are more words and numbers.
     pub with_numbers: &'static str,
     /// The word behind the numbers.
     pub behind: Field,
@@ -117,7 +117,7 @@ pub enum Presence {
     Required,
     /// The parameter is given whole or omitted.
     Optional(&'static str),
-    /// Its numbers may be omitted one by one, from the end.
+    /// The numbers may be omitted one by one, from the end.
     FromTheEnd(&'static str),
 }
 
@@ -142,7 +142,7 @@ pub enum Kind {
     Plain,
     /// Red, green and blue.
     Color,
-    /// The share of the light that a surface sends on, for red, green and blue.
+    /// The share of light that a surface scatters, reflects or transmits, for red, green and blue.
     Coefficients,
     /// An error of a picture.
     Error,
@@ -163,7 +163,7 @@ pub enum Unit {
     Frames,
     /// Levels of a channel, from 0 to 255.
     Levels,
-    /// Lengths of the world, which the script chooses.
+    /// Lengths in world units, which the script chooses.
     World,
     /// Brightness on the screen: 0 is black, 1 the brightest.
     Display,
@@ -272,7 +272,7 @@ impl Form {
         Self { usage: Some(usage), ..self }
     }
 
-    /// Allows to omit the numbers of the surface together.
+    /// Allows the numbers of the surface to be omitted together.
     pub(crate) const fn with_optional_surface(self) -> Self {
         let surface = match self.surface {
             Some(first) => first,
@@ -286,7 +286,7 @@ impl Form {
         Self { words: Some(words), ..self }
     }
 
-    /// Adds words that may stand behind the numbers.
+    /// Adds words that may follow the numbers.
     pub(crate) const fn with_options(self, options: &'static [&'static str]) -> Self {
         Self { options, ..self }
     }
@@ -331,12 +331,12 @@ impl Form {
         self.curves && i >= self.fixed
     }
 
-    /// Returns whether a word is one of those that may stand behind the numbers.
+    /// Returns whether a word is one of those that may follow the numbers.
     pub fn is_option(&self, word: &str) -> bool {
         self.options.iter().any(|option| option.eq_ignore_ascii_case(word))
     }
 
-    /// Returns whether this count of numbers leaves out those of the surface, which may be omitted together.
+    /// Returns whether this count of numbers omits those of the surface, which may be omitted together.
     pub fn is_bare(&self, count: usize) -> bool {
         self.may_be_bare && self.surface == Some(count)
     }
@@ -346,8 +346,8 @@ impl Form {
         self.may_be_bare && self.surface.is_some_and(|first| i >= first)
     }
 
-    /// Returns the default of a parameter of a surface that may be omitted: where nothing else is known, .9 of the colour .8 is
-    /// diffuse, and .1 ambient.
+    /// Returns the default of a parameter of a surface that may be omitted. Without further information, .9 of the
+    /// colour .8 is diffuse, and .1 ambient.
     pub fn surface_default(&self, field: &Field) -> Option<&'static str> {
         match (self.subject, field.parameter) {
             _ if !self.may_be_bare => None,
@@ -379,7 +379,7 @@ impl Form {
         (least, self.most)
     }
 
-    /// Returns the count of numbers of the parameters that are required if there is any number of the surface.
+    /// Returns the count of numbers of the required parameters, if there is any number of the surface.
     pub const fn required(&self) -> usize {
         self.required
     }
@@ -427,13 +427,13 @@ impl Form {
         number.unwrap_or_else(|| unreachable!("`{}` has no number {i}", self.name))
     }
 
-    /// Returns all parameters in the order of the line, those that are words among the numbers included.
+    /// Returns all parameters in the order of the line, including words among the numbers.
     pub fn parameters(&self) -> impl Iterator<Item = &Field> {
         let (before, behind) = self.words.as_ref().map(|words| (&words.before, &words.behind)).unzip();
         before.into_iter().chain(self.fields).chain(behind)
     }
 
-    /// Returns the parameters of a line that begins with this word behind the name in quotes.
+    /// Returns the parameters of a line that has this word after the name in quotes.
     pub fn parameters_behind(&self, first: &str) -> impl Iterator<Item = &Field> {
         let is_alone =
             self.words.as_ref().is_some_and(|words| !words.with_numbers.eq_ignore_ascii_case(first));

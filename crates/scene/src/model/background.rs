@@ -17,8 +17,8 @@ pub struct Background {
 }
 
 impl Background {
-    /// No background: rays that reach nothing straight or through glass leave the picture transparent. All other rays see the sky,
-    /// or black without one.
+    /// No background: the picture is transparent where camera rays hit nothing, directly or through glass. All other
+    /// rays see the sky, or black without one.
     pub const NONE: Self = Self { low: DVec3::ZERO, high: None, is_none: true };
 
     /// Makes a background of one colour. Clamps each channel to 0..=1, and makes zeros positive.
