@@ -497,8 +497,8 @@ impl Model {
         self.looks[look].factor.map_or(DVec3::ONE, |factor| self.read(factor, linear))
     }
 
-    /// Returns whether the product of a colour's factors is the number of the picture that is drawn. `linear` is whether that is
-    /// computed in linear light.
+    /// Returns whether the factors of a colour can be multiplied directly as numbers of the drawn picture. `linear` is
+    /// whether that is computed in linear light.
     pub fn is_product(&self, linear: bool) -> bool {
         linear || self.space == Colors::Levels
     }

@@ -176,7 +176,7 @@ fn look(material: &Material) -> Look {
     }
 }
 
-/// Returns the texture of a material for a use, if it counts.
+/// Returns the texture of a material for a use. That of a glow without light does not count.
 fn texture(material: &Material, slot: Slot) -> Option<&TextureInfo> {
     match slot {
         Slot::Color => material.pbr_metallic_roughness.base_color_texture.as_deref(),

@@ -226,7 +226,7 @@ fn directed(at: I64Vec2, chords: [DVec2; 2], known: Option<Corner>) -> Corner {
     Corner { at, before, after }
 }
 
-/// Checks that contours cross often enough for letters and not so often that to join them has no end.
+/// Checks that contours do not lie above one another or cross so often that joining them would take too long.
 fn check_crossings(contours: &[Contour]) -> Result<(), Fault> {
     let mut chords: Vec<[I64Vec2; 2]> = contours
         .iter()
