@@ -406,7 +406,7 @@ impl Plan {
         &self.parts[job.part].file.name
     }
 
-    /// Selected frames of one shape in a row, each with the number of its first.
+    /// Returns the runs of selected frames of one shape, each with the number of its first frame.
     fn runs(&self) -> impl Iterator<Item = (u64, &Part, &Shape)> {
         let mut next = 1;
         self.parts.iter().flat_map(|part| part.runs.iter().map(move |run| (part, run))).filter_map(
