@@ -146,7 +146,7 @@ mod tests {
         Some(File { version: ETag::new(text), body: text.to_owned().into() })
     }
 
-    /// Works as for a frame: first the names that are missing, then the drawing. @6d422x
+    /// Works as for a frame: first the names that are missing, then the drawing.
     fn model(kept: &Kept, model: &str) -> Arc<assets::Model> {
         let files = [("c.obj".to_owned(), file(model)), ("c.mtl".to_owned(), None)];
         let files: Files = Arc::new(files.into_iter().collect());
