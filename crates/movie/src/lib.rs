@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// The file is the same whichever frame it is suspended after, also when frames are dropped, and with alpha.
+    /// The file is the same after a suspension at any frame, also when frames are dropped, and with alpha.
     #[test]
     fn a_file_in_two_pieces_is_the_file_in_one() {
         let frames: Vec<DynamicImage> = (0..7)
