@@ -97,7 +97,7 @@ pub fn parse_record(record: &[u8]) -> Result<Vec<Failure>> {
 ///
 /// # Errors
 ///
-/// [`Error::Key`] for a key that wakes nothing: a retry would not help. Others are the store's.
+/// [`Error::Key`] for a key that triggers nothing: a retry would not help. All other errors are the store's.
 pub async fn record_failure<S: Store, C: Clock>(
     invocation: &Invocation<'_, S, C>,
     failure: &Failure,
