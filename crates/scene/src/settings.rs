@@ -91,7 +91,7 @@ impl AnimationSettings {
     /// The allowed times of a frame in seconds. Players slow down a shorter one, and a GIF can hold no longer one.
     pub const DURATION: RangeInclusive<f64> = 0.02..=655.35;
 
-    /// The files that a bucket makes of an animation if nothing else is asked for.
+    /// The files that a bucket makes of an animation by default.
     pub const DEFAULT_OUTPUTS: &[Container] = &[Container::Gif];
 
     /// Makes settings. `frames` is the expected number of frames, or `None` for the existing ones. `fps` is the frame
@@ -117,7 +117,7 @@ impl AnimationSettings {
         Self::new(frames, self.fps, self.loops).map(|of| Self { frames: of.frames, ..self })
     }
 
-    /// Fills in the number of frames that there are.
+    /// Fills in the existing number of frames.
     #[must_use]
     pub fn of_frames(self, frames: u64) -> Self {
         Self { frames: Some(frames).filter(|frames| *frames > 0), ..self }

@@ -185,8 +185,8 @@ impl Scripted for Pinhole {
     }
 }
 
-/// The largest relative difference between the shapes of window and image. A window's outer pixels lie on its border,
-/// so its shape is between nx : ny and (nx - 1) : (ny - 1). Users also round the numbers that they write.
+/// The largest relative difference between the aspect ratios of window and image. A window's outer pixels lie on its
+/// border, so its shape is between nx : ny and (nx - 1) : (ny - 1). Users also round the numbers that they write.
 const TOLERANCE: f64 = 0.02;
 
 /// Returns the window with square pixels, with the same height and centre, or `None` if this one has them.

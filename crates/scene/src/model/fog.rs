@@ -12,7 +12,7 @@ use crate::form::{Field, Form, Kind, Line, Numbers, Scripted, Values};
 pub struct Fog(Option<(DVec3, f64)>);
 
 impl Fog {
-    /// Makes fog of a colour. Over the `distance`, in world units, 1 - 1/e of what a ray brings is the fog's colour.
+    /// Makes fog of a colour. At the `distance`, in world units, the fog's colour makes up 1 - 1/e of a ray's colour.
     ///
     /// # Errors
     /// Fails if the distance is not positive or a number is not finite.

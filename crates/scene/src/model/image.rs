@@ -10,13 +10,13 @@ pub struct Image {
     map: ImageMap,
 }
 
-/// The way in which a picture lies on a surface.
+/// The mapping of a picture onto a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImageMap {
     /// By the texture coordinates of a mesh.
     Uv,
-    /// On a plane of the coordinates of the object's numbers, so wide, greater than 0, with its lower left corner at 0. It
-    /// repeats.
+    /// On a plane of the coordinates of the object's numbers, with this width, greater than 0, and its lower left
+    /// corner at 0. It repeats.
     Flat(f64, Axes),
     /// Around the middle of the coordinates of the object's numbers, or that of a sphere.
     Ball,
@@ -55,7 +55,7 @@ impl Image {
         &self.file
     }
 
-    /// Returns the way in which it lies on the surface.
+    /// Returns its mapping onto the surface.
     pub fn map(&self) -> ImageMap {
         self.map
     }

@@ -1,4 +1,4 @@
-//! Light that surfaces throw on each other.
+//! Indirect light: light from one surface to another.
 
 use std::fmt;
 

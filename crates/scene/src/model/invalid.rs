@@ -134,7 +134,7 @@ pub enum Parameter {
     ScreenHeight,
     /// The colour of a ray that hits nothing.
     Background,
-    /// The light of a sky; of one with two colours that seen straight down.
+    /// The light of a sky. If the sky has two colours, the one that is seen straight down.
     Sky,
     /// The light of a sky that is seen straight up.
     SkyTop,
@@ -232,7 +232,7 @@ pub enum Parameter {
     Roughness,
     /// The size of a pattern's cells.
     CellSize,
-    /// The way in which a picture lies on a surface.
+    /// The mapping of a picture onto a surface.
     PictureMap,
     /// The width of a picture on a surface.
     PictureWidth,

@@ -41,8 +41,8 @@ pub struct Finish {
     pub rough: Option<Rough>,
 }
 
-/// The width α of the microfacets of a rough mirror or of rough glass (isotropic GGX), from 0 to 1. A curve can be 0 at a
-/// moment.
+/// The width α of the microfacets of a rough mirror or of rough glass (isotropic GGX), from 0 to 1. A curve may be 0 at
+/// some moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rough(f64);
 
@@ -151,13 +151,13 @@ pub struct Pattern {
 /// The weight of the other coefficients, from 0 to 1, as a function of the position in the coordinates of the script.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Weight {
-    /// 1 in every other cell of that size, greater than 0, along the three axes.
+    /// The weight is 1 in every other cell of this size, greater than 0, along the three axes.
     Checker(f64),
-    /// 1 in every other cell of that size, greater than 0, along x.
+    /// The weight is 1 in every other cell of this size, greater than 0, along x.
     Stripes(f64),
-    /// Perlin's improved noise (2002) of cells of that size, greater than 0.
+    /// The weight is Perlin's improved noise (2002) in cells of this size, greater than 0.
     Noise(f64),
-    /// From 0 at the first height y to 1 at the second, which differ.
+    /// The weight goes from 0 at the first height y to 1 at the second, which differ.
     Gradient(f64, f64),
 }
 

@@ -63,7 +63,7 @@ pub struct Scene {
     pub screen: Screen,
     /// The camera that generates the rays.
     pub camera: Camera,
-    /// The colour of rays that hit nothing. With a sky, only whether there is none for rays from the camera.
+    /// The colour of rays that hit nothing. If there is a sky, only whether camera rays see no background.
     pub background: Background,
     /// The light of rays that hit nothing, in place of the background's colours.
     pub sky: Option<Sky>,
@@ -73,7 +73,7 @@ pub struct Scene {
     pub lights: SharedSlice<Light>,
     /// The number of rays per pixel.
     pub samples: Samples,
-    /// Whether an object that is hidden at the moment is rough, and none that is seen.
+    /// Whether the only rough objects are hidden at the moment, so that none of them is visible.
     pub hides_rough: bool,
     /// The exposure time of a frame.
     pub shutter: Shutter,
@@ -119,8 +119,8 @@ impl Scene {
         if self.samples.most() > 1 { self.indirect.bounces() } else { 0 }
     }
 
-    /// Returns whether light goes round in the picture: no ray's colour is clamped then, and none is left out because its
-    /// factor is small.
+    /// Returns whether light goes round in the picture. Then no ray's colour is clamped, and no ray is left out because
+    /// its factor is small.
     pub fn goes_round(&self) -> bool {
         self.samples.most() > 1 && (self.indirect.bounces() > 0 || self.hides_rough || self.shows_rough())
     }
@@ -131,8 +131,8 @@ impl Scene {
         self.objects.iter().any(is_rough)
     }
 
-    /// Returns the colours of rays that hit nothing: those of the sky, of the background, or of the fog, which hides both. A sky
-    /// that is a picture is none of them ([`Self::sky_picture`]).
+    /// Returns the colours of rays that hit nothing: those of the sky, of the background, or of the fog, which hides
+    /// both. The picture of a sky is not included ([`Self::sky_picture`]).
     pub fn surroundings(&self) -> Background {
         match (self.fog.get(), &self.sky) {
             (Some((color, _)), _) => Background::of_fog(color),
@@ -141,7 +141,7 @@ impl Scene {
         }
     }
 
-    /// Returns the picture that rays see that hit nothing, unless fog hides it.
+    /// Returns the picture for rays that hit nothing, unless fog hides it.
     pub fn sky_picture(&self) -> Option<(&PictureFile, SkyTurn)> {
         match (&self.sky, self.fog.get()) {
             (Some(Sky::Picture(file, turn)), None) => Some((file, *turn)),

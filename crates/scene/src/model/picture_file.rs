@@ -12,7 +12,7 @@ pub struct PictureFile {
 }
 
 impl PictureFile {
-    /// Makes it of the plain name of a file and the picture in it.
+    /// Makes it from the plain name of a file and the picture in the file.
     pub fn new(file: &str, picture: Arc<Picture>) -> Self {
         Self { file: file.into(), picture }
     }
@@ -28,7 +28,7 @@ impl PictureFile {
     }
 }
 
-/// Two are equal if they are the same picture in memory.
+/// Two picture files are equal if they are the same picture in memory.
 impl PartialEq for PictureFile {
     fn eq(&self, other: &Self) -> bool {
         self.file == other.file && Arc::ptr_eq(&self.picture, &other.picture)

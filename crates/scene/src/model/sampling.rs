@@ -15,8 +15,8 @@ pub struct Samples {
 
 impl Samples {
     /// Makes a setting of at most `most` rays per pixel. Fewer are used where the image's error is estimated to be
-    /// below `error`, the root mean square in levels (0..255). With an error of 0, all rays are used. One ray is that
-    /// of language version 1, through the pixel's centre.
+    /// below `error`, the root mean square in levels (0..255). With an error of 0, all rays are used. With one ray, it
+    /// goes through the pixel's centre, as in language version 1.
     ///
     /// # Errors
     /// Fails if there is no ray, or the error is negative or not finite.

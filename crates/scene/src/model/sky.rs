@@ -9,7 +9,7 @@ use super::invalid::{Faults, InvalidValue, Parameter, finite, not_negative};
 use super::picture_file::PictureFile;
 use crate::form::{Field, Form, Kind, Line, Numbers, Quotes, Scripted, Subject, Values};
 
-/// The light that rays see that hit nothing.
+/// The light that rays see if they hit nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sky {
     /// One colour, or two.
@@ -25,7 +25,7 @@ pub struct SkyColors {
     high: Option<DVec3>,
 }
 
-/// The brightness of a sky's picture, and the way in which it is turned.
+/// The brightness of a sky's picture, and its rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyTurn {
     strength: f64,
@@ -47,7 +47,7 @@ impl SkyColors {
         (self.low, self.high)
     }
 
-    /// Returns the colours as a background, without the limit of one.
+    /// Returns the colours as a background, which may exceed 1.
     pub(super) fn background(self) -> Background {
         Background::of_light(self.low, self.high)
     }

@@ -18,7 +18,7 @@ pub(super) enum CurveFault {
     NotAMode(String),
     /// A mode comes after another mode or after a key.
     MisplacedMode(String),
-    /// A mark is unexpected: a second `(`, or a `:` without a frame before it.
+    /// A character is unexpected: a second `(`, or a `:` without a frame before it.
     Stray(String),
     /// A frame has no `:` and value.
     NoValue,

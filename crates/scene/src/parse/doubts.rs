@@ -33,16 +33,16 @@ type Place<'a> = (Line<'a>, Range<usize>);
 /// The lines whose effect is in doubt.
 #[derive(Default)]
 pub(super) struct Doubts<'a> {
-    /// The line of the lens, if it was not rendered yet; then those of the shutter and of a light of the scene. All
-    /// three need several rays per pixel.
+    /// The lines of the lens, of the shutter and of a light of the scene, if they were not rendered yet. All three need
+    /// several rays per pixel.
     lens: Option<Place<'a>>,
     shutter: Option<Place<'a>>,
     light: Option<Place<'a>>,
     /// The line of the last `Indirect` above 0.
     indirect: Option<Place<'a>>,
-    /// Whether it is not rendered yet.
+    /// Whether that `Indirect` has not been rendered yet.
     is_indirect_new: bool,
-    /// The first object of the scene with light from nowhere, until a warning was given.
+    /// The first object of the scene with ambient light, until a warning was given.
     ambient: Option<Place<'a>>,
     /// The first rough object of the scene, until a warning was given.
     rough: Option<Place<'a>>,
@@ -53,7 +53,7 @@ pub(super) struct Doubts<'a> {
     /// Whether an object of the scene has a colour that needs light.
     needs_light: bool,
     is_dark_told: bool,
-    /// The line of the sky, until it is known whether it is seen; and whether there is fog.
+    /// The line of the sky, until it is known whether rays see it; and whether there is fog.
     pub(super) sky: Option<Place<'a>>,
     pub(super) is_foggy: bool,
     /// Whether the script says how many frames there are.
@@ -112,7 +112,7 @@ impl Looks {
 }
 
 impl<'a> Parser<'a> {
-    /// Warns of colours far above 1, and of a comment that is glued to a word.
+    /// Warns of colours far above 1, and of a comment directly after a word.
     pub(super) fn doubt_line(&mut self, s: &Statement<'a, '_>) {
         let is_comma = s.row.is_none() && decimal_comma(s.text, s.command, s.words).is_some();
         if !is_comma && !matches!(s.command.effect(), Effect::Material) {
@@ -132,7 +132,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Warns of a comment that is glued to a word, or looks like a colour. It starts at byte `at`.
+    /// Warns of a comment directly after a word, or one that looks like a colour. It starts at byte `at`.
     pub(super) fn doubt_comment(&mut self, s: &Statement<'a, '_>, at: usize) {
         if at < s.text.len()
             && (wording::color_at(&s.text[at..]).is_some()
@@ -249,7 +249,7 @@ impl<'a> Parser<'a> {
         self.doubts.is_indirect_new = true;
     }
 
-    /// Warns of a curve in a script whose frames were probably forgotten: there is one moment only.
+    /// Warns of a curve in a script whose frames were probably forgotten, because there is only one moment.
     pub(super) fn doubt_curves(&mut self) {
         let is_open = self.exposures.iter().any(|exposure| exposure.open > 0.0);
         if self.doubts.has_frames || is_open || self.has_errors() {

@@ -6,7 +6,7 @@ pub(super) const DESCRIBED: usize = 10;
 /// The bytes at the start of a file in which a zero byte shows that it is no text.
 const LOOKED_AT: usize = 8 << 10;
 
-/// Text that is not UTF-8, but in which a script can be.
+/// Text that is not UTF-8, but may contain a script.
 pub(super) const UTF_16: &str = "UTF-16 text";
 
 /// The first bytes of files that people mistake for scripts, with their position.
@@ -32,7 +32,7 @@ const MARKS: &[(usize, &[u8], &str)] = &[
 /// Words that begin the lines of a Wavefront OBJ. Commands of a script begin with a capital.
 const OF_OBJ: [&[u8]; 10] = [b"v", b"vn", b"vt", b"vp", b"f", b"o", b"g", b"s", b"mtllib", b"usemtl"];
 
-/// Returns which other format a text is of, by its first line that is neither empty nor a comment.
+/// Returns the other format that a text probably has, from its first line that is neither empty nor a comment.
 fn other_text(bytes: &[u8]) -> Option<&'static str> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let lines = bytes[..bytes.len().min(LOOKED_AT)].split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
@@ -50,7 +50,7 @@ fn other_text(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Returns what a file is if it is no text, or that of another format.
+/// Returns the kind of a file that is no text, or a text in another format.
 pub(super) fn not_text(bytes: &[u8]) -> Option<&'static str> {
     let has =
         |(at, mark, _): &&(usize, &[u8], _)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(mark));

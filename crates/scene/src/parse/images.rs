@@ -1,4 +1,4 @@
-//! The clause `image`: a file in quotes, and the way in which its picture lies on a surface.
+//! The clause `image`: a file in quotes, and the mapping of its picture.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::row::{Number, Row};
 pub(super) type ImageWords = (Image, Row, Vec<Range<usize>>);
 
 impl<'a> Parser<'a> {
-    /// Parses the words behind `image`. If there is a fault, returns `None` and reports it.
+    /// Parses the words after `image`. If there is a fault, returns `None` and reports it.
     pub(super) fn clause_image(
         &mut self,
         s: &Statement<'a, '_>,

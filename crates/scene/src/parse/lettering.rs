@@ -58,8 +58,8 @@ impl<'a> Parser<'a> {
         self.draw_mesh(s, mesh, surface, looks);
     }
 
-    /// Reads the words behind the surface: the place of the lines and the file of the font, with its place. If there is a fault,
-    /// returns `None` and reports it.
+    /// Reads the words after the surface: the alignment of the lines, and the file of the font with its place. If there
+    /// is a fault, returns `None` and reports it.
     fn text_options(&mut self, s: &Statement<'a, '_>) -> Option<(Align, Option<FontFile>)> {
         let (mut align, mut font) = (None, None);
         let mut words = s.options.iter();

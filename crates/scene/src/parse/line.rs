@@ -27,9 +27,9 @@ pub(super) struct Statement<'a, 'w> {
     pub(super) row: Option<Row>,
     /// The name of a material in place of numbers.
     pub(super) surface: Option<Range<usize>>,
-    /// Whether the word of the command's form stands in place of all numbers.
+    /// Whether the word of the command's form replaces all numbers.
     pub(super) is_word: bool,
-    /// The words behind the surface of a mesh or a text.
+    /// The words after the surface of a mesh or a text.
     pub(super) options: Vec<Range<usize>>,
 }
 

@@ -20,7 +20,8 @@ use crate::script::Drawn;
 /// The files that a script names, and the models of the current scene.
 #[derive(Default)]
 pub(super) struct Named {
-    /// The names of the files, those that models refer to included, each with its path in a model, if one refers to it.
+    /// The names of the files, including those to which models refer. Each has its path in a model, if one refers to
+    /// it.
     files: BTreeMap<String, Option<String>>,
     is_limit_told: bool,
     /// The models that the current scene draws.
@@ -34,7 +35,7 @@ impl Named {
     }
 }
 
-/// Models that are drawn, each once, and the number of triangles as often as they are drawn.
+/// The drawn models, each once, and the number of triangles, counted as often as they are drawn.
 #[derive(Clone, Default)]
 pub(super) struct Models {
     of: Vec<Arc<Model>>,
@@ -57,7 +58,7 @@ impl Models {
         self.drawn = drawn.saturating_add(other.drawn);
     }
 
-    /// Returns the number of triangles, as often as they are drawn.
+    /// Returns the number of triangles, counted as often as they are drawn.
     pub(super) fn drawn(&self) -> usize {
         self.drawn
     }
@@ -113,8 +114,8 @@ impl<'a> Parser<'a> {
         self.add_mesh(s, mesh, surface);
     }
 
-    /// Returns the surface and its looks; `None` as its looks if they are those of the file. If there is a fault, returns `None`
-    /// and reports it.
+    /// Returns the surface and its looks. The looks are `None` if they are those of the file. If there is a fault,
+    /// returns `None` and reports it.
     pub(super) fn mesh_surface(
         &mut self,
         s: &Statement<'a, '_>,
@@ -185,7 +186,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Reports models that exceed the limits, given those before.
+    /// Reports models that exceed the limits together with the earlier ones.
     pub(super) fn check_triangles(&mut self, s: &Statement<'a, '_>, before: &Models) {
         let (was, is) = (before.triangles(), self.named.models.triangles());
         let limit = rayfold_assets::limits::TRIANGLES;
@@ -194,7 +195,7 @@ impl<'a> Parser<'a> {
         self.check_limit(s, was, is, Limits::DRAWN_TRIANGLES, "triangles of models drawn in a scene");
     }
 
-    /// Reads the words behind the surface. If there is a fault, returns `None` and reports it.
+    /// Reads the words after the surface. If there is a fault, returns `None` and reports it.
     fn smoothing(&mut self, s: &Statement<'a, '_>) -> Option<Smoothing> {
         let mut words = s.options.iter();
         let text = |span: &Range<usize>| &s.text[span.clone()];
@@ -244,14 +245,15 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Notes that the file of a name is missing, so that what waits for it knows.
+    /// Records that the file of a name is missing, so that a caller can wait for it.
     pub(super) fn note_absent(&mut self, error: &AssetError) {
         if let AssetError::Absent { name, .. } = error {
             self.named.files.entry(name.clone()).or_default();
         }
     }
 
-    /// Notes a file that is named. `path` is that in a model which refers to it. Returns whether it is in order.
+    /// Records a file that the script names. `path` is its path in a model that refers to it. Returns whether the file
+    /// can be used.
     fn name_file(
         &mut self,
         s: &Statement<'a, '_>,
@@ -314,7 +316,7 @@ impl<'a> Parser<'a> {
         is_good.then_some(model)
     }
 
-    /// Warns of glass that is a pane, because the model is not closed.
+    /// Warns of glass that consists of panes, because the model is not closed.
     fn doubt_glass_mesh(&mut self, s: &Statement<'a, '_>, mesh: &Mesh, span: &Range<usize>) {
         let closure = mesh.model().closure();
         if *closure != Closure::Closed {

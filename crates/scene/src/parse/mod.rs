@@ -102,7 +102,7 @@ struct Parser<'a> {
     lights: usize,
     /// The number of frames so far.
     frames: u64,
-    /// The Traces so far. Consecutive equal ones without curves between them are one.
+    /// The Traces so far. Consecutive equal Traces without curves between them are stored as one.
     exposures: Vec<Exposure>,
     /// Whether a line with curves was added since the last `Trace`.
     is_fresh: bool,
@@ -214,7 +214,7 @@ impl<'a> Parser<'a> {
         Parsed { script, diagnostics: self.report.finish(), files: self.named.into_files() }
     }
 
-    /// Records that a line could not be read, which may contain anything that is missing.
+    /// Records that a line could not be read. It may contain anything that is missing.
     fn expect_no_more(&mut self) {
         self.line_lost = true;
         self.expect_no_more_of(Command::Screen);
@@ -615,8 +615,8 @@ impl<'a> Parser<'a> {
         self.report.has_errors() || !self.unresolved.is_empty()
     }
 
-    /// Records something, unless the script has an error. Then the recorded data is not needed, and
-    /// its memory is freed.
+    /// Records an item, unless the script has an error. In that case the recorded data is not needed, and its memory is
+    /// freed.
     fn record(&mut self, what: impl FnOnce(&mut Recorder)) {
         if self.has_errors() {
             self.recorder.forget();

@@ -13,7 +13,7 @@ use crate::script::Value;
 /// The current screen, camera and lens, as far as warnings depend on their combination.
 #[derive(Default)]
 pub(super) struct Picture<'a> {
-    /// The corners of the window of a `Camera`, with their place.
+    /// The corners of the window of a `Camera`, with their position in the text.
     window: Option<(Line<'a>, Range<usize>, [f64; 4])>,
     /// Whether the window was compared with the screen.
     is_compared: bool,

@@ -72,7 +72,8 @@ pub(super) fn next_word(line: &[u8], at: &mut usize) -> Option<Range<usize>> {
     (end > start).then_some(start..end)
 }
 
-/// Returns the end of a word with quotes from `at` on. What is glued to it is a part of it, so that it can be reported.
+/// Returns the end of a word with quotes from `at` on. Characters directly after the quotes belong to it, so that they
+/// can be reported.
 #[cold]
 fn behind_quotes(line: &[u8], mut at: usize) -> usize {
     while at < line.len() {
@@ -106,7 +107,7 @@ fn closing_quote(line: &[u8], at: usize) -> Option<usize> {
 pub(super) enum QuoteFault {
     /// The closing quote is missing.
     Open,
-    /// Something is glued to the quotes.
+    /// Characters come directly before or after the quotes.
     Glued,
     /// A backslash before another character.
     Escape(char),
@@ -178,7 +179,7 @@ impl<'a> Parameters<'a> {
         self.words.extend(std::iter::from_fn(|| next_parameter(self.line, &mut self.end)));
     }
 
-    /// Reads on behind a colour such as `#ff8000`, which becomes three equal words, if one comes next.
+    /// Continues after a colour such as `#ff8000`, if one comes next. The colour becomes three equal words.
     pub(super) fn read_color(&mut self) {
         let start = self.end;
         if color_levels(&self.line[start..]).is_some() {
@@ -253,7 +254,7 @@ impl Words {
         self.count += 1;
     }
 
-    /// Reads on behind colours such as `#ff8000`, where the command takes them. A `#` elsewhere begins a comment.
+    /// Continues after colours such as `#ff8000`, if the command accepts them. A `#` elsewhere begins a comment.
     pub(super) fn read_colors(&mut self, line: &[u8], form: &Form) {
         let mut is_behind_color = false;
         while self.comment < line.len()

@@ -35,7 +35,7 @@ pub(super) struct VisibleSpan {
     /// The time of the first opening; `to` is that of the last closing.
     pub(super) from: f64,
     pub(super) to: f64,
-    /// The Traces from the first to the last that render it. Those between may not.
+    /// The first and the last Trace that render it. Traces between them may not.
     traces: Range<usize>,
 }
 

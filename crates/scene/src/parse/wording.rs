@@ -68,7 +68,7 @@ pub(super) fn unknown_command(name: &str, nearest: Option<Command>) -> Fault {
         .help(help)
 }
 
-/// Describes `word` in place of `parameter`. `is_surface`: a material's name alone is allowed there.
+/// Describes `word` in place of `parameter`. `is_surface`: only the name of a material is allowed there.
 pub(super) fn bad_number(fault: NumberFault, parameter: &str, word: &str, is_surface: bool) -> Fault {
     match fault {
         NumberFault::TooLarge => Fault::new(Code::NumberTooLarge, format!("{} is too large", quoted(word)))
@@ -111,7 +111,7 @@ fn hint(word: &str) -> Option<String> {
 
 /// Describes missing parameters. `comma` is a parameter that was probably written with a decimal comma.
 ///
-/// `color` is that of a comment, which is a colour in other languages.
+/// `color` is the colour in a comment, in the notation of other languages.
 pub(super) fn too_few(
     command: Command,
     words: &Words,
@@ -201,7 +201,7 @@ pub(super) fn invalid(fault: InvalidValue, name: &str, field: &Field, word: &str
     )
 }
 
-/// Adds to a fault of a size how an object vanishes.
+/// Adds to a fault of a size the advice how to make an object vanish.
 fn vanishing(fault: Fault, field: &Field, is_hidden: bool) -> Fault {
     if is_hidden
         && field.kind == Kind::Length
@@ -454,7 +454,7 @@ pub(super) fn clause_twice(clause: Clause, first: Clause) -> Fault {
     Fault::new(Code::DuplicateClause, message).expected("expected another clause")
 }
 
-/// Describes a clause with `found` numbers, of which the one called `name` is missing. `color` is that of a comment.
+/// Describes a clause with `found` numbers that lacks the one called `name`. `color` is the colour in a comment.
 pub(super) fn clause_too_short(clause: Clause, name: &str, found: usize, color: Option<[f64; 3]>) -> Fault {
     let found = if found == 0 { "none".to_string() } else { found.to_string() };
     let takes = counts_of(clause.form());
@@ -566,7 +566,7 @@ pub(super) fn far_above_one(written: &str) -> Fault {
     }
 }
 
-/// Describes a `#` that is glued to a word. `color` is what it is in other languages.
+/// Describes a `#` directly after a word. `color` is its meaning in other languages.
 pub(super) fn glued_comment(color: Option<[f64; 3]>) -> Fault {
     let fault = Fault::new(Code::GluedComment, "`#` begins a comment: nothing from here on counts");
     match color {

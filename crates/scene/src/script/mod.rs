@@ -54,7 +54,7 @@ pub struct Script {
     is_quick: bool,
 }
 
-/// A summary of one `Trace`, or of several consecutive ones that see the same, without their scenes.
+/// A summary of one `Trace`, or of several consecutive Traces with the same scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShotSummary {
     /// The number of frames.
@@ -106,7 +106,7 @@ pub(crate) struct Template {
     pub(crate) row: Row,
 }
 
-/// The data of one `Trace`, or of several consecutive ones that see the same.
+/// The data of one `Trace`, or of several consecutive Traces with the same scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shot {
     view: usize,
@@ -305,7 +305,7 @@ impl Script {
         Some(script.settled())
     }
 
-    /// Returns the script without what it does not use.
+    /// Returns the script without the items that it does not use.
     fn settled(mut self) -> Self {
         self.forget_unused();
         let is_quick = self.is_quick && self.rows().flat_map(Row::curves).any(Curve::is_quick);
@@ -333,7 +333,7 @@ impl Script {
         views.chain(lights).chain(drawn).chain(clauses)
     }
 
-    /// Returns whether an object is rough, also one that is hidden.
+    /// Returns whether any object is rough, even if it is hidden.
     fn is_rough(&self, extent: &Extent) -> bool {
         let rough: Vec<bool> =
             self.materials.iter().map(|m| m.clauses.iter().any(ClauseLine::is_rough)).collect();
@@ -477,7 +477,8 @@ impl Objects {
         Self { list: self.list.part(extent), surfaces, lines }
     }
 
-    /// Returns whether one of these objects is rough. `rough` says it of each material, and `groups` of each group.
+    /// Returns whether one of these objects is rough. `rough` holds this for each material, and `groups` for each
+    /// group.
     fn are_rough(&self, extent: &Extent, rough: &[bool], groups: &[bool]) -> bool {
         let Range { start, end } = extent.still;
         let has = |surface: &Option<usize>| surface.is_some_and(|material| rough[material]);

@@ -325,7 +325,7 @@ impl Template {
         reader(&mut Numbers::new(&values, self.row.len(), surface))
     }
 
-    /// Returns whether it is an object that its radii hide.
+    /// Returns whether it is an object that is hidden because its radii are 0.
     fn is_hidden(&self, frame: f64, tone: Tone) -> bool {
         self.command.form().hides(&self.row.at(frame, tone))
     }

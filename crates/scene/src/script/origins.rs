@@ -7,23 +7,24 @@ use super::{Drawn, Objects, Script};
 /// The origin of an object of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// The place among all objects that the script draws since its start or the last `Clear`, counted from 1, with those
-    /// that are hidden in this frame.
+    /// The number of the object, counted from 1, among all objects that the script draws since its start or the last
+    /// `Clear`, including those hidden in this frame.
     pub number: usize,
-    /// The lines of the `Use` commands that draw the groups which it is in, from the outermost group on, counted from 1.
+    /// The lines, counted from 1, of the `Use` commands that draw the groups of the object, from the outermost group
+    /// inwards.
     pub uses: Arc<[usize]>,
-    /// The line of its own command. Lines are 0 if they come from no text, as in a script that is made of a scene.
+    /// The line of its own command. A line is 0 if it comes from no text, as in a script that is made from a scene.
     pub line: usize,
 }
 
 /// The origins of objects in the order in which they are drawn.
 pub(super) struct Origins {
-    /// The number of objects that each group draws, with those that are hidden.
+    /// The number of objects that each group draws, including hidden ones.
     sizes: Vec<usize>,
     pub(super) all: Vec<Origin>,
 }
 
-/// The numbers and lines of the objects of a level of groups.
+/// The numbers and lines of the objects at one level of groups.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counter {
     next: usize,
@@ -63,7 +64,7 @@ impl Counter {
         into.all.extend(is_seen.then_some(origin));
     }
 
-    /// Returns the counter of a group that another line draws, and goes on behind its objects.
+    /// Returns the counter of a group that another line draws, and continues after its objects.
     pub(super) fn enter(&mut self, objects: &Objects, i: usize, group: usize, origins: &Origins) -> Self {
         let uses = self.uses.iter().copied().chain([objects.lines[1].line_of(i)]).collect();
         let inner = Self { next: self.next, uses };

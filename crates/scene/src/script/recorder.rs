@@ -18,7 +18,7 @@ pub(crate) struct Recorder {
     surfaces: Surfaces,
     /// The lines of the constant objects and of the others.
     lines: [SourceLines; 2],
-    /// The line of what is added next, counted from 1; 0 if it comes from no text.
+    /// The line of the next item, counted from 1; 0 if it comes from no text.
     pub(crate) line: usize,
     lights: List<Light, Template>,
     camera: Value<Camera>,
@@ -45,7 +45,7 @@ pub(crate) struct GroupRecorder {
     surfaces: Surfaces,
     /// The lines of the constant objects and of the others.
     lines: [SourceLines; 2],
-    /// The line of what is added next, counted from 1; 0 if it comes from no text.
+    /// The line of the next item, counted from 1; 0 if it comes from no text.
     pub(crate) line: usize,
 }
 
@@ -144,7 +144,7 @@ impl Recorder {
         set(&mut self.fog, fog);
     }
 
-    /// Forgets everything except the settings of a `Trace`.
+    /// Drops everything except the settings of a `Trace`.
     pub(crate) fn forget(&mut self) {
         *self = Self { shutter: self.shutter, numbers: self.numbers, ..Self::default() };
     }

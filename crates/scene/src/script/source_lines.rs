@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// The lines of items in their order, as runs of items on consecutive lines.
 ///
-/// All are equal: two texts that say the same in other lines are the same script.
+/// All source lines count as equal, because two texts with the same content in other lines are the same script.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SourceLines(Vec<Run>);
 
@@ -42,7 +42,7 @@ impl SourceLines {
         run.map_or(0, |run| run.line_of(i))
     }
 
-    /// Returns the lines of some items, which are numbered from 0 then.
+    /// Returns the lines of some items, which are then numbered from 0.
     pub(crate) fn part(&self, items: Range<usize>) -> Self {
         let within = self.0.iter().filter(|run| (items.start + 1..items.end).contains(&run.first));
         let start = items.clone().next().map(|first| Run { first: 0, line: self.line_of(first) });

@@ -19,7 +19,7 @@ pub(crate) const MESH: Form = Form::new("Mesh", &[surface::AMBIENT, surface::DIF
     .with_options(&[SMOOTH, FLAT])
     .with_usage("Mesh \"FILE\" [M] [smooth a or flat]");
 
-/// The words before and in place of the angle.
+/// The words before the angle and in place of it.
 pub(crate) const SMOOTH: &str = "smooth";
 pub(crate) const FLAT: &str = "flat";
 
@@ -38,7 +38,7 @@ pub(crate) const TEXT: Form =
 /// The word before the file of a font.
 pub(crate) const FONT: &str = "font";
 
-/// Returns the place of lines that a word gives.
+/// Returns the alignment of lines for a word.
 pub(crate) fn align_from_word(word: &str) -> Option<Align> {
     let all = [Align::Left, Align::Center, Align::Right];
     all.into_iter().find(|align| align_word(*align).eq_ignore_ascii_case(word))
@@ -68,7 +68,7 @@ pub(crate) fn letter_surface(numbers: &mut Numbers<'_>) -> Result<Material, Faul
     mesh_surface(numbers)
 }
 
-/// Reads the numbers behind the name of the file.
+/// Reads the numbers after the name of the file.
 pub(crate) fn mesh_surface(numbers: &mut Numbers<'_>) -> Result<Material, Faults> {
     Ok(Material::read(numbers)?)
 }
@@ -122,7 +122,7 @@ impl Mesh {
         &self.model
     }
 
-    /// Returns the material of the surface. Where it has the colours of the file, its own are factors of them.
+    /// Returns the material of the surface. If it has the colours of the file, its own colours are factors of them.
     pub fn material(&self) -> &Material {
         &self.material
     }
@@ -141,7 +141,7 @@ impl Mesh {
     /// Moves the mesh, by moving every position of its model, and gives it a material.
     ///
     /// # Errors
-    /// If a number overflows.
+    /// Fails if a number overflows.
     pub(super) fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
         let model = self.model.moved(|p| motion.point(p), |n| motion.direction(n));
         let model = model.ok_or(InvalidValue::NotFinite(Parameter::Vertex))?;
@@ -162,7 +162,7 @@ impl Mesh {
         })
     }
 
-    /// Writes a line of a script whose surface `surface` writes, with a space before it.
+    /// Writes a line of a script. The function `surface` writes the surface, with a space before it.
     pub(crate) fn write_with<'b>(
         &self,
         f: &mut fmt::Formatter<'b>,

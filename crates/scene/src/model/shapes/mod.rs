@@ -62,7 +62,7 @@ trait Shape: Sized {
     /// Returns the maximum of p·`direction` over all points p, or `None` if the shape is unbounded.
     fn support(&self, direction: DVec3) -> Option<f64>;
 
-    /// Returns a simple solid that holds it closely.
+    /// Returns a simple solid that encloses it closely.
     fn outline(&self) -> Outline;
 
     /// Returns a valid property that is probably a mistake.
@@ -141,7 +141,8 @@ macro_rules! objects {
                 }
             }
 
-            /// Returns a simple solid that holds the object closely; `None` for an object of a group and for a model.
+            /// Returns a simple solid that encloses the object closely; `None` for an object of a group and for a
+            /// model.
             pub fn outline(&self) -> Option<Outline> {
                 match self {
                     $(Self::$Shape(shape) => Some(shape.outline()),)*
@@ -184,7 +185,7 @@ impl Object {
     /// Gives the object a material. An instance keeps its own.
     ///
     /// # Errors
-    /// Never fails for an object that could be made.
+    /// Cannot fail for an object that could be made.
     pub fn with_material(&self, material: Material) -> Result<Self, InvalidValue> {
         if let Self::Mesh(mesh) = self {
             return Ok(mesh.with_material(material).into());

@@ -1,11 +1,11 @@
-//! The simplest solid that shows how large a shape is and where.
+//! The simplest solid that shows the size and the position of a shape.
 //!
 //! Code that needs only the size of an object matches its outline. A new shape returns one of these, and such code does
 //! not change.
 
 use glam::DVec3;
 
-/// A simple solid that holds a shape closely.
+/// A simple solid that encloses a shape closely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
     /// A ball.
@@ -46,7 +46,7 @@ pub enum Outline {
     },
     /// A ring.
     Ring {
-        /// The distance of the middle of the ring's body from the centre.
+        /// The distance of the middle of the tube from the centre.
         radius: f64,
         /// The radius of the ring's body.
         thickness: f64,

@@ -31,9 +31,8 @@ impl Roundbox {
     /// Makes a rounded box from two opposite corners of the box around it.
     ///
     /// # Errors
-    /// Fails if the radius is negative or more than half of the shortest side, or a number is not finite. A radius that
-    /// exceeds half of it by a rounding error of the coordinates is allowed, so that sides of .2 from .8 to 1 take a
-    /// radius of .1.
+    /// Fails if the radius is negative or more than half of the shortest side, or a number is not finite. A radius may
+    /// exceed half of it by a rounding error of the coordinates. So a side from .8 to 1 allows a radius of .1.
     pub fn new(corners: [DVec3; 2], radius: f64, material: Material) -> Result<Self, InvalidValue> {
         let made = Self::unchecked(corners, radius, material)?;
         let largest = corners[0].abs().max(corners[1].abs()).max_element();
@@ -78,7 +77,7 @@ impl Roundbox {
 }
 
 impl Shape for Roundbox {
-    /// Rounding may make a side shorter than two radii.
+    /// A side may be shorter than two radii because of rounding.
     fn moved(&self, motion: &impl Motion, material: Material) -> Result<Self, InvalidValue> {
         let corners = self.corners.map(|corner| motion.point(corner));
         Self::unchecked(corners, motion.length(self.radius), material)

@@ -131,7 +131,7 @@ pub(in crate::parse) fn bad_smooth_angle(word: &str) -> Fault {
         .expected("expected a number from 0 to 180, not a curve")
 }
 
-/// Describes a word behind the surface that is none of those of the command.
+/// Describes a word after the surface that is not one of the command's.
 pub(in crate::parse) fn unknown_option(command: Command, word: &str) -> Fault {
     let options: Vec<_> = command.form().options.iter().map(|option| format!("`{option}`")).collect();
     let (last, others) = options.split_last().map_or(("", &[][..]), |(last, others)| (last, others));
@@ -157,7 +157,7 @@ pub(in crate::parse) fn blank_text() -> Fault {
     Fault::new(Code::Unused, "nothing is drawn: the text has no letter with an outline")
 }
 
-/// Describes a word behind `font` that names no file, or its absence.
+/// Describes a word after `font` that names no file, or the lack of one.
 pub(in crate::parse) fn no_font(word: Option<&str>) -> Fault {
     let message = match word {
         None => "`font` names no file".to_string(),
