@@ -1,7 +1,7 @@
 //! The simulated bucket: latency, faults, kills, and the counts of the platform.
 //!
-//! A request takes effect at some moment between its start and its answer, whether or not its sender still lives.
-//! Listings are not atomic: each name is seen as it was at one of two moments within the request.
+//! A request takes effect at some moment between its start and its reply, even if its sender has been killed. Listings
+//! are not atomic: each name is seen as it was at one of two moments within the request.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -18,42 +18,42 @@ use rayfold_pipeline::store::{
 };
 use rayfold_pipeline::{Clock, Error, Randomness, Result, Timestamp};
 
-/// The rates of faults: one in so many requests; never when 0.
+/// The rates of faults: one in this many requests, or never if 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Faults {
-    /// Answers of status 503.
+    /// Replies with status 503.
     pub(super) busy: u64,
-    /// 409 for a conditional put.
+    /// Replies with status 409 to a conditional put.
     pub(super) conflict: u64,
     /// The answer is lost.
     pub(super) lost_answer: u64,
-    /// Listings mix two moments.
+    /// Listings that mix two moments.
     pub(super) torn_listings: bool,
-    /// A request takes up to eight times as long.
+    /// Requests that take up to eight times as long.
     pub(super) slow: u64,
 }
 
-/// Bytes of an upload's part; the simulated files are small.
+/// The number of bytes of a part of an upload; the simulated files are small.
 const PART: usize = 256;
 
-/// The request rate that S3 bears of one bucket, and the speed of the bytes.
+/// The request rate that a bucket of S3 accepts, and the transfer rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Puts and deletes a second; more are answered with 503. S3 says 3,500 a prefix that it has set apart, and sets prefixes
-    /// apart only in time, so all of a bucket is one here.
+    /// The puts and deletes per second; more are answered with 503. S3 allows 3,500 per partitioned prefix, but
+    /// partitions prefixes only over time, so the whole bucket counts as one here.
     pub writes: u64,
-    /// Reads and listings a second. S3 says 5,500 a prefix.
+    /// The reads and listings per second. S3 allows 5,500 per prefix.
     pub reads: u64,
-    /// Bytes of a body that come or go in a microsecond, on one connection.
+    /// The bytes of a body that are transferred per microsecond on one connection.
     pub bytes_a_microsecond: u64,
 }
 
 impl Limits {
-    /// S3's, as its documentation has them; bodies at 80 MB/s, as one connection of a function brings them (assumed).
+    /// The limits in S3's documentation. Bodies at 80 MB/s, as on one connection of a function (assumed).
     pub const S3: Limits = Limits { writes: 3_500, reads: 5_500, bytes_a_microsecond: 80 };
 }
 
-/// The share of its limits that a second has used up.
+/// The used share of the limits of a second.
 #[derive(Debug, Default)]
 struct Second {
     number: u64,
@@ -70,7 +70,7 @@ pub(super) enum Actor {
     Assemble,
 }
 
-/// One kind of request, as permissions know it.
+/// A kind of request, as permissions distinguish it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Action {
     /// `s3:GetObject`: `get`, `get_range`, `head`.
@@ -86,15 +86,15 @@ pub(super) enum Action {
 /// The faults of one invocation.
 #[derive(Debug)]
 pub(super) struct Fate {
-    /// Requests until it is killed; never when it starts at 0.
+    /// The number of requests until the invocation is killed; never if it starts at 0.
     countdown: AtomicU32,
-    /// Whether the request that it is killed in is lost, too.
+    /// Whether the request during which it is killed is lost, too.
     lose_last: bool,
-    /// The delay after which the request lands otherwise.
+    /// The delay after which the request otherwise takes effect.
     delay_last: Duration,
     killed: AtomicBool,
     requests: AtomicU64,
-    /// When it last asked for the listing of scripts, in microseconds.
+    /// The time of its last request for the listing of scripts, in microseconds.
     listed_us: AtomicU64,
 }
 
@@ -123,21 +123,21 @@ impl Fate {
     }
 }
 
-/// When a user can do the most awkward thing.
+/// A moment at which a user's action is most likely to cause trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Moment {
-    /// A function asks for the listing of the scripts.
+    /// A function requests the listing of the scripts.
     Listing,
-    /// The listing has been made, and is on its way.
+    /// The listing has been made, but the reply has not arrived.
     Listed,
     /// An assembler begins to write a GIF.
     Building,
 }
 
-/// The bucket's notice to the world after a change: the actor, the key, and whether the object is there now.
+/// A function that is called after each change, with the actor, the key, and whether the object exists now.
 pub(super) type Notify = dyn Fn(Actor, &str, bool, &Bucket) + Send + Sync;
 
-/// Called at a moment at which a change is most awkward.
+/// A function that is called at a moment at which a change is most likely to cause trouble.
 pub(super) type MomentListener = dyn Fn(Moment) + Send + Sync;
 
 /// The bucket and everything around it.
@@ -145,38 +145,38 @@ pub(super) struct SimEnvironment {
     pub(super) engine: Engine,
     pub(super) random: Randomness,
     pub(super) faults: Mutex<Faults>,
-    /// None: the bucket bears anything.
+    /// `None`: the bucket accepts any rate.
     pub(super) limits: Mutex<Option<Limits>>,
     second: Mutex<Second>,
-    /// Bytes of an upload's part.
+    /// The number of bytes of a part of an upload.
     pub(super) part: AtomicUsize,
-    /// Requests that were one too many.
+    /// The number of requests that were refused because of the limits.
     pub(super) throttled: AtomicU64,
     pub(super) bucket: Mutex<Bucket>,
     pub(super) notify: Mutex<Option<Arc<Notify>>>,
-    /// Called at the moments at which a change is most awkward.
+    /// Called at the moments at which a change is most likely to cause trouble.
     pub(super) moments: Mutex<Option<Arc<MomentListener>>>,
-    /// By GIF: the moment of the oldest listing from which one was made. Equal files are one GIF.
+    /// For each GIF, the time of the oldest listing from which it was made. Equal files are one GIF.
     gifs: Mutex<BTreeMap<ETag, u64>>,
-    /// A GIF gave way to one from an older listing.
+    /// Whether a GIF was replaced by one from an older listing.
     pub(super) set_back: Mutex<Option<String>>,
-    /// The seed by which some frames are too big for one invocation, if any are.
+    /// The seed that decides which frames are too big for one invocation, if any.
     pub(super) big: Mutex<Option<u64>>,
-    /// The seed by which some scripts name files, if any do.
+    /// The seed that decides which scripts name files, if any.
     pub(super) files: Mutex<Option<u64>>,
     /// The objects that users have overwritten or deleted, with their keys.
     pub(super) past: Mutex<Vec<(String, Option<String>)>>,
-    /// A write took effect after its sender was killed.
+    /// Whether a write took effect after its sender was killed.
     pub(super) late_writes: AtomicU64,
     /// The actions of each actor, with the prefix up to the first slash.
     pub(super) seen: Mutex<BTreeSet<(Actor, Action, String)>>,
     /// The number of requests, by actor.
     pub(super) requests: [AtomicU64; 3],
-    /// Requests of the functions by kind, in the order of [`Action`].
+    /// The number of requests of the functions by kind, in the order of [`Action`].
     pub(super) kinds: [AtomicU64; 4],
-    /// Bytes of objects that were read, by actor.
+    /// The number of bytes that were read from objects, by actor.
     pub(super) bytes: [AtomicU64; 3],
-    /// The events of a run, line by line, for a reader of its replay.
+    /// The events of a run, line by line, for reading its replay.
     pub(super) log: Option<Mutex<Vec<String>>>,
 }
 
@@ -215,7 +215,7 @@ impl SimEnvironment {
         }
     }
 
-    /// True once in `of` times, never when `of` is 0.
+    /// Returns `true` once in `of` times, and never if `of` is 0.
     pub(super) fn chance(&self, of: u64) -> bool {
         of > 0 && self.random.one_in(of)
     }
@@ -224,7 +224,7 @@ impl SimEnvironment {
         Duration::from_micros(range.start * 1000 + self.random.below((range.end - range.start) * 1000))
     }
 
-    /// Whether the bucket bears one more request in this second.
+    /// Returns whether the bucket accepts one more request in this second.
     fn is_borne(&self, limits: Limits, action: Action) -> bool {
         let mut second = lock(&self.second);
         let number = self.engine.now_us() / 1_000_000;
@@ -239,7 +239,7 @@ impl SimEnvironment {
         *used <= most
     }
 
-    /// Returns the time that a request's body is on its way.
+    /// Returns the transfer time of a request's body.
     fn transfer(&self, limits: Limits, effect: &Effect) -> Duration {
         let bytes = match effect {
             Effect::Put(_, body, _) => body.len() as u64,
@@ -261,7 +261,7 @@ impl SimEnvironment {
         }
     }
 
-    /// Holds that a GIF never gives way to one from an older listing.
+    /// Checks that a GIF is never replaced by one from an older listing.
     fn replace_gif(&self, key: &str, before: Option<&ETag>, next: &ETag, listed_us: u64) {
         let mut gifs = lock(&self.gifs);
         let older = before.and_then(|before| gifs.get(before)).filter(|before| **before > listed_us);
@@ -289,7 +289,7 @@ pub(super) struct WorldStore {
     /// The id of the request.
     pub(super) name: String,
     pub(super) fate: Arc<Fate>,
-    /// Ends the invocation that uses this.
+    /// Ends the invocation that uses this bucket.
     pub(super) die: Arc<dyn Fn() + Send + Sync>,
 }
 
@@ -343,7 +343,7 @@ impl Effect {
         }
     }
 
-    /// Milliseconds from request to answer.
+    /// The range of milliseconds from request to reply.
     fn latency_ms(&self) -> Range<u64> {
         match self {
             Effect::Get(..) => 10..25,
@@ -367,13 +367,12 @@ impl Effect {
     }
 }
 
-/// The number of times that S3's client sends a request that the bucket cannot bear, and its
-/// first pause, which doubles.
+/// The number of times that S3's client sends a request that is over the limits, and its first pause, which doubles.
 const SENDINGS: u32 = 3;
 const RESENT_AFTER: Duration = Duration::from_secs(1);
 
 impl WorldStore {
-    /// If the bucket has limits, the client repeats a request that the bucket cannot bear, as that of `S3Store` does.
+    /// If the bucket has limits, the client repeats a request that is over them, as that of `S3Store` does.
     async fn request(&self, effect: Effect) -> Result<Answer> {
         let sendings = if lock(&self.env.limits).is_some() { SENDINGS } else { 1 };
         let mut pause = RESENT_AFTER;
@@ -463,7 +462,7 @@ impl WorldStore {
         take(&slot, key)
     }
 
-    /// Ends the invocation at some moment of the request that it is about to send.
+    /// Ends the invocation at some moment of its next request.
     fn kill_within(&self, latency: Duration) {
         let (fate, die) = (self.fate.clone(), self.die.clone());
         let moment = self.env.random.up_to(latency);
@@ -588,7 +587,7 @@ fn take(slot: &Mutex<Option<Result<Answer>>>, key: String) -> Result<Answer> {
     lock(slot).take().unwrap_or_else(|| Err(Error::Ambiguous { key, source: "no effect, no answer".into() }))
 }
 
-/// Replaces about half of the names of a page by those of a later moment.
+/// Replaces about half of the names on a page by those of a later moment.
 fn tear(page: &mut ListPage, later: ListPage, salt: u64) {
     if page.next.is_some() || later.next.is_some() {
         return;
@@ -680,7 +679,7 @@ pub(super) struct WorldUpload {
     id: u64,
     parts: Vec<ETag>,
     gathered: BytesMut,
-    /// Bytes of a part.
+    /// The number of bytes of a part.
     part: usize,
 }
 

@@ -38,7 +38,7 @@ pub async fn check<S: Store>(store: &S, prefix: &str) {
     uploads_that_are_gone_have_an_error_of_their_own(store, prefix).await;
 }
 
-/// Body, size, tag and metadata, by `get` and by `head`; a later put replaces them; a delete removes them.
+/// Checks body, size, tag and metadata, by `get` and by `head`. A later put replaces them, and a delete removes them.
 pub async fn objects_come_back_as_they_were_put<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/object");
     let options = PutOptions::always().content_type("text/plain").metadata("generation", "abc-1");
@@ -58,7 +58,7 @@ pub async fn objects_come_back_as_they_were_put<S: Store>(store: &S, prefix: &st
     store.delete(&key).await.expect("deleting what is not there is no error");
 }
 
-/// Blanks, plus signs, umlauts, percent signs, slashes, ampersands, in put, get, list and delete.
+/// Checks keys with spaces, plus signs, umlauts, percent signs, slashes and ampersands, in put, get, list and delete.
 pub async fn keys_may_hold_any_text<S: Store>(store: &S, prefix: &str) {
     let names =
         ["a b", "a+b", "ä/ö", "100%", "50%25", "x&y=z", "q?r#s", "it's", "deep/er/still", "日本@v-p1.png"];
@@ -73,7 +73,7 @@ pub async fn keys_may_hold_any_text<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// A range is cut at the object's end; the size stays that of the whole.
+/// A range is cut at the object's end. The reported size is that of the whole object.
 pub async fn ranges_are_parts_of_the_body<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/range");
     let etag = store.put(&key, Bytes::from_static(b"0123456789"), PutOptions::always()).await.unwrap();
@@ -84,7 +84,7 @@ pub async fn ranges_are_parts_of_the_body<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// 404, not another error, for get, range, head and a put with `If-Match`.
+/// Checks that get, range, head and a put with `If-Match` fail with 404 and no other error.
 pub async fn missing_objects_have_an_error_of_their_own<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/missing");
     let is_missing = |error: Error| matches!(error, Error::NotFound { key: named } if named == key);
@@ -96,7 +96,7 @@ pub async fn missing_objects_have_an_error_of_their_own<S: Store>(store: &S, pre
     assert!(is_missing(put.unwrap_err()), "a put with If-Match on nothing answers 404");
 }
 
-/// The protocol counts on a script's unchanged upload having an unchanged tag.
+/// The protocol relies on this: if a script is uploaded again unchanged, its tag stays the same.
 pub async fn equal_bodies_have_equal_tags<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/tag");
     let first = store.put(&key, Bytes::from_static(b"one"), PutOptions::always()).await.unwrap();
@@ -108,7 +108,7 @@ pub async fn equal_bodies_have_equal_tags<S: Store>(store: &S, prefix: &str) {
     assert_eq!(page.objects[0].etag, third, "listings show the same tag");
 }
 
-/// 412 for the second, and the first stays.
+/// The second put fails with 412, and the first object stays.
 pub async fn if_absent_never_replaces<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/absent");
     store.put(&key, Bytes::from_static(b"first"), PutOptions::if_absent()).await.unwrap();
@@ -119,7 +119,7 @@ pub async fn if_absent_never_replaces<S: Store>(store: &S, prefix: &str) {
     store.put(&key, Bytes::from_static(b"third"), PutOptions::if_absent()).await.expect("it is gone");
 }
 
-/// 412 for an older version.
+/// A put fails with 412 for an older version.
 pub async fn if_match_replaces_only_that_version<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/match");
     let first = store.put(&key, Bytes::from_static(b"1"), PutOptions::always()).await.unwrap();
@@ -131,7 +131,7 @@ pub async fn if_match_replaces_only_that_version<S: Store>(store: &S, prefix: &s
     store.put(&key, Bytes::from_static(b"4"), PutOptions::if_match(second)).await.unwrap();
 }
 
-/// Side by side: the losers see a conflict (409 or 412), and the object is the winner's.
+/// Of concurrent puts, the losers get a conflict (409 or 412), and the object is the winner's.
 pub async fn of_many_writers_one_wins<S: Store>(store: &S, prefix: &str) {
     let absent = format!("{prefix}/race-absent");
     let matched = format!("{prefix}/race-match");
@@ -151,7 +151,7 @@ pub async fn of_many_writers_one_wins<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// In byte order, with size and prefix; `start_after` itself is left out and need not exist.
+/// Keys are in byte order, with size and prefix. The key `start_after` itself is excluded and need not exist.
 pub async fn listings_are_sorted_and_complete<S: Store>(store: &S, prefix: &str) {
     let names = ["B", "a-b", "a/b", "aa", "b", "é", "z"];
     for name in names {
@@ -177,7 +177,7 @@ pub async fn listings_are_sorted_and_complete<S: Store>(store: &S, prefix: &str)
     assert_eq!(nothing, ListPage::default());
 }
 
-/// One entry a folder, with its closing slash.
+/// Checks one entry per folder, with its closing slash.
 pub async fn delimiters_roll_up<S: Store>(store: &S, prefix: &str) {
     for name in ["x/1", "x/2/3", "x/2/4", "x/5", "x/6/7", "y/8"] {
         store.put(&format!("{prefix}/rolled/{name}"), Bytes::new(), PutOptions::always()).await.unwrap();
@@ -188,7 +188,7 @@ pub async fn delimiters_roll_up<S: Store>(store: &S, prefix: &str) {
     assert_eq!(page.prefixes, [format!("{prefix}/rolled/x/2/"), format!("{prefix}/rolled/x/6/")]);
 }
 
-/// More than a page, also from `start_after` on.
+/// Checks listings of more than a page, also from `start_after` on.
 pub async fn long_listings_go_on<S: Store>(store: &S, prefix: &str) {
     let key = |n: usize| format!("{prefix}/long/{n:05}");
     let count = PAGE + 5;
@@ -205,7 +205,7 @@ pub async fn long_listings_go_on<S: Store>(store: &S, prefix: &str) {
     assert_eq!(rest, (3..count).map(key).collect::<Vec<_>>());
 }
 
-/// A page may end on a folder, which must come once and only once.
+/// A page may end with a folder, which must be listed exactly once.
 pub async fn long_listings_with_delimiter_go_on<S: Store>(store: &S, prefix: &str) {
     let folder = |n: usize| format!("{prefix}/folders/{n:05}/");
     let count = PAGE + 5;
@@ -225,7 +225,8 @@ pub async fn long_listings_with_delimiter_go_on<S: Store>(store: &S, prefix: &st
     assert_eq!(folders, (0..count).map(folder).collect::<Vec<_>>());
 }
 
-/// Invisible until finished, byte for byte after it, invisible when aborted; pieces of all sizes, several parts.
+/// An upload is invisible until it is finished, then equal byte for byte, and invisible if it is aborted. Tested with
+/// pieces of all sizes and several parts.
 pub async fn uploads_appear_whole<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload");
     let body: Vec<u8> = (0..13_000_000_u32).map(|n| (n % 251) as u8).collect();
@@ -264,7 +265,7 @@ pub async fn uploads_appear_whole<S: Store>(store: &S, prefix: &str) {
     assert!(store.head(&aborted).await.unwrap_err().is_not_found());
 }
 
-/// The condition is that of the moment of finishing, not of beginning.
+/// The condition is evaluated when the upload is finished, not when it is begun.
 pub async fn uploads_keep_their_condition<S: Store>(store: &S, prefix: &str) {
     for size in [10, 6_000_000] {
         let key = format!("{prefix}/upload-condition-{size}");
@@ -295,8 +296,8 @@ pub async fn uploads_keep_their_condition<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// An upload is left after any number of bytes and resumed from values that a process can write down: the body is the
-/// same, and the condition still holds.
+/// An upload is left after any number of bytes, and resumed from values that a process can store. The body is the same,
+/// and the condition still holds.
 pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-left");
     let body: Vec<u8> = (0..26_000_000_u32).map(|n| (n % 253) as u8).collect();
@@ -326,7 +327,7 @@ pub async fn uploads_are_left_and_taken_up<S: Store>(store: &S, prefix: &str) {
     }
 }
 
-/// However long the object is, and wherever it was left.
+/// This holds for any length of the object, and wherever the upload was left.
 pub async fn uploads_change_their_start_at_the_end<S: Store>(store: &S, prefix: &str) {
     let options = PutOptions::if_absent().start_last();
     for (name, pieces) in [
@@ -352,7 +353,7 @@ pub async fn uploads_change_their_start_at_the_end<S: Store>(store: &S, prefix: 
     }
 }
 
-/// Two processes go on from the same place with the same bytes: one finishes, and the object is whole.
+/// Two processes continue from the same place with the same bytes. One of them finishes, and the object is complete.
 pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-twice");
     let piece = |byte: u8| Bytes::from(vec![byte; 9_000_000]);
@@ -369,7 +370,7 @@ pub async fn uploads_are_taken_up_twice_without_harm<S: Store>(store: &S, prefix
     assert!(store.get(&key).await.unwrap().body == [piece(1), piece(2)].concat());
 }
 
-/// The upload is aborted by the writer that resumed it. The other writer learns that at its next part, or at its end.
+/// The writer that resumed the upload aborts it. The other writer gets the error at its next part, or at its end.
 pub async fn uploads_that_are_gone_have_an_error_of_their_own<S: Store>(store: &S, prefix: &str) {
     let key = format!("{prefix}/upload-gone");
     let piece = || Bytes::from(vec![1; 9_000_000]);
@@ -385,14 +386,14 @@ pub async fn uploads_that_are_gone_have_an_error_of_their_own<S: Store>(store: &
     assert!(store.head(&key).await.unwrap_err().is_not_found());
 }
 
-/// As another process finds it.
+/// Returns the unfinished upload as another process reads it.
 fn written_down(unfinished: UnfinishedUpload) -> UnfinishedUpload {
     let text = serde_json::to_string(&unfinished).unwrap();
     let UnfinishedUpload { start, tail, .. } = unfinished;
     UnfinishedUpload { start, tail, ..serde_json::from_str(&text).unwrap() }
 }
 
-/// All keys and folders of a listing, page by page.
+/// Returns all keys and folders of a listing, read page by page.
 async fn follow<S: Store>(store: &S, mut request: ListRequest) -> (Vec<String>, Vec<String>) {
     let (mut keys, mut folders) = (Vec::new(), Vec::new());
     loop {

@@ -1,7 +1,7 @@
-//! A world in which time is a number and everything happens in one thread, in an order that the seed decides.
+//! A simulated world: time is a number, and everything runs in one thread, in an order that the seed decides.
 //!
-//! Tasks are futures; they wait on nothing but [`Engine::sleep`]. When no task can go on, time jumps to the next timer.
-//! It knows nothing of stores or functions.
+//! Tasks are futures; they wait on nothing but [`Engine::sleep`]. When no task can continue, time jumps to the next
+//! timer. The engine knows nothing of stores or functions.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
@@ -19,7 +19,7 @@ pub(super) type TaskId = u64;
 type Task = Pin<Box<dyn Future<Output = ()> + Send>>;
 type Call = Box<dyn FnOnce() + Send>;
 
-/// The world's time and tasks. Clones are the same world.
+/// The time and the tasks of a world. Clones share the same world.
 #[derive(Clone, Default)]
 pub(super) struct Engine {
     inner: Arc<Mutex<Inner>>,
@@ -73,14 +73,14 @@ impl Engine {
         id
     }
 
-    /// Ends a task where it waits.
+    /// Ends a task at its current await.
     pub(super) fn kill(&self, id: TaskId) {
         let task = lock(&self.inner).tasks.remove(&id);
         // Its destructors may come back to the engine.
         drop(task);
     }
 
-    /// Ends the world: whatever is left to happen knows the world and would keep it alive.
+    /// Ends the world by dropping all pending work, which refers to the world and would keep it alive.
     pub(super) fn end(&self) {
         let mut inner = lock(&self.inner);
         let (tasks, actions) = (std::mem::take(&mut inner.tasks), std::mem::take(&mut inner.actions));
@@ -94,7 +94,7 @@ impl Engine {
         Sleep { engine: self.clone(), until_us, waker: None }
     }
 
-    /// Runs until nothing is left to happen, or until `limit`; says whether nothing is left.
+    /// Runs until nothing is left to do, or until `limit`. Returns whether nothing is left.
     pub(super) fn run(&self, limit: Duration) -> bool {
         let limit_us = micros(limit);
         loop {
@@ -147,7 +147,7 @@ impl Inner {
     }
 }
 
-/// Ready at its time.
+/// A future that is ready at its time.
 pub(super) struct Sleep {
     engine: Engine,
     until_us: u64,
@@ -172,14 +172,14 @@ impl Future for Sleep {
     }
 }
 
-/// The world's time as a function sees it, a little fast or slow.
+/// The clock of a function, which is slightly ahead of the world's time or behind it.
 #[derive(Clone)]
 pub(super) struct WorldClock {
     pub(super) engine: Engine,
     pub(super) skew: Duration,
 }
 
-/// The time of the world's clock at the beginning; clocks that are slow still show a time.
+/// The world's time at the beginning, late enough that slow clocks do not show a negative time.
 const EPOCH: Timestamp = Timestamp(1_000_000_000_000);
 
 impl WorldClock {

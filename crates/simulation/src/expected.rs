@@ -1,5 +1,5 @@
-//! The contents that a bucket must have once everything has come to rest, worked out from its scripts alone, and the
-//! manifests that may follow one another.
+//! The contents that a bucket must have when nothing is left to do, computed from its scripts alone, and the manifests
+//! that may follow one another.
 
 use std::num::NonZeroU64;
 
@@ -22,9 +22,9 @@ struct Shot {
     script: ScriptName,
     version: ETag,
     part: Part,
-    /// `None` when it cannot be drawn.
+    /// `None` if it cannot be drawn.
     picture: Option<String>,
-    /// Whether a file that it names is absent.
+    /// Whether a file that the frame's script names is absent.
     waits: bool,
 }
 
@@ -75,7 +75,7 @@ impl Expected {
         Expected { frames, settings }
     }
 
-    /// Returns the status. A sweep fails the frames whose files have not come for long.
+    /// Returns the status. After a long time a sweep fails the frames whose files have not arrived.
     fn status(&self, manifest: Option<&Manifest>) -> Status {
         let waits = manifest.is_some_and(|manifest| manifest.head.waiting > 0);
         let expects = self.settings.as_ref().and_then(|settings| settings.frames()).unwrap_or(0);
@@ -90,7 +90,8 @@ impl Expected {
         }
     }
 
-    /// Frames that the manifest says cannot be drawn though they can, and a GIF that cannot be made though it can.
+    /// Errors that may remain: frames that the manifest reports as failed although they can be drawn, and a GIF that it
+    /// reports as refused although it can be made.
     pub(super) fn wrongly_given_up(&self, manifest: &Manifest) -> usize {
         let good =
             |name: &ScriptName| self.frames.iter().any(|shot| shot.script == *name && shot.picture.is_some());
@@ -172,7 +173,7 @@ impl Expected {
     }
 }
 
-/// A manifest takes another one's place as its next revision, or with nothing new but which files are there.
+/// Checks that a manifest follows its predecessor as the next revision, or changes only the recorded files.
 pub(super) fn follows(next: &Manifest, before: Option<&Manifest>) -> Result<(), String> {
     let revision = before.map_or(0, |before| before.head.revision);
     let is_record = before.is_some_and(|before| {

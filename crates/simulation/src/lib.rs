@@ -1,16 +1,17 @@
 //! The protocol in a simulated world: store, clock, events, functions and users, all from one seed.
 //!
-//! [`run`] makes up a story (scripts uploaded, overwritten, changed back, deleted, faulty; settings coming and going)
-//! and a world that fails in its own ways (events lost, doubled, late; invocations killed between any two requests;
-//! answers lost; 409, 412 and 503; listings that mix two moments; writes that land after their writer is dead), lets
-//! the real steps work in it, and checks at the end what the protocol guarantees:
+//! [`run`] generates a story and a world with faults. In the story scripts are uploaded, overwritten, changed back,
+//! deleted and faulty, and settings come and go. In the world events are lost, duplicated and late, invocations are
+//! killed between any two requests, and replies are lost. There are 409, 412 and 503, listings that mix two moments,
+//! and writes that take effect after their writer was killed. The real steps work in this world, and at the end [`run`]
+//! checks the guarantees of the protocol:
 //!
-//! - once everything has come to rest, the manifest says what the bucket's scripts say, frame by frame, and there is
-//!   exactly the GIF that they give;
-//! - that holds **without** a sweep, unless something happened that by design only the sweep heals;
-//! - manifests' revisions grow by one, no function writes below `scripts/`, every GIF has its frames in order.
+//! - when nothing is left to do, the manifest agrees with the bucket's scripts, frame by frame, and the only GIF is the
+//!   one that they give;
+//! - this holds **without** a sweep, unless something happened that by design only the sweep repairs;
+//! - revisions of manifests grow by one, no function writes below `scripts/`, and every GIF has its frames in order.
 //!
-//! The expected results of the scripts are worked out here, apart from [`rayfold_pipeline::reconcile()`].
+//! The expected results are computed here, independently of [`rayfold_pipeline::reconcile()`].
 //!
 //! ```
 //! rayfold_simulation::run(1, None).expect("the protocol holds");
@@ -53,23 +54,23 @@ pub struct Violation {
 /// The statistics of a run, for reports.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
-    /// Requests to the bucket.
+    /// The number of requests to the bucket.
     pub requests: u64,
-    /// Invocations of the render and of the assemble function.
+    /// The number of invocations of the render and of the assemble function.
     pub invocations: [u64; 2],
-    /// Whether the run had to come right without a sweep, and did.
+    /// Whether the run had to reach the right state without a sweep, and did.
     pub without_sweep: bool,
-    /// Events that the platform gave up.
+    /// The number of events that the platform gave up.
     pub given_up: u64,
-    /// GIFs that an invocation left unfinished to the next one.
+    /// The number of GIFs that an invocation left unfinished to the next one.
     pub left: u64,
-    /// Writes that landed after their writer was killed.
+    /// The number of writes that took effect after their writer was killed.
     pub late_writes: u64,
     /// The actions of each function below each prefix, as `function action prefix`.
     pub permissions: Vec<String>,
 }
 
-/// Runs one seed, with a rule of the protocol broken on purpose if asked for.
+/// Runs one seed. `mutation` is a rule of the protocol that is broken on purpose.
 ///
 /// # Errors
 ///
@@ -78,7 +79,7 @@ pub fn run(seed: u64, mutation: Option<Mutation>) -> Result<Run, Violation> {
     story::run(seed, mutation, None).map_err(|what| Violation { seed, what })
 }
 
-/// Runs one seed and records its history, a line a request.
+/// Runs one seed and records its history, one line per request.
 ///
 /// # Errors
 ///
@@ -87,12 +88,12 @@ pub fn replay(seed: u64, mutation: Option<Mutation>, log: &mut Vec<String>) -> R
     story::run(seed, mutation, Some(log)).map_err(|what| Violation { seed, what })
 }
 
-/// The seed that the environment variable `RAYFOLD_SEED` asks to replay.
+/// Returns the seed in the environment variable `RAYFOLD_SEED`, for a replay.
 pub fn seed_to_replay(variable: Option<&str>) -> Option<u64> {
     variable?.parse().ok()
 }
 
-/// Shared by the parts of a run.
+/// The data that the parts of a run share.
 type Shared<T> = Arc<std::sync::Mutex<T>>;
 
 #[cfg(test)]

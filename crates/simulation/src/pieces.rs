@@ -21,7 +21,7 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 /// The time that a frame takes.
 const PUSH: Duration = Duration::from_secs(4);
 
-/// By when all must have come to rest.
+/// The time by which everything must have come to rest.
 const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 
 /// An animation that is assembled in pieces.
@@ -31,9 +31,9 @@ pub struct Pieces {
     pub frames: u64,
     /// The number of the checkpoint, from 1, at whose put the first script is overwritten.
     pub overwritten_at: Option<u64>,
-    /// It is then changed back at once.
+    /// Whether the script is changed back at once.
     pub is_changed_back: bool,
-    /// One in this number of invocations is killed, and its event tried again.
+    /// One in this many invocations is killed, and its event tried again.
     pub kill: u64,
     /// A rule that is broken.
     pub mutation: Option<Mutation>,
@@ -46,11 +46,11 @@ pub struct Pieces {
 pub struct PiecesReport {
     /// The number of times that a GIF was left unfinished to the next invocation.
     pub left: u64,
-    /// GIFs that were put.
+    /// The number of GIFs that were put.
     pub gifs: u64,
-    /// Objects that say how far a GIF is, put in all.
+    /// The number of checkpoints that were put.
     pub checkpoints: u64,
-    /// The most invocations of the assemble function at once.
+    /// The largest number of concurrent invocations of the assemble function.
     pub at_once: u64,
     /// The uploads that were neither finished nor aborted.
     pub unfinished: usize,
@@ -60,7 +60,8 @@ pub struct PiecesReport {
 ///
 /// # Errors
 ///
-/// The final contents of the bucket, if they are not the animation, or include a lease or a checkpoint.
+/// Returns the final contents of the bucket as an error if they are not the animation, or include a lease or a
+/// checkpoint.
 pub fn in_pieces(pieces: Pieces) -> Result<PiecesReport, String> {
     let engine = Engine::default();
     let env = SimEnvironment::new(engine.clone(), pieces.seed, false);

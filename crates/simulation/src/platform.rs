@@ -1,5 +1,5 @@
-//! The functions' platform: events come late, twice or never; invocations run side by side up to a limit, are killed
-//! and tried again under the same request id; an event that is given up is recorded.
+//! The functions' platform. Events come late, twice or never. Invocations run concurrently up to a limit, and are
+//! killed and tried again under the same request id. An event that is given up is recorded.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::Ordering;
@@ -20,12 +20,12 @@ use rayfold_pipeline::{
     render_frame, sweep,
 };
 
-/// The rates at which the platform fails its users: one in so many, never when 0.
+/// The rates of the platform's faults: one in this many, or never if 0.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Chaos {
     /// An event is lost.
     pub(super) drop: u64,
-    /// An event comes twice, or an invocation that succeeded is run again.
+    /// An event is delivered twice, or an invocation that succeeded is run again.
     pub(super) duplicate: u64,
     /// An invocation is killed.
     pub(super) kill: u64,
@@ -57,40 +57,40 @@ struct Job {
     work: Work,
     request_id: String,
     attempt: u64,
-    /// When it came into the queue, in microseconds.
+    /// The time when it was queued, in microseconds.
     queued_us: u64,
 }
 
 /// The history of a run, for the predicates.
 #[derive(Debug, Default)]
 pub(super) struct Diary {
-    /// Something that by design only the sweep can heal.
+    /// Whether something happened that by design only the sweep can repair.
     pub(super) needs_sweep: Option<&'static str>,
-    /// Events that were given up.
+    /// The number of events that were given up.
     pub(super) given_up: u64,
-    /// GIFs that an invocation left unfinished to the next one.
+    /// The number of GIFs that an invocation left unfinished to the next one.
     pub(super) left: u64,
     /// The visits of the last sweep.
     pub(super) last_sweep: Vec<Visit>,
     /// An error that no invocation should have.
     pub(super) bug: Option<String>,
-    /// Requests of invocations that found everything done, with how often each count came.
+    /// The number of requests of invocations that found everything done, with the frequency of each number.
     pub(super) idle: Vec<u64>,
-    /// Invocations by kind: render, assemble.
+    /// The number of invocations by kind: render, assemble.
     pub(super) invocations: [u64; 2],
-    /// Time of the render function's invocations that was not drawing, and that was.
+    /// The time of the render function's invocations without drawing, and the time of drawing.
     pub(super) beyond_drawing: Duration,
     pub(super) drawing: Duration,
-    /// Time that events waited for a free place: the longest, and all together, by function.
+    /// The time that events waited for a free place: the longest, and the sum, by function.
     pub(super) longest_wait: [Duration; 2],
     pub(super) waits: [Duration; 2],
     /// The most invocations at once.
     pub(super) at_once: usize,
-    /// Time of assemblers that came to their end, and the most assemblers at once.
+    /// The time of finished assemblers, and the largest number of concurrent assemblers.
     pub(super) assembling: Duration,
     pub(super) assemblers_at_once: u64,
     assemblers: u64,
-    /// When an invocation last ended, in microseconds.
+    /// The time when an invocation last ended, in microseconds.
     pub(super) last_end_us: u64,
 }
 
@@ -128,7 +128,8 @@ pub(super) struct Platform {
     pub(super) diary: Mutex<Diary>,
     pub(super) mutation: Option<Mutation>,
     pub(super) concurrency: usize,
-    /// Places at the beginning, and how many more every 10 seconds, up to the concurrency; all at once when none.
+    /// The number of places at the beginning, and the number added every 10 seconds, up to the concurrency; `None` for
+    /// all at once.
     pub(super) ramp: Mutex<Option<usize>>,
     pub(super) timeout: Duration,
     pub(super) draw_ms: (u64, u64),
@@ -183,7 +184,7 @@ impl Platform {
         }
     }
 
-    /// Starts work after a delay, as an event of its own.
+    /// Starts work after a delay, as a separate event.
     pub(super) fn submit(&self, work: Work, delay: Duration) {
         let request_id = format!("{:016x}", self.env.random.bits());
         self.enqueue(Job { work, request_id, attempt: 1, queued_us: 0 }, delay);
@@ -338,7 +339,7 @@ impl Platform {
         Ok(())
     }
 
-    /// Returns the end that the platform sees for an error; `None` for one that a retry cannot mend.
+    /// Returns the end that the platform sees for an error, or `None` for an error that a retry cannot fix.
     fn end_of(&self, error: &Error) -> Option<End> {
         match error {
             Error::Key { .. } => None,
@@ -398,7 +399,7 @@ impl Platform {
         lock(&self.diary).needs_sweep.get_or_insert(what);
     }
 
-    /// Whether a write landed after its writer was killed.
+    /// Returns whether a write took effect after its writer was killed.
     pub(super) fn has_late_writes(&self) -> bool {
         self.env.late_writes.load(Ordering::Relaxed) > 0
     }

@@ -1,8 +1,8 @@
 //! Measurements for animations of any size and number: requests per frame, the time from the last result to the claim
 //! and from the first upload to the GIF, the waits for a free place, and the requests that the bucket refuses.
 //!
-//! There are no faults here but the bucket's limits, if they are asked for. All else is the requests' latencies
-//! (GET 10-25 ms, PUT 25-60 ms, LIST 20-40 ms a page, and the time of the bodies), the platform's concurrency
+//! There are no faults here except the bucket's limits, if requested. The model consists of the latencies of requests
+//! (GET 10-25 ms, PUT 25-60 ms, LIST 20-40 ms per page, and the transfer time of bodies), the platform's concurrency,
 //! and the drawing times.
 
 use std::sync::Arc;
@@ -27,34 +27,34 @@ const TIMEOUT: Duration = Duration::from_secs(900);
 /// The parameters of a measurement.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
-    /// Frames of each animation.
+    /// The number of frames of each animation.
     pub frames: u64,
-    /// Animations that are uploaded at once.
+    /// The number of animations that are uploaded at once.
     pub animations: u64,
-    /// Invocations at once, of both functions together.
+    /// The number of concurrent invocations of both functions together.
     pub concurrency: usize,
-    /// With limits the bucket and the platform have those of AWS: a bucket's requests a second, the time of large bodies, and
-    /// 1,000 more invocations every 10 s.
+    /// Whether the bucket and the platform have the limits of AWS: a bucket's requests per second, the transfer time of
+    /// large bodies, and 1,000 more invocations every 10 s.
     pub limits: Option<Limits>,
     /// The time that the assembler takes for a frame.
     pub push: Duration,
-    /// Milliseconds that a frame takes, from and to.
+    /// The minimum and the maximum milliseconds that a frame takes.
     pub draw_ms: (u64, u64),
-    /// Milliseconds over which the scripts are uploaded.
+    /// The milliseconds over which the scripts are uploaded.
     pub upload_ms: u64,
     /// The seed of everything.
     pub seed: u64,
 }
 
 impl Scale {
-    /// One animation in a bucket that bears anything, assembled in no time.
+    /// Returns the settings for one animation in a bucket without limits, which is assembled in no time.
     pub fn unlimited(frames: u64, concurrency: usize, seed: u64) -> Self {
         let (animations, limits, push) = (1, None, Duration::ZERO);
         let (draw_ms, upload_ms) = ((800, 1_200), 200);
         Scale { frames, animations, concurrency, limits, push, draw_ms, upload_ms, seed }
     }
 
-    /// On AWS, as far as it is modelled: `uploaded` scripts are uploaded per second.
+    /// Returns the settings for AWS, as far as it is modelled. `uploaded` scripts are uploaded per second.
     pub fn on_aws(frames: u64, animations: u64, uploaded: u64, concurrency: usize, push: Duration) -> Self {
         let upload_ms = frames * animations * 1_000 / uploaded.max(1);
         let (limits, draw_ms) = (Some(Limits::S3), (800, 1_200));
@@ -62,7 +62,7 @@ impl Scale {
     }
 }
 
-/// Bytes of a part that the store for S3 sends.
+/// The number of bytes of a part that the store for S3 sends.
 const PART_OF_S3: usize = 8 << 20;
 
 /// The number of places that Lambda adds every 10 seconds.
@@ -71,31 +71,31 @@ const RAMP: usize = 1_000;
 /// The results of a measurement.
 #[derive(Debug, Clone, Default)]
 pub struct ScaleReport {
-    /// Requests of the render function's invocations, divided by the frames.
+    /// The requests of the render function's invocations, divided by the frames.
     pub requests_a_frame: f64,
-    /// Requests of both functions by kind (GET, PUT, DELETE, LIST), divided by the frames.
+    /// The requests of both functions by kind (GET, PUT, DELETE, LIST), divided by the frames.
     pub kinds_a_frame: [f64; 4],
-    /// Mean time of the render function's invocations that was not drawing: requests and pauses.
+    /// The mean time of the render function's invocations without drawing: requests and pauses.
     pub beyond_drawing: Duration,
-    /// Bytes that the render function read, divided by the frames.
+    /// The bytes that the render function read, divided by the frames.
     pub bytes_a_frame: f64,
-    /// From the last result's put to the render function's last claim.
+    /// The time from the last result's put to the render function's last claim.
     pub tail: Duration,
-    /// Claims that were put.
+    /// The number of claims that were put.
     pub claims: u64,
-    /// Manifests that were written.
+    /// The number of manifests that were written.
     pub revisions: u64,
-    /// Requests of the assemble function, all invocations together.
+    /// The requests of the assemble function, all invocations together.
     pub assembling: u64,
-    /// The most requests of an event that comes once more when all is done.
+    /// The largest number of requests of an event that is delivered once more when everything is done.
     pub idle: u64,
-    /// From the first upload to the last GIF.
+    /// The time from the first upload to the last GIF.
     pub whole: Duration,
-    /// From the first upload to the first GIF.
+    /// The time from the first upload to the first GIF.
     pub first: Duration,
-    /// Mean time of the render function's invocations that was drawing.
+    /// The mean drawing time of the render function's invocations.
     pub drawing: Duration,
-    /// Time of the assemble function's invocations, all together.
+    /// The time of the assemble function's invocations, all together.
     pub assembling_time: Duration,
     /// The average and the longest time that events waited for a free place: the render
     /// function's, the assemble function's.
@@ -104,9 +104,9 @@ pub struct ScaleReport {
     pub invocations: [u64; 2],
     /// The most invocations at once.
     pub at_once: usize,
-    /// Requests that the bucket refused as one too many, divided by the frames.
+    /// The requests that the bucket refused because of its limits, divided by the frames.
     pub throttled: f64,
-    /// Bytes of the largest manifest.
+    /// The number of bytes of the largest manifest.
     pub manifest: u64,
     /// The number of times that an assembler left a GIF unfinished to the next one.
     pub left: u64,
@@ -127,7 +127,7 @@ struct Moments {
 ///
 /// # Errors
 ///
-/// The final contents of the bucket, if they are not the animations.
+/// Returns the final contents of the bucket as an error if they are not the animations.
 pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     let engine = Engine::default();
     let random = Randomness::seeded(scale.seed);
@@ -196,7 +196,7 @@ pub fn measure(scale: Scale) -> Result<ScaleReport, String> {
     })
 }
 
-/// The most requests of events that come once more when all is done.
+/// Returns the largest number of requests of events that are delivered once more when everything is done.
 fn idle(
     env: &Arc<SimEnvironment>,
     platform: &Platform,

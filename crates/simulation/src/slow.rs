@@ -1,7 +1,8 @@
 //! The cost of a slow upload or a slow removal: scripts come or go one by one, and `animation.json` does not say how
 //! many there will be.
 //!
-//! No faults here. Each finished moment is claimed for; the cost is what the assemblers make of the claims.
+//! There are no faults. A claim is written each time that all known frames are done; the cost is that of the assemblers
+//! of these claims.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -24,11 +25,11 @@ const TIMEOUT: Duration = Duration::from_secs(900);
 /// A slow change of a set.
 #[derive(Debug, Clone, Copy)]
 pub struct Slow {
-    /// Scripts that come, one after the other.
+    /// The number of scripts that are uploaded, one after the other.
     pub scripts: u64,
-    /// Milliseconds between two of them.
+    /// The milliseconds between two of them.
     pub apart_ms: u64,
-    /// The number of scripts that go again, as slowly, once all are done.
+    /// The number of scripts that are deleted again, equally slowly, once all are done.
     pub removed: u64,
     /// The time limit of an invocation.
     pub timeout: Option<Duration>,
@@ -39,27 +40,27 @@ pub struct Slow {
 /// The cost of a slow upload or removal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SlowReport {
-    /// GIFs that were built.
+    /// The number of GIFs that were built.
     pub gifs: u64,
-    /// Claims that were put.
+    /// The number of claims that were put.
     pub claims: u64,
-    /// Time of the assemble function's invocations, all together.
+    /// The time of the assemble function's invocations, all together.
     pub assembling: Duration,
     /// The most of them at once.
     pub at_once: u64,
-    /// Requests of the assemble function.
+    /// The number of requests of the assemble function.
     pub requests: u64,
-    /// Requests of the render function.
+    /// The number of requests of the render function.
     pub rendering: u64,
-    /// From the first change to rest.
+    /// The time from the first change to rest.
     pub whole: Duration,
 }
 
-/// Lives through a slow upload, and a slow removal if asked for; the counts are of the last of them.
+/// Runs a slow upload, and a slow removal if requested. The counts are those of the last of them.
 ///
 /// # Errors
 ///
-/// The final contents of the bucket, if they are not the animation.
+/// Returns the final contents of the bucket as an error if they are not the animation.
 pub fn slowly(slow: Slow) -> Result<SlowReport, String> {
     let engine = Engine::default();
     let env = SimEnvironment::new(engine.clone(), slow.seed, false);

@@ -1,4 +1,4 @@
-//! One run: a story and a world made up from a seed, lived through, and judged.
+//! One run: a story and a world are generated from a seed, simulated, and checked.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -21,25 +21,25 @@ use rayfold_pipeline::sweep::Visit;
 use rayfold_pipeline::{Clock, Mutation, Policy, Randomness};
 use rayfold_scene::Container;
 
-/// By when a run must have come to rest.
+/// The time by which a run must have come to rest.
 const PATIENCE: Duration = Duration::from_secs(24 * 3600);
 
 /// The time limit of an invocation.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// For how long things happen and go wrong.
+/// The time during which changes and faults happen.
 const TROUBLES: Duration = Duration::from_secs(45);
 
-/// Keeps the random numbers of strangers apart from the rest of a story.
+/// Separates the random numbers of other clients from those of the rest of a story.
 const STRANGERS: u64 = 0x0067_6172_626c_6572;
 
-/// Sets apart which frames are too big from the rest of a story.
+/// Separates the random choice of frames that are too big from the rest of a story.
 const BIG_FRAMES: u64 = 0x0062_6967;
-/// Sets apart which scripts name files, and the acts on these, from the rest of a story.
+/// Separates the random choice of scripts that name files, and the actions on these files, from the rest of a story.
 const FILES: u64 = 0x0066_696c_6573;
-/// Sets apart how little time the assembler has.
+/// Separates the random time limits of the assembler.
 const HURRY: u64 = 0x0068_7572_7279;
-/// Likewise of the files that are asked for.
+/// Separates the random choice of the requested files.
 const OUTPUTS: u64 = 0x006f_7574_7075_7473;
 
 /// The number of sweeps that a run may need.
@@ -48,16 +48,16 @@ const MAX_SWEEPS: u32 = 24;
 /// The largest number of calls of `retry`.
 const MAX_RETRIES: u32 = 4;
 
-/// Bytes of an upload's part where GIFs are built in pieces: two or three frames.
+/// The number of bytes of a part if GIFs are built in pieces: two or three frames.
 const SMALL_PART: usize = 32;
 
 /// Scripts of the stories: their natural order is not their byte order, and one name looks like a receipt's.
 const NAMES: [&str; 4] = ["2", "10", "1", "3@0-p1"];
 
-/// Files of the stories.
+/// The file names of the stories.
 const FILE_NAMES: [&str; 2] = ["f", "g"];
 
-/// Lives through one seed, and writes it down if asked to.
+/// Runs one seed, and records its history if requested.
 pub(super) fn run(
     seed: u64,
     mutation: Option<Mutation>,
@@ -126,7 +126,7 @@ fn begin(
     Ok(Judge { engine, env, platform, animation, watch })
 }
 
-/// The protocol's numbers: those that decide which cases a small world can show.
+/// Returns the constants of the protocol, chosen so that a small world can show all cases.
 fn policy(random: &Randomness) -> Policy {
     Policy {
         quiet: Duration::from_millis([100, 1_000, 5_000][pick(random, 3)]),
@@ -140,7 +140,7 @@ fn policy(random: &Randomness) -> Policy {
     }
 }
 
-/// One of four rates.
+/// Returns one of four rates.
 fn rate(random: &Randomness, rates: [u64; 4]) -> u64 {
     rates[pick(random, 4)]
 }
@@ -168,7 +168,7 @@ fn faults(random: &Randomness) -> Faults {
     }
 }
 
-/// Has every change of the bucket watched, and sent to the platform.
+/// Watches every change of the bucket, and sends it to the platform.
 fn watch(env: &SimEnvironment, platform: &Arc<Platform>) -> Shared<Watch> {
     let watch: Shared<Watch> = Shared::default();
     let (platform, watched) = (Arc::downgrade(platform), watch.clone());
@@ -186,7 +186,7 @@ fn pick(random: &Randomness, of: usize) -> usize {
     usize::try_from(random.below(of as u64)).unwrap_or(0)
 }
 
-/// Writes the acts of users and their times.
+/// Generates the actions of users and their times.
 fn write_story(
     (random, outputs): (&Randomness, &Randomness),
     env: &Arc<SimEnvironment>,
@@ -242,7 +242,7 @@ fn write_story(
     }
 }
 
-/// Writes the acts on files and their times. Some come before the scripts that name them, some never.
+/// Generates the actions on files and their times. Some files come before the scripts that name them, some never come.
 fn write_acts_on_files(random: &Randomness, env: &Arc<SimEnvironment>, animation: &Animation) {
     let span_ms = [50, 500, 4_000, 20_000][pick(random, 4)];
     for _ in 0..1 + random.below(7) {
@@ -263,7 +263,7 @@ fn write_acts_on_files(random: &Randomness, env: &Arc<SimEnvironment>, animation
     }
 }
 
-/// A user who changes a script at the worst moment, mostly back to its earlier text.
+/// Simulates a user who changes a script at the worst moment, mostly back to its earlier text.
 fn awkward_user(random: &Randomness, env: &Arc<SimEnvironment>) -> Arc<dyn Fn(Moment) + Send + Sync> {
     let random = Randomness::seeded(random.bits());
     let (left, patience) = (AtomicU64::new(1 + random.below(4)), 1 + random.below(6));
@@ -307,7 +307,7 @@ fn awkward_user(random: &Randomness, env: &Arc<SimEnvironment>) -> Arc<dyn Fn(Mo
     })
 }
 
-/// Few contents, so that a change often goes back to an earlier one.
+/// Returns one of few contents, so that a change often goes back to an earlier one.
 fn content(random: &Randomness) -> String {
     let number = random.below(2);
     match random.below(24) {
@@ -341,7 +341,7 @@ fn act(env: &Arc<SimEnvironment>, delay: Duration, key: String, text: Option<Str
     });
 }
 
-/// In a world with files half of the texts of scripts name some, always the same ones.
+/// In a world with files, half of the texts of scripts name some, always the same ones.
 fn perhaps_with(world: &SimEnvironment, key: &str, text: String) -> String {
     let Some(lot) = *lock(&world.files) else { return text };
     let is_plain = !text.starts_with("with ") && !text.starts_with(BIG);
@@ -354,7 +354,7 @@ fn perhaps_with(world: &SimEnvironment, key: &str, text: String) -> String {
     text
 }
 
-/// In a world with big frames half of the texts of scripts have some, always the same ones.
+/// In a world with big frames, half of the texts of scripts have some, always the same ones.
 fn perhaps_big(world: &SimEnvironment, key: &str, text: String) -> String {
     let Some(lot) = *lock(&world.big) else { return text };
     let number = text.bytes().fold(lot, |number, byte| number.wrapping_mul(31) ^ u64::from(byte));
@@ -420,7 +420,7 @@ fn is_image(key: &str) -> bool {
     key.ends_with(".png") || key.ends_with(".band")
 }
 
-/// Returns the place of a picture: the number that its script's name starts with, the name, the part.
+/// Returns the place of a picture in the animation: the number with which its script's name starts, the name, the part.
 fn place_of(picture: &str) -> Option<(u64, String, u64)> {
     let mut fields = picture.split(':');
     let name = fields.next()?;
@@ -428,7 +428,7 @@ fn place_of(picture: &str) -> Option<(u64, String, u64)> {
     Some((digits.parse().ok()?, name.to_owned(), fields.next()?.parse().ok()?))
 }
 
-/// Lets the world come to rest and looks at it.
+/// Lets the world come to rest and checks it.
 struct Judge {
     engine: Engine,
     env: Arc<SimEnvironment>,
@@ -438,7 +438,7 @@ struct Judge {
 }
 
 impl Judge {
-    /// A user overwrites the manifest, a frame or the GIF with garbage. No function is woken by that.
+    /// A user overwrites the manifest, a frame or the GIF with garbage. This triggers no function.
     fn garble(&self, random: &Randomness) {
         let delay = Duration::from_micros(random.below(TROUBLES.as_micros() as u64));
         match random.below(3) {
@@ -465,7 +465,7 @@ impl Judge {
         });
     }
 
-    /// A user puts half of a file in its place, with its metadata, once the manifest says which one it is.
+    /// A user replaces a file by half of it, with its metadata, once the manifest records its version.
     fn cut_off_a_file(&self, delay: Duration) {
         let (world, platform, animation) = (self.env.clone(), self.platform.clone(), self.animation.clone());
         self.engine.after(delay, move || {
@@ -493,7 +493,7 @@ impl Judge {
         });
     }
 
-    /// From now on nothing goes wrong.
+    /// Stops all faults from now on.
     fn calm_down(&self) {
         *lock(&self.platform.chaos) = Chaos { delay_ms: 10, ..Chaos::default() };
         *lock(&self.env.faults) = Faults::default();

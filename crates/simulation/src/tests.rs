@@ -34,8 +34,8 @@ fn the_protocol_holds() {
     assert!(left > SEEDS / 8, "GIFs must be built in pieces, too: {left}");
 }
 
-/// Some rules are noticed by many seeds; all of them by the search ([`explore`](super::explore)). The last one is noticed by
-/// about one in 30,000.
+/// Many seeds detect the violation of some rules; the search ([`explore`](super::explore)) detects that of all rules.
+/// The last one is detected by about one seed in 30,000.
 #[test]
 fn broken_rules_are_noticed_by_seeds() {
     for (rule, mut seeds) in [
@@ -52,8 +52,8 @@ fn broken_rules_are_noticed_by_seeds() {
     }
 }
 
-/// Frames in bands are cut again by invocations that look before the cut is written down, while events are lost,
-/// doubled and late, invocations are killed, answers lost and scripts overwritten.
+/// Frames in bands are cut again by invocations that list before the cut is written. Meanwhile events are lost,
+/// duplicated and late, invocations are killed, replies are lost, and scripts are overwritten.
 #[test]
 fn frames_in_bands_are_put_together_whatever_happens() {
     let mut put_together = 0;
@@ -74,7 +74,7 @@ fn a_seed_gives_the_same_run() {
     assert!(first.len() > 50 && first == second);
 }
 
-/// `docs/pipeline.md` lists the actions of each function, besides those that only superseded parts lead to.
+/// `docs/pipeline.md` lists the actions of each function, except those for superseded parts.
 #[test]
 fn functions_do_only_what_their_permissions_say() {
     let mut seen = std::collections::BTreeSet::new();
@@ -99,7 +99,8 @@ fn functions_do_only_what_their_permissions_say() {
     assert_eq!(seen, expected);
 }
 
-/// Each finished moment woke an assembler that waited until the upload was quiet: 56 at once, and 20 GIFs of 20 frames.
+/// Each time that all known frames were done, an assembler was invoked and waited until the upload was quiet: 56 at
+/// once, and 20 GIFs of 20 frames.
 #[test]
 fn a_slow_upload_has_one_assembler_that_waits() {
     for (scripts, apart_ms) in [(60, 1_000), (20, 4_000), (300, 80)] {
@@ -124,7 +125,7 @@ fn a_slow_removal_is_assembled_once_it_is_over() {
     assert!(report.gifs <= 2 && report.whole < Duration::from_secs(24 + 10), "{report:?}");
 }
 
-/// An upload that lasts longer than an invocation may run is watched by one after the other.
+/// If an upload lasts longer than an invocation may run, assemblers wait for it one after the other.
 #[test]
 fn an_assembler_hands_over_before_its_time_is_up() {
     let timeout = Some(Duration::from_secs(60));
@@ -133,7 +134,7 @@ fn an_assembler_hands_over_before_its_time_is_up() {
     assert!(report.gifs <= 2, "{report:?}");
 }
 
-/// The GIF is that of an assembler that has time for all of it.
+/// The GIF equals that of an assembler that has time for all of it.
 #[test]
 fn a_gif_that_takes_too_long_for_one_assembler_is_built_by_several() {
     for (frames, left) in [(1, 0), (2, 0), (3, 1), (40, 19)] {
@@ -145,7 +146,7 @@ fn a_gif_that_takes_too_long_for_one_assembler_is_built_by_several() {
     }
 }
 
-/// One that would take longer than an unfinished upload is kept.
+/// A GIF is refused if it would take longer than an unfinished upload is kept.
 #[test]
 fn a_gif_that_takes_a_day_is_refused() {
     assert_eq!(
@@ -219,7 +220,7 @@ fn more_frames_than_a_page_on_fewer_invocations() {
     scaled(1_100, 150, 12.0);
 }
 
-/// 299 frames of 8 x 8 pixels took 33 s on two places, for finishers paused on them, and 2,000 took 17 requests each.
+/// 299 frames of 8 x 8 pixels took 33 s on two places, because finishers paused, and 2,000 took 17 requests each.
 #[test]
 fn on_few_places_nobody_waits_for_a_crowd() {
     for (frames, places) in [(50, 1), (300, 1), (300, 2), (1_000, 4), (1_000, 16)] {

@@ -22,7 +22,7 @@ pub(super) struct TimedRenderer {
     pub(super) env: Arc<SimEnvironment>,
     pub(super) fate: Arc<Fate>,
     pub(super) die: Arc<dyn Fn() + Send + Sync>,
-    /// Milliseconds that a frame takes, from and to.
+    /// The minimum and the maximum milliseconds that a frame takes.
     pub(super) draw_ms: (u64, u64),
 }
 
@@ -31,7 +31,7 @@ impl TimedRenderer {
         self.env.engine.sleep(self.env.between_ms(self.draw_ms.0..self.draw_ms.1)).await;
     }
 
-    /// A frame that is measured again is not always cut the same, and a frame at the edge is drawn after all.
+    /// A frame that is measured again may get another number of bands, and a frame at the limit may be drawn after all.
     fn drawer(&self, script: &[u8]) -> InstantRenderer {
         let bands = if is_big(script) { self.env.random.below(6) } else { 1 };
         InstantRenderer { bands: NonZeroU64::new(bands).unwrap_or(NonZeroU64::MIN) }
@@ -79,16 +79,16 @@ impl Renderer for TimedRenderer {
     }
 }
 
-/// The pace at which an animation is assembled.
+/// The time that an assembler takes per frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pace {
     /// The time that a frame takes.
     pub(super) push: Duration,
-    /// Whether a frame goes out when the next one comes, as of a GIF; else all do at the end.
+    /// Whether a frame is output when the next one comes, as in a GIF; otherwise all are output at the end.
     pub(super) is_eager: bool,
 }
 
-/// Lists frames, in simulated time.
+/// An animator that lists frames, in simulated time.
 pub(super) struct FakeAnimator {
     pub(super) engine: Engine,
     pub(super) pace: Pace,

@@ -1,18 +1,19 @@
-//! Small worlds searched instead of drawn at random: all interleavings of the real steps, or those that provoke most.
+//! Searches small worlds instead of drawing them at random: all interleavings of the real steps, or those that are most
+//! likely to show errors.
 //!
-//! [`explore`] visits every state that a [`World`] can come to: invocations' requests in any order, and within the
-//! world's budget kills before and after any request, writes that land after their sender's death, lost answers, and
-//! events that come twice or never. States are distinguished by a hash of 64 bits; a request that can meet no other
-//! is taken alone (partial-order reduction: in a world that always comes to rest nothing is missed by it). States
-//! that few preemptions lead to come first. [`provoke`] runs schedules that are chosen to provoke, with preemptions
-//! and faults aimed at writes.
+//! [`explore`] visits every state that a [`World`] can reach. Requests of invocations come in any order. Within the
+//! world's budget there are kills before and after any request, writes that take effect after their sender was killed,
+//! lost replies, and events that come twice or never. States are distinguished by a hash of 64 bits. If a request
+//! cannot interact with any other, only that request is followed (partial-order reduction, which misses nothing in a
+//! world that always comes to rest). States that need few preemptions come first. [`provoke`] runs schedules that are
+//! chosen to provoke errors, with preemptions and faults aimed at writes.
 //!
-//! The invariants are those that [`super::run`] checks: revisions grow by one, no function writes below `scripts/`,
-//! no GIF gives way to one from an older listing, and at rest manifest and GIF are what the scripts say, after sweeps
-//! where something happened that only they heal.
+//! The invariants are those that [`super::run`] checks. Revisions grow by one. No function writes below `scripts/`. No
+//! GIF is replaced by one from an older listing. When nothing is left to do, manifest and GIF follow from the scripts,
+//! after sweeps if something happened that only a sweep repairs.
 //!
-//! Not searched: listings that mix two moments, time (the store's clock moves with the user's acts alone, others
-//! stand still), the deadline. The seeds of [`super::run`] have these.
+//! The search does not cover listings that mix two moments, deadlines, or time: the store's clock advances only with
+//! the user's actions, and other clocks stand still. The seeds of [`super::run`] cover these.
 
 mod order;
 mod process;
@@ -34,13 +35,13 @@ pub use worlds::{World, provoking, worlds};
 pub struct Budget {
     /// The number of invocations killed.
     pub kills: u8,
-    /// The number of these that are writes that land after their sender is dead.
+    /// The maximum number of these kills after which a write still takes effect.
     pub ghosts: u8,
-    /// Answers to writes lost.
+    /// Writes whose replies are lost.
     pub losses: u8,
-    /// Events that come twice.
+    /// Events that are delivered twice.
     pub doubles: u8,
-    /// Events that never come.
+    /// Events that are never delivered.
     pub drops: u8,
 }
 
@@ -49,33 +50,32 @@ pub struct Budget {
 pub struct Explored {
     /// The number of different states.
     pub states: u64,
-    /// States in which nothing is left to happen.
+    /// The number of states in which nothing is left to do.
     pub rests: u64,
     /// The number of different situations: the contents of the bucket, and the next request of every invocation.
     pub situations: u64,
     /// A hash of all these.
     pub all_situations: u64,
-    /// Steps from one state to another.
+    /// The number of steps from one state to another.
     pub steps: u64,
-    /// The most steps to a state of rest, by the way that it was reached first.
+    /// The largest number of steps to a state of rest, on the path on which that state was reached first.
     pub depth: usize,
-    /// The largest weight of the preemptions and faults on the way to a state, by the way that it was reached
-    /// first: 1 before a write, 2 elsewhere. If the search ended at its limit, their weight on the cheapest way
-    /// that it did not go.
+    /// The largest weight of the preemptions and faults on the path on which a state was reached first: 1 before a
+    /// write, 2 elsewhere. If the search ended at its limit, the smallest weight of a path that it did not follow.
     pub price: usize,
-    /// There was no more to see; else the search ended at its limit.
+    /// Whether there was nothing more to visit; otherwise the search ended at its limit.
     pub complete: bool,
 }
 
 impl Explored {
-    /// Whether both searches have come to the same situations, and to as many states of rest.
+    /// Returns whether both searches reached the same situations, and the same number of states of rest.
     pub fn saw_the_same_as(&self, other: &Explored) -> bool {
         let seen = |of: &Explored| (of.situations, of.all_situations, of.rests);
         seen(self) == seen(other)
     }
 }
 
-/// A guarantee that does not hold, and how it came to that.
+/// A violated guarantee, and the steps that led to it.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{world}: {what}\n{}", steps.join("\n"))]
 pub struct Counterexample {
@@ -83,15 +83,15 @@ pub struct Counterexample {
     pub world: &'static str,
     /// The invariant that does not hold.
     pub what: String,
-    /// The steps that led there, in order, in words.
+    /// The steps that led there, in order, as text.
     pub steps: Vec<String>,
-    /// The number of states that were seen before; none by a schedule.
+    /// The number of states that were visited before; 0 in a schedule.
     pub states: u64,
-    /// The weight of the preemptions and faults on the way; not counted in a schedule.
+    /// The weight of the preemptions and faults on the path; not counted in a schedule.
     pub price: usize,
 }
 
-/// Schedules of each kind that a seed runs in each world.
+/// The number of schedules of each kind that a seed runs in each world.
 const SCHEDULES: usize = 2;
 
 /// Runs a few schedules of each kind in each world.
@@ -112,7 +112,7 @@ pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Resul
     })
 }
 
-/// When something goes wrong that may.
+/// The points at which faults happen.
 enum Aim {
     /// Once in this number of steps.
     Anywhere(u64),
@@ -128,7 +128,7 @@ impl Aim {
         }
     }
 
-    /// Whether it is now, `writes` having been begun before.
+    /// Returns whether a fault happens now, after `writes` begun writes.
     fn is_met(&self, is_write: bool, writes: u64, random: &Randomness) -> bool {
         match self {
             Aim::Anywhere(seldom) => random.one_in(*seldom),
@@ -178,12 +178,12 @@ fn schedule(
     state.judge(world, memo).map_err(|what| failed(what, &steps))
 }
 
-/// Whether a write is on its way after it.
+/// Returns whether a write takes effect later because of it.
 fn is_late(choice: Choice) -> bool {
     matches!(choice, Choice::Request { fate: Fate::KilledAndLate, .. })
 }
 
-/// Whether nothing goes wrong in it.
+/// Returns whether it contains no fault.
 fn is_plain(choice: Choice) -> bool {
     use state::Delivery;
     match choice {

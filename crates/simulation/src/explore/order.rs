@@ -1,4 +1,4 @@
-//! The order in which processes go on in a schedule that is to provoke.
+//! The order in which processes continue in a provoking schedule.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,26 +8,26 @@ use rayfold_pipeline::Randomness;
 /// The number of times that priorities change in a schedule.
 const CHANGES: u32 = 4;
 
-/// The most preemptions of a schedule that has few.
+/// The maximum number of preemptions of a schedule with few.
 const FEW: u64 = 2;
 
-/// Writes of a schedule that preemptions and faults are aimed at: in most of the worlds all of them.
+/// The number of writes of a schedule at which preemptions and faults are aimed: in most of the worlds all of them.
 pub(super) const MAX_WRITES: u64 = 12;
 
-/// Priorities that are drawn at random are above this, those that have changed below.
+/// Random priorities are above this; changed priorities are below.
 const DRAWN: u64 = 1 << 63;
 
 /// A way to choose who goes on.
 #[derive(Debug)]
 pub(super) enum Order {
-    /// The process with the highest priority. Priorities are drawn by lot, the user's anew after each act, and
-    /// fall below all others a few times, mostly before a write (probabilistic concurrency testing; Burckhardt
-    /// et al., ASPLOS 2010).
+    /// The process with the highest priority continues. Priorities are random; the user gets a new one after each
+    /// action. A few times a priority falls below all others, mostly before a write (probabilistic concurrency testing;
+    /// Burckhardt et al., ASPLOS 2010).
     Priorities { priorities: BTreeMap<u64, u64>, changes: u32, lowest: u64, pauses: Pauses },
-    /// The process that went on before, up to a pause; then the one that the lot falls on.
+    /// The process that continued before goes on up to a pause; then a random one continues.
     Turns { current: Option<u64>, pauses: Pauses },
-    /// The process that went on before, up to the end, but for a few writes before which the lot falls on another one
-    /// (context bounding; Musuvathi and Qadeer, PLDI 2007). `writes` are counted as they come up.
+    /// The process that continued before goes on to its end, except for a few writes before which a random other one
+    /// continues (context bounding; Musuvathi and Qadeer, PLDI 2007). `writes` counts the writes so far.
     Few { current: Option<u64>, preempted: Vec<u64>, writes: u64 },
 }
 
@@ -43,7 +43,7 @@ impl Kind {
     pub(super) const ALL: [Kind; 3] = [Kind::Priorities, Kind::Turns, Kind::Few];
 }
 
-/// A process is put off before one in so many writes, and at one in so many other steps.
+/// A process is suspended before one in this many writes, and at one in this many other steps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pauses {
     before_writes: u64,
@@ -65,7 +65,7 @@ impl Order {
         }
     }
 
-    /// Returns the process that goes on; `None` when nothing is left to happen.
+    /// Returns the process that continues, or `None` if nothing is left to do.
     pub(super) fn next(&mut self, state: &State, choices: &[Choice], random: &Randomness) -> Option<u64> {
         let actors: BTreeSet<u64> = choices.iter().map(|choice| state.actor(*choice)).collect();
         let actors: Vec<u64> = actors.into_iter().collect();
@@ -116,7 +116,7 @@ impl Order {
     }
 }
 
-/// Any of them; none if there is none.
+/// Returns any of them at random, or `None` if there is none.
 pub(super) fn pick<'a, T>(from: &'a [T], random: &Randomness) -> Option<&'a T> {
     from.get(usize::try_from(random.below(from.len() as u64)).unwrap_or(0))
 }

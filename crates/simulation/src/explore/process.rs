@@ -1,12 +1,12 @@
-//! An invocation as a function: from the answers that it has got to the requests that it waits on, or to its end.
+//! An invocation as a function: from the replies that it has received to the requests that it waits for, or to its end.
 //!
-//! The real steps run against a store that answers nothing by itself. The next requests of an invocation depend on
-//! its event, its request id, the moment that its clock shows, and the answers so far; on nothing else. So its state
-//! is known by a hash of these and is worked out once ([`Memo`]), and states of the world can be copied and compared.
-//! At some places a step declares the values from which it continues ([`Invocation::forget_history_before`]): its
-//! history is then forgotten, and two invocations that have reached the same values in different ways are one.
-//! Clocks of invocations stand still, and pauses end at once: a pause only lets the next request of its invocation
-//! take effect later, and that is searched anyway.
+//! The real steps run against a store that replies to nothing by itself. The next requests of an invocation depend only
+//! on its event, its request id, the time that its clock shows, and the replies so far. So a hash of these identifies
+//! its state, the state is computed once ([`Memo`]), and states of the world can be copied and compared. At some places
+//! a step declares the values from which it continues ([`Invocation::forget_history_before`]). Its history is then
+//! dropped, and two invocations that reached the same values in different ways become equal. Clocks of invocations
+//! stand still, and pauses end at once: a pause only delays the next request of its invocation, which the search covers
+//! anyway.
 
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -39,7 +39,7 @@ use rayfold_pipeline::{
 /// The time limit of an invocation.
 const TIMEOUT: Duration = Duration::from_secs(900);
 
-/// The time that a frame takes where there is no time for a second one.
+/// The time that a frame takes if there is no time for a second one.
 const LONG_PUSH: Duration = Duration::from_secs(300);
 
 /// The event that an invocation works on.
@@ -78,22 +78,22 @@ pub(super) enum Answer {
 /// The state that an invocation has reached.
 #[derive(Debug, PartialEq)]
 pub(super) struct Standing {
-    /// The requests that it waits on, each with its number.
+    /// The requests whose replies it waits for, each with its number.
     pub(super) requests: Vec<(u32, Request)>,
-    /// The end of the invocation; an error is what the platform sees.
+    /// The end of the invocation. An error is the one that the platform sees.
     pub(super) end: Option<Result<(), End>>,
     /// The hash of its requests.
     pub(super) asks: u64,
-    /// The hash of the values that it continues from, if the last answer has led to a place where it declares them.
+    /// The hash of the values from which it continues, if the last reply has led to a place where it declares them.
     carried: Option<u64>,
 }
 
-/// The end of an invocation that did not succeed.
+/// The end of an invocation that failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
     /// The platform tries again.
     TryAgain,
-    /// No invocation should end so.
+    /// An error of the program, with which no invocation should end.
     Bug(String),
 }
 
@@ -102,15 +102,15 @@ pub(super) enum End {
 pub(super) struct Event {
     slot: u32,
     answer: Arc<Answer>,
-    /// The hash of all that has happened up to it.
+    /// The hash of everything that has happened up to it.
     hash: u64,
 }
 
-/// An invocation: its event, and all that has happened to it.
+/// An invocation: its event, and everything that has happened to it.
 #[derive(Debug, Clone)]
 pub(super) struct Process {
     pub(super) work: Work,
-    /// Shared by the platform's attempts at the event.
+    /// The request id, which the platform's attempts at the event share.
     pub(super) request_id: Arc<str>,
     /// The number of the attempt, from 1.
     pub(super) attempt: u32,
@@ -118,20 +118,21 @@ pub(super) struct Process {
     /// The hash of all the above.
     begun: u64,
     history: Vec<Event>,
-    /// Answers from here on have led to nothing yet: others of requests that were sent with theirs are yet to come.
+    /// The index of the first reply that has had no effect yet, because replies to requests that were sent together
+    /// with its request are still to come.
     silent: usize,
     /// The hash of all that has happened.
     pub(super) hash: u64,
     pub(super) standing: Arc<Standing>,
-    /// When it last listed the scripts, if it is one that writes GIFs.
+    /// The time when it last listed the scripts, if it writes GIFs.
     pub(super) listed: Timestamp,
 }
 
-/// The known states of invocations, by the hash of what has happened to them.
+/// The known states of invocations, by the hash of their history.
 #[derive(Debug)]
 pub(super) struct Memo {
     standings: BTreeMap<u64, Arc<Standing>>,
-    /// By the hash of all that had happened before, and of an answer.
+    /// The states by the hash of the earlier history and of a reply.
     answered: BTreeMap<u64, Arc<Process>>,
     manner: Manner,
 }
@@ -140,9 +141,9 @@ pub(super) struct Memo {
 #[derive(Debug, Clone, Copy)]
 struct Manner {
     mutation: Option<Mutation>,
-    /// Whether an assembler has time for one frame and no more.
+    /// Whether an assembler has time for only one frame.
     is_cut: bool,
-    /// Whether nothing is forgotten.
+    /// Whether no history is dropped.
     remembers: bool,
 }
 
@@ -159,7 +160,7 @@ impl Memo {
         Memo { standings, answered, manner }
     }
 
-    /// Begins an invocation, whose clock will show `start` all the time.
+    /// Begins an invocation, whose clock shows `start` all the time.
     pub(super) fn begin(
         &mut self,
         work: Work,
@@ -176,7 +177,7 @@ impl Memo {
         Arc::new(process)
     }
 
-    /// Gives an invocation the answer to one of its requests, by the store's clock `now`.
+    /// Passes the reply to one of its requests to an invocation, at the time `now` of the store's clock.
     pub(super) fn answer(
         &mut self,
         process: &Process,
@@ -209,7 +210,7 @@ impl Memo {
         next
     }
 
-    /// Forgets the history of a process: it is then equal to each other one that continues from the same state.
+    /// Drops the history of a process, which is then equal to any other one that continues from the same state.
     fn forget(&mut self, process: &mut Process, carried: u64) {
         process.hash = hash_of(&(process.begun, process.listed, carried));
         process.silent = process.history.len();
@@ -221,8 +222,8 @@ impl Memo {
         assert_eq!(*known, process.standing, "more than is said makes a difference");
     }
 
-    /// Answers that are waited for together are kept in the order of their requests, whichever came first, where that leads
-    /// to the same: the invocation does not tell.
+    /// Replies that are awaited together are stored in the order of their requests and not of their arrival, if the
+    /// result is the same, because the invocation cannot distinguish the orders.
     fn work_out(&mut self, process: Process, slot: u32, answer: Answer) -> Process {
         let asked = process.standing.requests.len();
         let mut next = process;
@@ -259,7 +260,7 @@ impl Memo {
 }
 
 impl Process {
-    /// Hashes all that has happened from this answer on.
+    /// Hashes everything that has happened from this reply on.
     fn rehash_from(&mut self, place: usize) {
         let before = place.checked_sub(1).and_then(|before| self.history.get(before));
         let mut hash = before.map_or(self.begun, |event| event.hash);
@@ -307,7 +308,7 @@ impl Answer {
     }
 }
 
-/// Runs the real step again from its beginning, giving it the answers in their order.
+/// Runs the real step again from its beginning, with the replies in their order.
 fn relive(process: &Process, manner: Manner) -> Standing {
     let (start, now) = (process.start, process.start);
     let slots = Arc::new(Mutex::new(Slots { start, now, ..Slots::default() }));
@@ -359,7 +360,7 @@ fn step(work: Work, request_id: Arc<str>, board: Board, manner: Manner) -> Task 
     })
 }
 
-/// Polls a step until it waits for an answer.
+/// Polls a step until it waits for a reply.
 fn poll(task: &mut Task) -> Option<Result<(), End>> {
     struct Flag(AtomicBool);
     impl Wake for Flag {
@@ -377,7 +378,7 @@ fn poll(task: &mut Task) -> Option<Result<(), End>> {
     None
 }
 
-/// The board on which a step leaves its requests and finds the answers.
+/// The board on which a step leaves its requests and finds the replies.
 #[derive(Clone)]
 struct Board {
     slots: Arc<Mutex<Slots>>,
@@ -493,7 +494,7 @@ impl Store for BoardStore {
         }
     }
 
-    /// Beginning an upload and sending its parts changes nothing that anyone sees, so it is no request here.
+    /// To begin an upload and send its parts changes nothing that anyone can see, so it is no request here.
     async fn upload(&self, key: &str, options: PutOptions) -> Result<BoardUpload> {
         Ok(self.take_up(key, options, UnfinishedUpload::default()))
     }
@@ -526,7 +527,7 @@ impl Upload for BoardUpload {
         Ok(())
     }
 
-    /// No part has been sent.
+    /// No part has been sent yet.
     fn leave(self) -> UnfinishedUpload {
         UnfinishedUpload { tail: self.body.freeze(), ..UnfinishedUpload::default() }
     }
@@ -535,7 +536,7 @@ impl Upload for BoardUpload {
 /// The bands of a frame that is too big.
 const BANDS: NonZeroU64 = NonZeroU64::new(2).expect("two is not zero");
 
-/// Lists frames, at once or in the time of one.
+/// An animator that lists frames, at once or in the time of one.
 struct Joiner {
     board: Board,
     push: Duration,

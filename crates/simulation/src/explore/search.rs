@@ -1,14 +1,14 @@
-//! Visits all states of a world, first those that need few preemptions and faults.
+//! Visits all states of a world, beginning with those that need few preemptions and faults.
 //!
-//! A preemption is that a process goes on though the one that went on before still could. It is no preemption that
-//! the user pauses after an act, or that a process goes on where another one has ended or died. Errors of a protocol
-//! mostly show after one or two preemptions (iterative context bounding; Musuvathi and Qadeer, PLDI 2007), before a
-//! write rather than before a read, so they are found long before the search has come to its end. Each state is
-//! visited once, from whichever side it is reached first: nothing is left out for the order's sake.
+//! A preemption is a switch to another process although the current one could continue. It is no preemption if the user
+//! pauses after an action, or if the current process has ended or was killed. Most errors of a protocol show after one
+//! or two preemptions (iterative context bounding; Musuvathi and Qadeer, PLDI 2007), before a write rather than before
+//! a read. So they are found long before the search ends. Each state is visited once, on the first path that reaches
+//! it. The order of the search leaves no state out.
 //!
-//! For a state that has been visited, its hash and the step that led to it are kept. Whole states are kept
-//! of those from which steps are still to be tried; if that becomes too many, the last ones come first,
-//! which leaves few behind.
+//! For a state that has been visited, its hash and the step that led to it are kept. Whole states are kept only while
+//! some of their steps are untried. If these become too many, the newest ones are tried first, which keeps their number
+//! small.
 
 use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
@@ -21,11 +21,11 @@ use rayfold_pipeline::Mutation;
 /// The weight of a preemption or a fault before a write, and elsewhere.
 const PRICES: [usize; 2] = [1, 2];
 
-/// Steps still to be tried, beyond which the last ones come first.
+/// The number of untried steps above which the newest ones are tried first.
 const MANY: usize = 1_000_000;
 
-/// The way by which a state was reached: the visited state before it, and the number of its choice. Small, as there
-/// is one for each state.
+/// The link to the predecessor of a state: the visited state before it, and the number of its choice. It is small,
+/// because there is one per state.
 #[derive(Clone, Copy)]
 struct Step {
     from: u32,
@@ -37,22 +37,22 @@ struct Step {
 struct Way {
     /// The last step of it.
     step: Step,
-    /// Steps from the beginning.
+    /// The number of steps from the beginning.
     depth: usize,
     /// The weight of its preemptions and faults.
     price: usize,
-    /// The process that goes on after it, if none is preempted.
+    /// The process that continues after it, if none is preempted.
     current: u64,
 }
 
-/// A step that is still to be tried.
+/// A step that is untried.
 struct Open {
     state: Rc<State>,
     choice: Choice,
     way: Way,
 }
 
-/// The states still to be tried, by the weight of their preemptions and faults; the newest first among equals.
+/// The untried steps, by the weight of their preemptions and faults; the newest first among equals.
 #[derive(Default)]
 struct Frontier {
     by_price: Vec<Vec<Open>>,
@@ -74,7 +74,7 @@ impl Frontier {
         self.by_price.iter().position(|of_a_price| !of_a_price.is_empty()).unwrap_or_default()
     }
 
-    /// The cheapest one, or the dearest one where there are many.
+    /// Returns the cheapest one, or the most expensive one if there are many.
     fn pop(&mut self) -> Option<Open> {
         let is_some = |of_a_price: &Vec<Open>| !of_a_price.is_empty();
         let price = match self.len {
@@ -86,7 +86,7 @@ impl Frontier {
     }
 }
 
-/// The hashes of the visited states, which need not be hashed again.
+/// The hashes of the visited states, which serve as keys without another hash.
 #[expect(clippy::disallowed_types, reason = "nothing is drawn by lot here, and there are many millions")]
 type Seen = std::collections::HashSet<u64, BuildHasherDefault<AsItIs>>;
 
@@ -115,13 +115,14 @@ struct Search<'a> {
     mutation: Option<Mutation>,
     seen: Seen,
     situations: Seen,
-    /// By the number of the state that they led to; to the beginning leads none, and something stands for it.
+    /// The links, by the number of the state that they lead to. No link leads to the beginning, so it has a
+    /// placeholder.
     steps: Vec<Step>,
     frontier: Frontier,
     explored: Explored,
 }
 
-/// Searches a world to its end, or until it has seen `most` states, with a rule broken on purpose if asked for.
+/// Searches a world to its end, or until it has visited `most` states. `mutation` is a rule that is broken on purpose.
 ///
 /// # Errors
 ///
@@ -159,7 +160,7 @@ pub fn explore(
 }
 
 impl Search<'_> {
-    /// Judges a state in which nothing is left to happen; notes the choices of any other state.
+    /// Checks a state in which nothing is left to do; records the choices of any other state.
     fn visit(&mut self, state: State, way: Way) -> Result<(), Box<Counterexample>> {
         if !self.seen.insert(state.hash()) {
             return Ok(());
@@ -201,7 +202,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Lives through the way to a state again, to tell it.
+    /// Repeats the steps to a state, to describe them.
     fn counterexample(&self, what: String, way: Way) -> Box<Counterexample> {
         let before = |step: &Step| self.steps.get(step.from as usize).copied();
         let mut steps: Vec<Step> = std::iter::successors(Some(way.step), before).take(way.depth).collect();

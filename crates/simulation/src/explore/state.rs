@@ -1,7 +1,8 @@
 //! A state of a small world, its possible next steps, and its invariants.
 //!
 //! A request takes effect and is answered at one moment. Its sender may be killed before it, after it, or so that the
-//! write lands later; its answer may get lost. A read that is lost is sent again, which is the same as a late read.
+//! write takes effect later. Its reply may be lost. A read whose reply is lost is sent again, which is the same as a
+//! late read.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,13 +17,13 @@ use rayfold_pipeline::store::{Bucket, ETag, PutOptions};
 use rayfold_pipeline::{Error, Timestamp};
 use rayfold_scene::Container;
 
-/// When the story begins.
+/// The time when the story begins.
 const EPOCH: Timestamp = Timestamp(1_000_000_000_000);
 
-/// Between two acts of the user; the store's clock moves with them alone.
+/// The time between two actions of the user, which alone advance the store's clock.
 const APART: Duration = Duration::from_secs(1);
 
-/// Between two sweeps, once all has come to rest: longer than the sweep's patience with any frame.
+/// The time between two sweeps when nothing else is left to do: longer than the sweep waits for any frame.
 const SWEEPS_APART: Duration = Duration::from_secs(4 * 3600);
 
 /// The number of sweeps that must suffice.
@@ -31,13 +32,13 @@ const SWEEPS: u32 = 6;
 /// The number of times that the platform tries an event.
 const ATTEMPTS: u32 = 3;
 
-/// Steps after which a world that should come to rest does not.
+/// The number of steps after which a world counts as never coming to rest.
 const MAX_STEPS: u32 = 100_000;
 
 /// The user among those who act.
 pub(super) const USER: u64 = 0;
 
-/// One thing that can happen next.
+/// A possible next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Choice {
     /// The user does the next thing.
@@ -51,9 +52,9 @@ pub(super) enum Choice {
 /// The choices for the next step.
 #[derive(Debug)]
 pub(super) struct Offer {
-    /// Each of them alone.
+    /// Each choice is followed.
     pub(super) choices: Vec<Choice>,
-    /// They are the outcomes of one request, which meets no other.
+    /// The choices are the outcomes of one request that interacts with no other.
     pub(super) is_alone: bool,
 }
 
@@ -68,17 +69,17 @@ pub(super) enum Delivery {
 /// The outcome of a request, and of its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fate {
-    /// It takes effect and is answered; if it fires an event, that is delivered so.
+    /// The request takes effect and is answered. If it fires an event, the event is delivered in this way.
     Answered(Delivery),
-    /// The answer is lost, after the effect or instead of it.
+    /// The reply is lost, after the effect or without one.
     Lost { effect: bool },
-    /// The sender dies, after the effect or before it.
+    /// The sender is killed, after the effect or before it.
     Killed { effect: bool },
-    /// The sender dies, and the write lands later.
+    /// The sender is killed, and the write takes effect later.
     KilledAndLate,
 }
 
-/// The bucket, with a hash that is kept while it changes, and how often each key has fired.
+/// The bucket, with a hash that is updated on each change, and the number of times that each key has fired.
 #[derive(Debug, Clone, Default)]
 struct Contents {
     bucket: Bucket,
@@ -86,7 +87,7 @@ struct Contents {
     hash: u64,
 }
 
-/// A write that is still on its way.
+/// A write that has not taken effect yet.
 #[derive(Debug)]
 struct Ghost {
     request: Request,
@@ -99,18 +100,18 @@ struct Ghost {
 pub(super) struct State {
     contents: Arc<Contents>,
     acted: usize,
-    /// The time by which the clock is ahead of the story, while the sweep heals.
+    /// The time by which the clock has been advanced for the sweeps.
     ahead: Duration,
     processes: Vec<Arc<Process>>,
     ghosts: Vec<Arc<Ghost>>,
     budget: Budget,
     needs_sweep: bool,
-    /// When the scripts of each file were listed.
+    /// The time when the scripts of each file were listed.
     files_of: BTreeMap<Container, Timestamp>,
 }
 
 impl State {
-    /// Before anything has happened; then the world's past is lived through, one thing after the other.
+    /// Returns the first state: the world's past happens step by step before it.
     pub(super) fn begin(world: &World, memo: &mut Memo) -> Result<Self, String> {
         let mut state = State {
             contents: Arc::default(),
@@ -158,13 +159,14 @@ impl State {
         EPOCH.after(APART * u32::try_from(self.acted).unwrap_or(u32::MAX) + self.ahead)
     }
 
-    /// Returns the time of an invocation's clock, from its beginning to its end: it runs behind the store's.
+    /// Returns the time of an invocation's clock, which stays the same from its beginning to its end, behind the
+    /// store's clock.
     fn start(&self) -> Timestamp {
         EPOCH.after(self.ahead)
     }
 
-    /// All that can happen next; nothing when the world has come to rest. If a request meets no other, now or later, it
-    /// alone: whatever else happens could as well happen after it.
+    /// Returns all possible next steps; none if the world has come to rest. If a request interacts with no other, now
+    /// or later, returns only that one, because anything else could as well happen after it.
     pub(super) fn offer(&self, world: &World) -> Offer {
         let mut choices = Vec::new();
         for (place, process) in self.processes.iter().enumerate() {
@@ -184,8 +186,8 @@ impl State {
         Offer { choices, is_alone: false }
     }
 
-    /// Returns whether nothing that can happen until the world's end changes the answer to the request,
-    /// or sees its effect.
+    /// Returns whether nothing that can happen until the world's end changes the reply to the request, or sees its
+    /// effect.
     fn meets_no_other(&self, world: &World, request: &Request) -> bool {
         let user_is_done = self.acted == world.acts.len();
         match request {
@@ -329,7 +331,7 @@ impl State {
         Ok(())
     }
 
-    /// Lets a request take effect, and fires the events that follow.
+    /// Lets a request take effect, and fires the resulting events.
     fn apply(
         &mut self,
         memo: &mut Memo,
@@ -430,8 +432,8 @@ impl State {
         }
     }
 
-    /// Checks the invariants that hold when nothing is left to happen: after sweeps, if something happened
-    /// that only they heal.
+    /// Checks the invariants that hold when nothing is left to do: after sweeps, if something happened that only a
+    /// sweep repairs.
     pub(super) fn judge(&self, world: &World, memo: &mut Memo) -> Result<(), String> {
         let animation = Animation::new("a").map_err(|error| error.to_string())?;
         let check = |state: &State| {
@@ -456,7 +458,7 @@ impl State {
         check(&state).map_err(|what| format!("after {SWEEPS} sweeps: {what}"))
     }
 
-    /// Lets all invocations work to their ends, one after the other, and nothing goes wrong.
+    /// Runs all invocations to their ends, one after the other, without faults.
     fn at_rest(mut self, world: &World, memo: &mut Memo) -> Result<Self, String> {
         for _ in 0..MAX_STEPS {
             let Some(process) = self.processes.first() else { return Ok(self) };
@@ -469,7 +471,7 @@ impl State {
         Err("the world does not come to rest".to_owned())
     }
 
-    /// Returns the actor of a choice: the user, an attempt at an event, or the write that a dead one has left.
+    /// Returns the actor of a choice: the user, an attempt at an event, or the pending write of a killed sender.
     pub(super) fn actor(&self, choice: Choice) -> u64 {
         match choice {
             Choice::User(_) => USER,
@@ -481,7 +483,7 @@ impl State {
         }
     }
 
-    /// Whether an invocation is about to change something.
+    /// Returns whether an invocation is about to write.
     pub(super) fn is_write(&self, choice: Choice) -> bool {
         let Choice::Request { process, slot, .. } = choice else { return false };
         let request = self.processes[process].standing.requests.iter().find(|(of, _)| *of == slot);
@@ -525,7 +527,7 @@ impl Contents {
         self.bucket.delete(key)
     }
 
-    /// Returns how often the key has fired, this time included.
+    /// Returns the number of times that the key has fired, including this time.
     fn fire(&mut self, key: &str) -> u32 {
         let count = self.fired.entry(key.to_owned()).or_default();
         *count += 1;
@@ -540,7 +542,7 @@ impl Contents {
     }
 }
 
-/// Returns the work that an object wakes when it comes or goes.
+/// Returns the work that is triggered when an object is created or deleted.
 fn work_of(key: &str, there: bool) -> Option<Work> {
     match key.split('/').next() {
         Some("scripts") => Some(Work::Render(key.to_owned())),

@@ -2,17 +2,17 @@
 
 use super::*;
 
-/// States of a world up to which every `cargo test` searches it.
+/// The number of states up to which every `cargo test` searches a world.
 const SMALL: u64 = 8_000;
 
-/// Worlds of no more states than that.
+/// The worlds with at most that many states.
 const SMALL_WORLDS: usize = 26;
 
 fn world(name: &str) -> World {
     worlds().into_iter().find(|world| world.name == name).expect(name)
 }
 
-/// Small worlds are searched to their ends, and once more with nothing forgotten; the others as far as that goes.
+/// Small worlds are searched to their ends, and once more without dropping history; the others up to the limit.
 #[test]
 fn worlds_hold_whatever_happens_in_whatever_order_and_nothing_is_missed_by_forgetting() {
     let search = |world: &World, most| explore(world, None, most).unwrap_or_else(|found| panic!("{found}"));
@@ -35,7 +35,8 @@ fn worlds_hold_whatever_happens_in_whatever_order_and_nothing_is_missed_by_forge
     assert_eq!(small, SMALL_WORLDS);
 }
 
-/// The search finds the error without the rule, and it is a story: the same search with the rule finds nothing.
+/// Without the rule the search finds the error, and the rule is the reason: the same search with the rule finds
+/// nothing.
 #[track_caller]
 fn notices(rule: Mutation, name: &str, most: u64) {
     let found = explore(&world(name), Some(rule), most).expect_err("a broken rule is noticed");
@@ -49,8 +50,8 @@ fn a_missing_second_listing_is_noticed() {
     notices(Mutation::SkipSecondListing, "one of two frames, changed and changed back", 20_000);
 }
 
-/// A set was whole when it was claimed, not when the assembler looked, and whole again when it was committed. The
-/// finisher that came then found the commit, and none claimed.
+/// A set was complete when it was claimed, incomplete when the assembler looked, and complete again when it was
+/// committed. The finisher that came then found the commit, and no invocation wrote a claim.
 #[test]
 fn claims_before_their_commit_are_noticed() {
     notices(Mutation::ClaimBeforeCommit, "the second of two frames comes, goes and comes back", 20_000);
@@ -71,8 +72,8 @@ fn missing_claims_are_noticed() {
     notices(Mutation::NeverClaim, "one frame, a kill", 20_000);
 }
 
-/// An assembler wrote down that a frame was pending which was there again, and left. The invocation that had brought
-/// the frame back had found the earlier manifest.
+/// An assembler committed that a frame was pending although it was there again, and exited. The invocation that had
+/// brought the frame back had found the earlier manifest.
 #[test]
 fn assemblers_that_leave_early_are_noticed() {
     notices(Mutation::AssemblerLeavesEarly, "the second of two frames comes, goes and comes back", 20_000);
@@ -88,26 +89,26 @@ fn frames_put_together_too_early_are_noticed() {
     notices(Mutation::JoinTooEarly, "a frame in bands", 20_000);
 }
 
-/// Two whose frames the manifest shows to come left for each other.
+/// Two invocations stopped for each other, because the manifest showed both frames as pending.
 #[test]
 fn leaving_for_a_frame_that_is_there_is_noticed() {
     notices(Mutation::LeaveForAnyFrame, "two frames, announced last", 20_000);
 }
 
-/// A file that changes while it is read has an event that finds no set of it.
+/// The event of a file that changes while it is read finds no set with the file.
 #[test]
 fn a_file_that_is_not_looked_at_again_is_noticed() {
     notices(Mutation::FilesNotLookedAtAgain, "a file after its script", 20_000);
 }
 
-/// The GIF of an assembler that was killed landed on that of its successor, which knew newer scripts.
+/// The write of the GIF of a killed assembler replaced that of its successor, which knew newer scripts.
 #[test]
 fn unconditional_gifs_are_noticed() {
     notices(Mutation::DropGifCondition, "one frame, overwritten twice when done, a late write", 20_000);
 }
 
-/// An assembler that had found the lease taken took it when it was handed over, as one that none wanted, and gave up
-/// the unfinished GIF; the claim's assembler found the lease taken, and none built.
+/// An assembler that had found the lease taken then took it when it was handed over, as if it were abandoned, and
+/// aborted the unfinished GIF. The assembler of the claim found the lease taken, and no assembler built the GIF.
 #[test]
 fn a_lease_that_is_handed_over_is_not_taken_by_who_has_left_the_gif_to_its_holder() {
     for name in ["two frames in two pieces, a kill", "two frames in two pieces, the first overwritten"] {
@@ -116,7 +117,7 @@ fn a_lease_that_is_handed_over_is_not_taken_by_who_has_left_the_gif_to_its_holde
     }
 }
 
-/// The first frame was another one when the GIF was left unfinished.
+/// The first frame was a different one when the GIF was left unfinished.
 #[test]
 fn unfinished_gifs_of_another_set_that_are_gone_on_with_are_noticed() {
     notices(Mutation::TakeUpAnyCheckpoint, "two frames in two pieces, the first overwritten", 20_000);
@@ -130,8 +131,8 @@ fn schedules_find_nothing_where_all_rules_hold() {
     }
 }
 
-/// Two rules that few seeds notice, so they are named here; the report of `rayfold-bench explore` lists the
-/// worlds that notice them.
+/// Two rules whose violation few seeds detect, so they are named here. The report of `rayfold-bench explore` lists the
+/// worlds that detect it.
 #[test]
 fn rules_that_few_schedules_notice_are_noticed() {
     let worlds = provoking();

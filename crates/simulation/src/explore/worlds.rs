@@ -1,4 +1,4 @@
-//! The small worlds: the acts of their users, and the faults that may happen.
+//! The small worlds: the actions of their users, and the faults that may happen.
 
 use super::Budget;
 
@@ -7,29 +7,28 @@ use super::Budget;
 pub struct World {
     /// The name of the world in reports.
     pub name: &'static str,
-    /// The objects that the user puts, or deletes, in this order: keys and texts.
+    /// The objects that the user puts or deletes, in this order: keys and texts.
     pub(super) acts: Vec<(String, Option<&'static str>)>,
-    /// The number of acts that are past: all has come to rest after each.
+    /// The number of actions that are in the past. After each of them everything came to rest.
     pub(super) past: usize,
-    /// Whether the event of the past's last claim comes once more.
+    /// Whether the event of the past's last claim is delivered once more.
     pub(super) is_claimed_again: bool,
-    /// Whether an assembler has time for one frame, so that a GIF of several takes as many invocations.
+    /// Whether an assembler has time for only one frame, so that a GIF of several takes as many invocations.
     pub(super) is_cut: bool,
     /// The faults that may happen.
     pub budget: Budget,
-    /// Whether invocations are distinguished by all that has happened to them, not only by the state
-    /// that they continue from.
+    /// Whether invocations are distinguished by their whole history, not only by the state from which they continue.
     pub(super) remembers: bool,
 }
 
 impl World {
-    /// Returns the world with invocations that forget nothing: its search has the same result, and takes longer.
+    /// Returns the world with invocations that drop no history: its search has the same result, and takes longer.
     pub fn remembering(&self) -> Self {
         World { remembers: true, ..self.clone() }
     }
 }
 
-/// Nothing goes wrong but the order.
+/// Worlds without faults; only the order varies.
 const CALM: Budget = Budget { kills: 0, ghosts: 0, losses: 0, doubles: 0, drops: 0 };
 
 /// A script of one frame.
@@ -40,9 +39,9 @@ const B: Option<&str> = Some("frame 1");
 const C: Option<&str> = Some("frame 2");
 /// One frame that is drawn in bands.
 const BIG: Option<&str> = Some("big frame 0");
-/// Settings that ask for two files.
+/// Settings that request two files.
 const BOTH: Option<&str> = Some("{\"outputs\": [\"gif\", \"webp\"]}");
-/// Settings that ask for another file than a GIF.
+/// Settings that request another file than a GIF.
 const WEBP: Option<&str> = Some("{\"outputs\": [\"webp\"]}");
 /// A script that names a file.
 const WITH_F: Option<&str> = Some("with f frame 0");
@@ -60,12 +59,13 @@ fn world(name: &'static str, past: usize, budget: Budget, acts: &[(&str, Option<
     World { name, acts, past, is_claimed_again: false, is_cut: false, budget, remembers: false }
 }
 
-/// Between the past and the acts an assembler is woken that has nothing to do: events may come late, and again.
+/// Between the past and the actions, an assembler is invoked that has nothing to do, because events may be late and
+/// duplicated.
 fn claimed_again(world: World) -> World {
     World { is_claimed_again: true, ..world }
 }
 
-/// Every frame of a GIF takes an invocation of its own.
+/// Each frame of a GIF takes a separate invocation.
 fn cut(world: World) -> World {
     World { is_cut: true, ..world }
 }
@@ -208,7 +208,7 @@ pub fn worlds() -> Vec<World> {
     ]
 }
 
-/// Returns the worlds in which few schedules show much, which suit [`super::provoke`] best.
+/// Returns the worlds in which few schedules find many errors, which suit [`super::provoke`] best.
 pub fn provoking() -> Vec<World> {
     const NAMES: [&str; 14] = [
         "a file after its script",
