@@ -42,8 +42,8 @@ pub(crate) fn align(
     sorted.iter().enumerate().filter_map(change).collect()
 }
 
-/// Adds lines of a text to a frame: objects, groups and lights after those that there are, and materials and groups of
-/// new names before them. Returns the changes, and the new lines of what is drawn.
+/// Adds lines of a text to a frame: objects, groups and lights after the existing ones, and materials and groups with
+/// new names before them. Returns the changes, and the new lines of the drawn items.
 pub(crate) fn paste(lines: &[Line], source_map: &SourceMap, text: &str) -> (Vec<Splice>, Vec<usize>) {
     let defines = |line: &Line, command: Command, name: Option<&str>| {
         line.command() == Some(command) && line.subject() == name

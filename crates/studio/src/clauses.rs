@@ -1,4 +1,4 @@
-//! The clauses of a material: where their numbers and words stand in its line, and the change of a word.
+//! The clauses of a material: the positions of their numbers and words in the line, and changes of a word.
 //!
 //! Knows clauses only by their forms. Invariant: a word changes to one of those that its parameter offers.
 
@@ -9,15 +9,15 @@ use rayfold_scene::{Clause, Field, Form, Kind, Parameter, Presence, Quotes, Subj
 use crate::line::Line;
 use crate::tables::FieldTable;
 
-/// The names that words of a clause can be.
+/// The names that words of a clause may refer to.
 pub(crate) struct Offers {
-    /// The materials of coefficients alone, before the line.
+    /// The materials that have only coefficients and are defined before the line.
     pub(crate) materials: Vec<String>,
     /// The pictures beside the script.
     pub(crate) pictures: Vec<String>,
 }
 
-/// Returns the clauses of a material, each with its words, from its name on.
+/// Returns the clauses of a material, each with its words, given the words from its name on.
 pub(crate) fn clauses(line: &Line) -> Vec<(Clause, Range<usize>)> {
     let Some(words) = line.words() else { return Vec::new() };
     let found = words.parameters.iter().enumerate();
@@ -27,8 +27,8 @@ pub(crate) fn clauses(line: &Line) -> Vec<(Clause, Range<usize>)> {
     starts.iter().zip(ends).map(|(&(at, clause), end)| (clause, at..end)).collect()
 }
 
-/// Returns the parameters of a clause, each with the position of its first number or word. One that is omitted has the
-/// position at which it would stand.
+/// Returns the parameters of a clause, each with the position of its first number or word. An omitted one has the
+/// position at which it would be.
 fn parameters(line: &Line, clause: Clause, span: &Range<usize>) -> Vec<(usize, &'static Field)> {
     let form: &'static Form = clause.form();
     let start = span.start + 1 + usize::from(form.subject.is_some());

@@ -1,4 +1,4 @@
-//! The time: the system's, or that of the page where there is no system.
+//! The time of the system, or that of the page if there is no system.
 
 #[cfg(target_arch = "wasm32")]
 pub(crate) use page::{Instant, set};
@@ -10,7 +10,7 @@ mod page {
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::time::Duration;
 
-    /// The time that the page has told last, in microseconds.
+    /// The time that the page has set last, in microseconds.
     static NOW: AtomicU64 = AtomicU64::new(0);
 
     /// A moment, as `std::time::Instant`.

@@ -1,4 +1,4 @@
-//! The way in of every server here: on loopback, for clients that know the token in its address.
+//! Access control of all servers here: on loopback, for clients that know the token in the address.
 //!
 //! Every request must contain the right host and the token. If the browser sends the origin of a page, it must be
 //! this server. So other machines, programs of other users without the address, and other pages in the same browser
@@ -84,7 +84,7 @@ fn same(given: &str, token: &str) -> bool {
     given.len() == token.len() && given.bytes().zip(token.bytes()).fold(0, |off, (a, b)| off | (a ^ b)) == 0
 }
 
-/// Rejects requests that may not come in, and adds the headers of safety to all answers.
+/// Rejects requests that are not allowed, and adds security headers to all responses.
 pub(crate) async fn guard(State(door): State<Arc<Door>>, request: Request, next: Next) -> Response {
     let mut response = if door.is_allowed(&request) {
         next.run(request).await

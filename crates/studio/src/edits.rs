@@ -97,7 +97,7 @@ pub(crate) fn new_line(command: Command, ground: DVec3, size: f64, count: usize)
     Line::new(&text)
 }
 
-/// Makes the line of a setting with values that show what it does.
+/// Makes the line of a setting with values that make its effect visible.
 pub(crate) fn new_setting(command: Command) -> Line {
     let required =
         fields(command).map(|(_, field)| field).filter(|field| field.presence == Presence::Required);
@@ -116,7 +116,7 @@ pub(crate) fn new_setting(command: Command) -> Line {
     Line::new(&format!("{} {}", command.name(), words.join("  ")))
 }
 
-/// Returns the place nearest to `ground`, at its height, where a new object of this size stands in no other.
+/// Returns the place nearest to `ground`, at its height, where a new object of this size is within no other object.
 pub(crate) fn free_place(objects: &[Object], ground: DVec3, size: f64) -> DVec3 {
     let boxes: Vec<_> = objects.iter().filter_map(|object| extent::bounds([object])).collect();
     let room = DVec3::new(1.1, 1.0, 1.1) * size;
@@ -134,7 +134,7 @@ pub(crate) fn free_place(objects: &[Object], ground: DVec3, size: f64) -> DVec3 
     places.into_iter().find(|&at| is_free(at)).unwrap_or(ground)
 }
 
-/// Adds a line to a frame, with all missing lines that make it visible. Returns the changes, and the new
+/// Adds a line to a frame, and all missing lines without which it would be invisible. Returns the changes, and the new
 /// index of the line.
 pub(crate) fn add(lines: &[Line], source_map: &SourceMap, line: Line) -> (Vec<Splice>, usize) {
     let mut before = Vec::new();

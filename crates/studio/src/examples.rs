@@ -3,7 +3,7 @@
 /// The name and the text of an example.
 type Example = (&'static str, &'static str);
 
-/// All examples without files of their own: the script with curves if the animation has one, else the script of its first
+/// All examples that use no other files: the script with curves if the animation has one, else the script of its first
 /// frame.
 const ALL: [Example; 13] = [
     ("hello", include_str!("../../../scenes/hello/frame01.txt")),

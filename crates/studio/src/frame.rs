@@ -25,7 +25,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Makes frame `frame` of a script, from 0. `lines` are those of the script, or newer ones with an error.
+    /// Makes frame `frame` of a script, counted from 0. `lines` are those of the script, or newer ones with an error.
     pub(crate) fn new(script: Option<&Script>, lines: &[Line], frame: usize) -> Self {
         let time = script.and_then(|script| script.frame_number(frame)).unwrap_or(1.0);
         Self {

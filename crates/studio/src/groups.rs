@@ -40,9 +40,9 @@ impl Refusal {
     }
 }
 
-/// Makes a group of lines. Returns the changes, and the new index of the line of its `Use`. The origin of the group
-/// is at the foot of the middle of its objects, about which it turns. If a pattern would slide, the origin stays
-/// that of the world.
+/// Makes a group of lines. Returns the changes, and the new index of the line of its `Use`. The origin of the group is
+/// at the foot of the middle of its objects, about which it turns. If a pattern would shift, the origin stays that of
+/// the world.
 ///
 /// # Errors
 /// Returns the reason if they cannot be a group.

@@ -27,11 +27,11 @@ const ARROW: f64 = 72.0;
 /// The position of a plane's handle along its two axes, in arrows.
 const PLANE: f64 = 0.35;
 
-/// The sine of the smallest angle between the view direction and a plane at which the plane can be dragged along. At
-/// smaller angles, a pixel would be a huge distance.
+/// The sine of the smallest angle between the view direction and a plane at which objects can be dragged along the
+/// plane. At smaller angles, a pixel would be a huge distance.
 const SLANTED: f64 = 0.12;
 
-/// The distance of a handle from the edge of its object in pixels, so that a finger can take either.
+/// The distance of a handle from the edge of its object in pixels, so that a finger can grab either.
 const CLEAR: f64 = 24.0;
 
 /// The length in pixels below which an arrow points at the viewer and is left out.
@@ -117,7 +117,7 @@ pub(crate) struct Handle {
 }
 
 /// Returns the handles of a line with these values. `around` is the point where lights without a position are shown,
-/// and `size` the radius of what the line draws, if that is not in its numbers.
+/// and `size` the radius of the drawn objects, if that is not in its numbers.
 pub(crate) fn handles(
     number: usize,
     values: &Values,
@@ -251,7 +251,7 @@ fn toward(index: usize, projection: &Projection) -> DVec3 {
     if index == 0 { right } else { up }
 }
 
-/// Returns -1 for a light, which is shown where it comes from, else 1.
+/// Returns -1 for a light, whose arrow points to where the light comes from, else 1.
 fn facing(command: Command) -> f64 {
     if role(command) == Role::Light { -1.0 } else { 1.0 }
 }

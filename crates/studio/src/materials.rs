@@ -15,8 +15,8 @@ use crate::output::frame_png;
 use crate::tables::{Role, role};
 use crate::tracks::slots;
 
-/// A starter material: its name and the clauses of its `Material` line. The material that its pattern
-/// names comes before it.
+/// A starter material: its name and the clauses of its `Material` line. The material to which its pattern refers comes
+/// before it.
 struct Preset {
     name: &'static str,
     says: &'static str,
@@ -61,7 +61,7 @@ const PRESETS: &[Preset] = &[
     },
 ];
 
-/// The reason why a material gets no picture.
+/// The reason why there is no picture of a material.
 const NO_PICTURE: &str = "There is no picture (.png, .jpg, .webp) beside the script.";
 
 /// The width and height of a sphere's picture in pixels.
@@ -163,10 +163,10 @@ pub(crate) fn plain_names(lines: &[Line], at: usize) -> Vec<String> {
 }
 
 /// Adds a clause to a material, or removes it. A pattern replaces another one, and gets a second material if there is
-/// none that it could name. `pictures` are those beside the script that a surface takes.
+/// none that it could name. `pictures` are the pictures beside the script that can be put on a surface.
 ///
 /// # Errors
-/// Returns the reason why the last clause stays.
+/// Returns the reason why the last clause must stay.
 pub(crate) fn toggle(
     lines: &[Line],
     at: usize,
@@ -217,7 +217,7 @@ pub(crate) fn toggle(
     Ok(splices)
 }
 
-/// Replaces the names of materials by coefficients, those of the materials.
+/// Replaces the names of materials by their coefficients.
 pub(crate) fn take(lines: &[Line], which: &[usize]) -> Vec<Splice> {
     let bare = |&at: &usize| {
         let line = lines.get(at)?;

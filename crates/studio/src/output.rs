@@ -33,7 +33,7 @@ pub(crate) struct Job {
     settings: AnimationSettings,
 }
 
-/// An animation on its way into a file in memory.
+/// An encoder of an animation to a file in memory.
 #[derive(Debug)]
 pub(crate) struct Film {
     job: Job,
@@ -95,7 +95,7 @@ impl Film {
         Self { job, frames, durations, file: Bounded::default(), encoding: None, pushed: 0 }
     }
 
-    /// Makes a film of each frame once, whatever the settings say.
+    /// Makes a video that shows each frame once, whatever the settings say.
     pub(crate) fn of_all_frames(mut job: Job) -> Self {
         job.settings = AnimationSettings::default();
         Self::new(job)
@@ -169,8 +169,8 @@ pub(crate) fn frame_png(script: &Script, frame: usize) -> Result<Option<Vec<u8>>
     png(&image.map_err(|error| no_picture(&error))?).map(Some)
 }
 
-/// Renders a small picture of a scene as PNG. Returns `None` if the scene has pixels of the world's units, which
-/// cannot be small.
+/// Renders a small picture of a scene as PNG. Returns `None` if a pixel is a unit of the world, because such a picture
+/// cannot be smaller.
 ///
 /// # Errors
 /// Fails if the scene cannot be rendered.

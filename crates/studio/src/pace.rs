@@ -8,11 +8,11 @@ use rayfold_scene::{Camera, Material, Scene, Screen};
 /// The largest number of pictures that the page has not shown yet while something moves.
 pub(crate) const MOVING_UNDER_WAY: u32 = 1;
 
-/// The same limit at rest, where sketches precede the final picture.
+/// This limit at rest, when sketches precede the final picture.
 pub(crate) const RESTING_UNDER_WAY: u32 = 2;
 
 /// The time from the last request of something that moves to its rest. It is longer than a frame at 24 per second, so
-/// that what is played does not rest.
+/// playback does not count as rest.
 pub(crate) const REST: Duration = Duration::from_millis(50);
 
 /// The time for one ray per pixel at rest, in seconds, above which sketches are drawn first.
@@ -21,7 +21,7 @@ pub(crate) const PATIENCE: f64 = 0.1;
 /// The shortest time between two views of an unfinished picture. Each takes time to be made and shown.
 pub(crate) const APART: Duration = Duration::from_millis(200);
 
-/// The longest time between two views. Each time is as long as the whole time before it, until then.
+/// The longest time between two views. Until this is reached, each time is as long as the whole time before it.
 #[cfg(feature = "server")]
 pub(crate) const SELDOM: Duration = Duration::from_secs(2);
 
@@ -35,26 +35,27 @@ pub(crate) const GROWTH: f64 = 2.0;
 /// goes to packing, the browser, and the wait for the next request.
 const MOVING: f64 = 0.009;
 
-/// The share of that time in which a picture larger than the last one must be drawn. So sizes do not go to and fro.
+/// The share of that time within which a picture larger than the last one must be drawn, so that sizes do not
+/// alternate.
 const RESERVE: f64 = 0.75;
 
-/// The shares of width and height that are drawn while something moves. Steps, because the page gets a picture of
-/// another size as a whole.
+/// The shares of width and height that are drawn while something moves. They are few steps, because a picture of
+/// another size is sent to the page as a whole.
 const SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.375, LEAST];
 
 /// The smallest share of width and height, while something moves and of the first sketch at rest: a hand that holds still
 /// for a moment must not make the picture coarser.
 const LEAST: f64 = 0.25;
 
-/// The weight of the last picture in the mean of those before it, if it was faster than these and if it was slower: a
-/// processor that does something else makes single pictures slow, and none fast.
+/// The weight of the last picture in the running mean, if it was faster than the mean, and if it was slower. They
+/// differ because other load on the processor makes single pictures slow, and none fast.
 const WEIGHTS: (f64, f64) = (0.5, 0.25);
 
-/// The most mirrors and glass that a ray follows while something moves, where the smallest picture takes too long with
-/// more.
+/// The limits on reflections and refractions of a ray while something moves, tried in turn if the smallest picture
+/// takes too long.
 const BOUNCES: [u32; 4] = [4, 2, 1, 0];
 
-/// The fewest bounces with which something is seen through glass.
+/// The minimum number of bounces with which objects can be seen through glass.
 const THROUGH_GLASS: u32 = 2;
 
 /// The duration of the last renderings with one ray per pixel.
@@ -62,7 +63,7 @@ const THROUGH_GLASS: u32 = 2;
 pub(crate) struct Pace {
     /// The seconds before the first pixel.
     preparing: f64,
-    /// The seconds per pixel with all bounces, once a picture was rendered so.
+    /// The seconds per pixel with all bounces, once such a picture was rendered.
     per_pixel: Option<f64>,
     /// The same with each of [`BOUNCES`], since the last rest.
     fewer: [Option<f64>; BOUNCES.len()],
@@ -75,7 +76,7 @@ pub(crate) struct Pace {
 pub(crate) struct Effort {
     /// The share of the width and of the height.
     pub(crate) share: f64,
-    /// The most bounces that a ray follows, if these are fewer than the scene's.
+    /// The maximum number of bounces that a ray follows, if that is less than the scene's.
     pub(crate) bounces: Option<u32>,
 }
 
@@ -86,7 +87,7 @@ impl Pace {
         self.preparing = took.as_secs_f64();
     }
 
-    /// Records the time for the pixels of a picture, which was drawn with this limit of bounces.
+    /// Records the time for the pixels of a picture that was drawn with this limit of bounces.
     pub(crate) fn drawn(&mut self, screen: Screen, bounces: Option<u32>, took: Duration) {
         let mean = match BOUNCES.iter().position(|&few| Some(few) == bounces) {
             Some(at) => &mut self.fewer[at],
@@ -149,7 +150,8 @@ impl Pace {
     }
 }
 
-/// Returns the fewest bounces with which the scene can be recognised: without mirrors and glass there are none to save.
+/// Returns the minimum number of bounces with which the scene can be recognised. Without mirrors and glass there are
+/// none to save.
 fn fewest(scene: &Scene) -> u32 {
     let of = |material: &Material| {
         let is_glass = material.finish().is_some_and(|finish| finish.glass.is_some());
@@ -181,7 +183,7 @@ mod tests {
         rayfold_scene::parse("a", text.as_bytes(), &Default::default()).script.unwrap().frame(0).unwrap()
     }
 
-    /// Makes the pace of pictures that take so many times as long as they may.
+    /// Makes a pace after pictures that took this many times as long as allowed.
     fn pace(preparing: f64, times: f64) -> Pace {
         let whole = MOVING / 500_000.0;
         Pace { preparing: preparing * MOVING, per_pixel: Some(times * whole), share: 1.0, ..Pace::default() }

@@ -29,9 +29,9 @@ pub(crate) struct Picture {
 pub(crate) enum Quality {
     /// A finer one follows.
     Coarse = 0,
-    /// It is that of the renderer.
+    /// The picture equals that of the renderer.
     Final = 1,
-    /// A finer one follows. This one has fewer mirror images, and less is seen through glass.
+    /// A finer picture follows. This one has fewer mirror images, and fewer objects are visible through glass.
     Simple = 2,
 }
 
@@ -51,7 +51,7 @@ struct Part {
 }
 
 impl Picture {
-    /// Makes the final picture that is shown already, for another request.
+    /// Makes the final picture, which is already shown, for another request.
     pub(crate) fn again(number: u32, image: &RgbaImage) -> Self {
         Self { number, image: image.clone(), took: Duration::ZERO, quality: Quality::Final }
     }

@@ -1,4 +1,4 @@
-//! The page: three files, built from `web` and part of the program. Only who changes the page needs Node.
+//! The page: three files, built from `web` and part of the program. Only developers who change the page need Node.
 
 use std::fs;
 use std::path::Path;

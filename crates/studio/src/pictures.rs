@@ -2,12 +2,12 @@
 //!
 //! A waiting request is replaced by the next one. At rest, a rendering is cancelled for a newer request of another
 //! picture. While something moves, a rendering is completed, in a smaller size if it would take too long ([`Pace`]), so
-//! that there is always a picture. It then has one ray per pixel, or a few where light goes round, whatever the script
-//! says; where even the smallest takes too long, it has fewer mirror images. At rest, a slow picture begins with sketches: few
-//! pixels with as few rays, then more. A picture with several rays per pixel is shown after its passes, at most five times a
-//! second and ever more seldom ([`APART`]). What moved is at rest soon after the last request, even while it is held.
-//! The number of pictures on their way to the page is limited: to one while something moves, because a picture that
-//! waits behind another is outdated when it is shown.
+//! that there is always a picture. It then has one ray per pixel, or a few if light goes round, whatever the script
+//! says. If even the smallest picture takes too long, it has fewer mirror images. At rest, a slow picture begins with
+//! sketches: few pixels with as few rays, then more. A picture with several rays per pixel is shown after each pass, at
+//! most five times a second and less and less often ([`APART`]). An object counts as at rest soon after the last
+//! request, even while the pointer holds it. The number of pictures on their way to the page is limited: to one while
+//! something moves, because a picture that waits behind another is outdated when it is shown.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -45,9 +45,9 @@ struct Desk {
     /// The request that is being drawn at full quality, which may be cancelled. It has the number of the last request of
     /// its picture.
     at_rest: Option<Wanted>,
-    /// The last request of something that moves, once its picture is being drawn or was.
+    /// The last request while something moves, once its picture has been begun.
     moved: Option<Wanted>,
-    /// The moment at which that is at rest.
+    /// The time from which that object is at rest.
     rests: Option<Instant>,
 }
 
@@ -231,7 +231,7 @@ impl Shared {
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality: Quality::Final })
     }
 
-    /// Renders a picture with one ray per pixel, or a few where light goes round.
+    /// Renders a picture with one ray per pixel, or a few if light goes round.
     fn sketch(&self, wanted: &Wanted, effort: Effort, pace: &mut Pace) -> Result<Picture, RenderError> {
         let start = Instant::now();
         let whole = &wanted.scene;
@@ -249,7 +249,7 @@ impl Shared {
         Ok(Picture { number: wanted.number, image, took: start.elapsed(), quality })
     }
 
-    /// Returns the number of another picture of what is at rest, if one may be sent to the page, and counts it.
+    /// Returns the number of another picture at rest, if one may be sent to the page, and counts it.
     fn another(&self) -> Option<u32> {
         self.change(|desk| {
             let number = desk.at_rest.as_ref()?.number;

@@ -35,8 +35,8 @@ pub(crate) fn pipe() -> (Pipe, Body) {
     (Pipe { sender, gathered: Vec::new() }, Body::from_stream(stream::unfold(receiver, next)))
 }
 
-/// Runs `work` to write a zip file on a thread of its own. An error breaks the response, so that it is not taken
-/// for a whole file.
+/// Runs `work` to write a zip file on a thread of its own. An error breaks the response, so that the client does not
+/// take it for a whole file.
 ///
 /// # Errors
 /// Fails if the system cannot start a thread.

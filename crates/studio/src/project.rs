@@ -1,7 +1,7 @@
 //! The open scripts and their files.
 //!
-//! Reads and writes only what it was opened with. A file is written whole or not at all, and never over a change by
-//! another program. In that case it is in [`Saved::Conflict`] until the user chooses a text.
+//! Reads and writes only the files that it was opened with. A file is written whole or not at all, and never over a
+//! change by another program. In that case it is in [`Saved::Conflict`] until the user chooses a text.
 
 use std::cell::{OnceCell, RefCell};
 #[cfg(feature = "server")]
@@ -86,7 +86,7 @@ pub struct Opened {
     /// and the numbers that change.
     frame: RefCell<Option<(usize, Arc<Frame>)>>,
     tracks: OnceCell<Tracks>,
-    /// The place of the script, and the models there.
+    /// The folder of the script, with its models.
     storage: Arc<dyn Storage>,
     library: Arc<Library>,
     /// The files that the script names, each with its state when it was parsed.
@@ -414,12 +414,12 @@ impl Opened {
         self.files_with(&MODELS)
     }
 
-    /// Returns the names of the pictures in the script's folder, skies first, then in natural order.
+    /// Returns the names of the pictures in the script's folder: skies first, and both kinds in natural order.
     pub(crate) fn pictures(&self) -> Vec<String> {
         [self.files_with(&PICTURES[..2]), self.surface_pictures()].concat()
     }
 
-    /// Returns the names of the pictures in the script's folder that a surface takes, in natural order.
+    /// Returns the names of the pictures in the script's folder that can be put on a surface, in natural order.
     pub(crate) fn surface_pictures(&self) -> Vec<String> {
         self.files_with(&PICTURES[2..])
     }

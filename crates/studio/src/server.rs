@@ -117,7 +117,7 @@ impl Server {
         &self.address
     }
 
-    /// Lets the page lead to the start page that it was opened from.
+    /// Lets the page link to the start page from which it was opened.
     pub fn lead_to_start(&self, address: &str) {
         // A second address would be the same.
         let _ = self.shared.start_page.set(address.to_owned());
@@ -241,7 +241,7 @@ async fn preset(request: Request) -> Response {
     picture(png, (StatusCode::NOT_FOUND, "there is no such starter material\n"))
 }
 
-/// Leads to the start page that the studio was opened from.
+/// Redirects to the start page from which the studio was opened.
 async fn start_page(State(shared): State<Arc<Shared>>) -> Response {
     match shared.start_page.get() {
         Some(address) => Redirect::to(address).into_response(),
@@ -392,7 +392,7 @@ mod tests {
         std::str::from_utf8(&answer[9..]).unwrap().parse().unwrap()
     }
 
-    /// Many clients that say nothing do not keep a page out, and are cut off.
+    /// Many idle clients do not keep a page out, and are disconnected.
     #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
     async fn half_open_connections_are_closed() {
         let folder = tempfile::tempdir().unwrap();

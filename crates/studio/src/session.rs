@@ -38,7 +38,7 @@ use crate::wanted::Wanted;
 use editing::of_page;
 use hold::Held;
 
-/// The reply to a move of what has no position.
+/// The reply to a move of a line without a position.
 const NO_POSITION: &str =
     "The selection has no position of its own. Models and words move in a group: Ctrl+G makes one.";
 
@@ -83,7 +83,7 @@ pub(crate) struct Session {
     /// The version of each file's text, and the last version of any.
     versions: BTreeMap<usize, u32>,
     version: u32,
-    /// The action that the server is to take on the rendered animation.
+    /// The action that the server must take on the rendered animation.
     output: Option<Output>,
 }
 

@@ -44,7 +44,7 @@ struct Groups {
     open: Option<(usize, String, usize)>,
 }
 
-/// The settings of what is around the scene, which a `Clear` removes.
+/// The settings of the scene's surroundings, which a `Clear` removes.
 pub(crate) const AROUND: [Command; 3] = [Command::Background, Command::Sky, Command::SkyPicture];
 
 impl SourceMap {
@@ -127,7 +127,7 @@ impl SourceMap {
         self.settings.get(&command).copied()
     }
 
-    /// Returns the line for a new setting: after the size, and after what removes settings.
+    /// Returns the line for a new setting: after the size, and after commands that remove settings.
     pub(crate) fn start(&self) -> usize {
         self.setting(Command::Screen).max(self.cleared).map_or(0, |at| at + 1)
     }

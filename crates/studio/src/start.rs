@@ -26,10 +26,10 @@ use crate::examples;
 use crate::output::thumbnail;
 pub use recent::Recent;
 
-/// The most copies of a name in a folder.
+/// The maximum number of copies of a name in a folder.
 const COPIES: usize = 999;
 
-/// A scene that looks right before anything is in it.
+/// A scene that looks good before objects are added.
 const EMPTY: &str = include_str!("start/empty.txt");
 
 /// The start page and its server.
@@ -45,7 +45,7 @@ pub struct Start {
 pub struct Choice {
     /// The script or the folder.
     pub path: PathBuf,
-    /// Takes the address of its studio, or the reason why it cannot be opened.
+    /// Receives the address of its studio, or the reason why it cannot be opened.
     pub answer: oneshot::Sender<Result<String, String>>,
 }
 

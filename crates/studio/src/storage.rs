@@ -57,7 +57,7 @@ struct Kept {
 }
 
 impl Memory {
-    /// Puts a file from outside here.
+    /// Stores a file from outside.
     pub(crate) fn insert(&self, name: &str, content: Vec<u8>) {
         let mut kept = self.kept();
         kept.writes += 1;

@@ -98,7 +98,8 @@ pub(crate) fn command_fields(command: Command) -> Vec<FieldTable> {
     fields(command).map(table).collect()
 }
 
-/// Returns the name of a command on the page: of the two named `Sky`, one with the word that it takes.
+/// Returns the name of a command on the page. For one of the two commands named `Sky` it includes the word that the
+/// command takes.
 pub(crate) fn title(command: Command) -> &'static str {
     match command {
         Command::SkyPicture => "Sky \"FILE\"",

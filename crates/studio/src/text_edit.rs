@@ -1,7 +1,8 @@
-//! Changes of a text as a text editor counts its lines, turned into splices of a document's lines.
+//! Changes of a text by the line numbers of a text editor, converted to splices of a document's lines.
 //!
 //! An editor shows an empty last line after a line end at the end of a text, and one empty line for an empty text. A
-//! document has neither. Invariant: a line whose text stays keeps its bytes, and one in its place keeps its line end.
+//! document has neither. Invariant: a line whose text stays the same keeps its bytes, and a line that replaces another
+//! keeps its line end.
 
 use serde::Deserialize;
 
@@ -25,7 +26,7 @@ pub(crate) fn ends(lines: &[Line]) -> bool {
     lines.last().is_none_or(|line| !line.end().is_empty())
 }
 
-/// Returns the splice of a change, or `None` if these lines do not have the changed ones.
+/// Returns the splice of a change, or `None` if these lines do not include the changed ones.
 pub(crate) fn splice(lines: &[Line], change: &TextChange) -> Option<Splice> {
     let count = lines.len() + usize::from(ends(lines));
     let end = change.at.checked_add(change.removed).filter(|&end| change.removed > 0 && end <= count)?;

@@ -20,10 +20,10 @@ const TRACKS: usize = 300;
 /// The largest number of keys of all these tracks.
 const KEYS: usize = 20_000;
 
-/// The keys up to which all curves are drawn with [`LINES`].
+/// The number of keys up to which all curves are drawn with [`LINES`].
 const FINE_KEYS: usize = 1000;
 
-/// The lines between two keys of a curve that no cubic draws.
+/// The number of straight pieces between two keys of a curve that is no cubic.
 const LINES: u32 = 32;
 
 /// A number that changes.
@@ -144,8 +144,8 @@ fn mode_of(words: &str) -> Option<Mode> {
     by_name.or_else(|| parse_curve(&format!("({words} 1:0 2:1)")).map(|curve| curve.mode()))
 }
 
-/// Returns a curve as a path of SVG, in frames and values. Its pieces are lines and cubics, which are exact, but for modes
-/// with other functions: those have [`LINES`] lines, or a single one if they are not to be fine.
+/// Returns a curve as a path of SVG, in frames and values. Its pieces are lines and cubics, which are exact. Modes with
+/// other functions are drawn with [`LINES`] lines, or with a single one unless `fine`.
 fn path(curve: &Curve, fine: bool) -> String {
     let keys = curve.keys();
     let mut path = format!("M{:e} {:e}", keys[0].frame, keys[0].value);

@@ -20,7 +20,7 @@ pub(crate) struct Values {
     numbers: Vec<Option<f64>>,
 }
 
-/// The moment of a change, and whether it is for that moment alone.
+/// The moment of a change, and whether the change is for that moment alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Keying {
     /// The frame that is shown.
@@ -76,8 +76,8 @@ impl Values {
         of_kind(self.command, Kind::Position).filter_map(|first| Some((first, self.vector(first)?)))
     }
 
-    /// Returns the most that number `first` may be beside the other numbers: the radius of a box with round edges has a
-    /// bound.
+    /// Returns the largest value of number `first` that the other numbers allow: the radius of a box with round edges
+    /// has a bound.
     pub(crate) fn most(&self, first: usize) -> f64 {
         let starts: Vec<usize> = fields(self.command).map(|(start, _)| start).collect();
         let of = |constraint: &Constraint| match *constraint {
@@ -115,8 +115,8 @@ fn field_of(command: Command, at: usize) -> Option<(usize, &'static Field)> {
     fields(command).find(|(first, field)| (*first..first + field.names.len()).contains(&at))
 }
 
-/// Returns the line with other values for its numbers from `first` on. An omitted parameter is written whole. Returns
-/// `None` if a name is in their place.
+/// Returns the line with other values for its numbers from `first` on. An omitted parameter is written completely.
+/// Returns `None` if a name replaces them.
 pub(crate) fn changed(line: &Line, first: usize, to: &[f64], keying: Keying) -> Option<Line> {
     let (command, words) = (line.command()?, line.words()?);
     let count = words.parameters.len();

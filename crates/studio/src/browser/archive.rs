@@ -29,7 +29,7 @@ pub fn zipped(files: &[File]) -> Result<Vec<u8>, Error> {
 /// holds everything does not count.
 ///
 /// # Errors
-/// Fails if it is no zip file, or if its files are more than the studio holds.
+/// Fails if it is no zip file, or if its files exceed the limit of the studio.
 pub fn unzipped(bytes: &[u8]) -> Result<(Vec<File>, Vec<String>), Error> {
     let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| refused(&error))?;
     let name_at = |at| Some(zip.name_for_index(at)?.ok()?.into_owned());
@@ -58,7 +58,7 @@ pub fn unzipped(bytes: &[u8]) -> Result<(Vec<File>, Vec<String>), Error> {
     Ok((files, left_out))
 }
 
-/// Returns whether a name is that of a file, and of no hidden one, in this very folder.
+/// Returns whether a name is that of a file that is not hidden and not in a folder.
 fn is_plain(name: &str) -> bool {
     !name.is_empty() && !name.starts_with('.') && !name.chars().any(|c| c.is_control() || "/\\:".contains(c))
 }

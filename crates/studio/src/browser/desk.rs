@@ -1,4 +1,4 @@
-//! The session of a page, and the work that it hands out to drawing workers.
+//! The session of a page, and the work that it gives to drawing workers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -15,20 +15,20 @@ use crate::protocol::{ClientMessage, MovieFormat, ServerMessage};
 use crate::session::{Answer, Output, Session};
 use crate::storage::Memory;
 
-/// Something that the page's scripts are to do.
+/// An action for the page's scripts.
 #[derive(Debug)]
 pub enum Effect {
-    /// Tell the page this message.
+    /// Send this message to the page.
     Tell(String),
-    /// Show the page this picture.
+    /// Show this picture on the page.
     Show(Vec<u8>),
-    /// Put a file to a drawing worker.
+    /// Send a file to a drawing worker.
     Put(usize, String, Vec<u8>),
-    /// Let a drawing worker draw this.
+    /// Let a drawing worker do this task.
     Draw(usize, String),
     /// Keep a file.
     Save(String, Vec<u8>),
-    /// Answer a request of this number. Nothing is there if the answer is empty.
+    /// Answer the request with this number. An empty answer means that there is nothing.
     Answer(u32, Vec<u8>),
     /// Call again after this many milliseconds.
     Wake(u32),
@@ -46,7 +46,7 @@ pub struct Desk {
     workers: Vec<Worker>,
     /// Small pictures that wait, each with the number of its request.
     waiting: VecDeque<(u32, usize, Task)>,
-    /// The texts of scripts that drawing workers have, each with a number that changes with it.
+    /// The texts of scripts that drawing workers have, each with a number that changes with the text.
     texts: BTreeMap<String, (u64, Vec<u8>)>,
     effects: Vec<Effect>,
 }
@@ -55,7 +55,7 @@ pub struct Desk {
 #[derive(Debug, Default)]
 struct Worker {
     busy: Option<Work>,
-    /// The tags of the files that it has.
+    /// The tags of the files that the worker has.
     has: BTreeMap<String, u64>,
 }
 
@@ -85,7 +85,7 @@ impl Desk {
     /// Opens a project of these files, for this many drawing workers.
     ///
     /// # Errors
-    /// Fails if the files are more than the studio holds, or if `animation.json` is invalid.
+    /// Fails if the files exceed the limit of the studio, or if `animation.json` is invalid.
     pub fn open(name: &str, files: Vec<File>, workers: usize) -> Result<Self, Error> {
         let (project, files) = project_of(name, files)?;
         let (session, mut answer) = Session::open(&project);
@@ -104,7 +104,7 @@ impl Desk {
         Ok(desk)
     }
 
-    /// Returns what is to be done since the last call.
+    /// Returns the actions since the last call.
     pub fn effects(&mut self) -> Vec<Effect> {
         self.hand_out();
         let written = self.files.take_written();
@@ -139,7 +139,7 @@ impl Desk {
         self.files.insert(name, content);
     }
 
-    /// Takes what a drawing worker has drawn.
+    /// Takes the result of a drawing worker.
     pub fn drawn(&mut self, worker: usize, drawn: Vec<u8>) {
         let effects = &mut self.effects;
         match self.workers.get_mut(worker).and_then(|worker| worker.busy.take()) {
@@ -151,7 +151,7 @@ impl Desk {
         }
     }
 
-    /// Takes the news that a drawing worker has failed, and that a new one without files is in its place.
+    /// Records that a drawing worker has failed, and that a new one without files replaces it.
     pub fn lost(&mut self, worker: usize) {
         if let Some(worker) = self.workers.get_mut(worker) {
             worker.has.clear();
@@ -159,7 +159,8 @@ impl Desk {
         self.drawn(worker, Vec::new());
     }
 
-    /// Takes a request for a file of the page: its address, as the server's. The answer comes as an [`Effect::Answer`].
+    /// Takes a request of the page for a file, by the same address as with a server. The answer is an
+    /// [`Effect::Answer`].
     pub fn get(&mut self, number: u32, address: &str) {
         let (name, query) = address.split_once('?').unwrap_or((address, ""));
         let mut numbers = query.split(',').map(|number| number.parse().unwrap_or(0usize));
@@ -226,7 +227,7 @@ impl Desk {
         self.effects.push(Effect::Tell(serde_json::to_string(&answer.tell).unwrap_or_default()));
     }
 
-    /// Gives work to the workers that have none: rows of the picture before small pictures.
+    /// Gives work to idle workers: rows of the picture before small pictures.
     fn hand_out(&mut self) {
         while let Some(worker) = self.workers.iter().position(|worker| worker.busy.is_none()) {
             let effects = &mut self.effects;
@@ -253,7 +254,7 @@ impl Desk {
         }
     }
 
-    /// Puts to a worker what it lacks: the text of a script, and files that are no scripts.
+    /// Sends to a worker what it lacks: the text of a script, and files that are no scripts.
     fn put_files(&mut self, worker: usize, file: usize) {
         let worker_files = &mut self.workers[worker].has;
         let mut put = |name: &str, tag: u64, content: &[u8]| {
@@ -294,7 +295,7 @@ mod tests {
     const TEXT: &str = "Screen 96 64\nLook 0 1 6  0 0 0  50\nIlight 1 1 1  1 -1 -1\n\
                         Sphere 1  0 0 0  0.2 0.1 0.1  0.7 0.5 0.3\nTrace\n";
 
-    /// A page, and workers that do at once what they are told.
+    /// A page with workers that do each task at once.
     struct Stage {
         desk: Desk,
         drawers: Vec<Drawer>,
@@ -315,7 +316,7 @@ mod tests {
             Self { desk, drawers, shown, told, saved, answers, qualities }
         }
 
-        /// Does what is to be done, until there is nothing left.
+        /// Executes all actions until there are none left.
         fn settle(&mut self) {
             loop {
                 let effects = self.desk.effects();

@@ -17,7 +17,7 @@ use crate::storage::{Memory, Storage};
 use crate::view::Orbit;
 use crate::wanted::{Motion, ViewSettings};
 
-/// What a drawer is to draw, as JSON.
+/// A task of a drawer, as JSON.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Task {
@@ -41,7 +41,7 @@ pub(super) struct Rows {
     pub(super) view: View,
     /// The picture is a sketch.
     pub(super) sketch: Option<Sketch>,
-    /// The rows from the top, and the one after them.
+    /// The first row from the top, and the end of the rows.
     pub(super) rows: (u32, u32),
 }
 
@@ -90,15 +90,15 @@ pub struct Drawer {
 }
 
 impl Drawer {
-    /// Puts a file here, in place of an older one.
+    /// Stores a file, in place of an older one.
     pub fn put(&self, name: &str, content: Vec<u8>) {
         self.files.insert(name, content);
     }
 
-    /// Draws. Nothing comes of what cannot be drawn.
+    /// Executes a task. Returns nothing for a picture that cannot be drawn.
     ///
     /// # Errors
-    /// Fails if the task is not understood, or if the tracer refuses the picture.
+    /// Fails if the task cannot be read, or if the tracer refuses the picture.
     pub fn draw(&mut self, task: &str) -> Result<Vec<u8>, Error> {
         let task = serde_json::from_str(task).map_err(|error| Error::Output(error.to_string()))?;
         let drawn = match task {

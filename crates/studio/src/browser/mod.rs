@@ -1,9 +1,9 @@
 //! The studio without a server, in the workers of a page: the session in one ([`Desk`]), and drawing in several
-//! ([`Drawer`], [`Reel`]). They share no memory and get along by messages, which the page's scripts carry.
+//! ([`Drawer`], [`Reel`]). They share no memory, and communicate by messages, which the page's scripts transport.
 //!
-//! Each worker has its own copy of the files. Files are kept in memory, and the page keeps what [`Desk`] tells it to.
-//! A worker draws rows of a picture; the desk puts them together. Rows are drawn the same everywhere, so the number of
-//! workers changes no pixel.
+//! Each worker has its own copy of the files in memory. The page stores files when [`Desk`] asks it to. A worker draws
+//! rows of a picture, and the desk joins them. Rows are drawn the same everywhere, so the number of workers changes no
+//! pixel.
 
 mod archive;
 mod desk;
@@ -18,7 +18,7 @@ pub use drawer::Drawer;
 pub use packet::{File, files_of, packet};
 pub use reel::Reel;
 
-/// Provides the font of letters that name none.
+/// Provides the default font of letters.
 #[cfg(target_arch = "wasm32")]
 pub use rayfold_scene::assets::provide_font;
 

@@ -1,5 +1,5 @@
-//! Files in one run of bytes, as they go from worker to worker: for each the length of its name, its name, the length of
-//! its content, its content. Lengths are 32-bit little-endian numbers.
+//! Files as one sequence of bytes, which workers send to each other: for each file the length of its name, its name,
+//! the length of its content, its content. Lengths are 32-bit little-endian numbers.
 
 /// A file: its name and its content.
 pub type File = (String, Vec<u8>);
@@ -16,7 +16,7 @@ pub fn packet<'a>(files: impl IntoIterator<Item = (&'a str, &'a [u8])>) -> Vec<u
     bytes
 }
 
-/// Returns the files of a run of bytes, or `None` if it is cut off.
+/// Returns the files in a sequence of bytes, or `None` if it is cut off.
 pub fn files_of(mut bytes: &[u8]) -> Option<Vec<File>> {
     let mut next = || {
         let (length, rest) = bytes.split_first_chunk()?;

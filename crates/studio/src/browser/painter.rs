@@ -1,9 +1,9 @@
-//! The order in which pictures of the viewport are drawn by several workers: as `pictures` on a thread, but for pieces of
-//! rows in place of a tracer that can be stopped.
+//! The order in which several workers draw pictures of the viewport. It works as `pictures` does on a thread, but with
+//! pieces of rows, because a worker's tracer cannot be stopped.
 //!
-//! The newest request wins. While something moves, a picture is completed, in a smaller size if it would take too long. At
-//! rest, a slow picture begins with sketches; a rendering gives way to a newer request after the rows that workers have in
-//! hand. So rows are few enough to be drawn soon.
+//! The newest request wins. While something moves, a picture is completed, in a smaller size if it would take too long.
+//! At rest, a slow picture begins with sketches. A rendering gives way to a newer request once the workers have drawn
+//! their current rows, so a worker gets only as many rows as it can draw soon.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -32,10 +32,10 @@ pub(super) struct Painter {
     /// The number of pictures on their way to the page.
     under_way: u32,
     drawing: Option<Drawing>,
-    /// The last request of something that moves, and the moment at which it is at rest.
+    /// The last request while something moves, and the time from which it is at rest.
     moved: Option<Wanted>,
     rests: Option<Instant>,
-    /// The request whose final picture was sent last, with nothing after it.
+    /// The request whose final picture was sent last, if nothing was sent after it.
     finished: Option<Wanted>,
     pace: Pace,
     packer: Packer,
@@ -102,7 +102,7 @@ impl Painter {
         self.under_way = self.under_way.saturating_sub(1);
     }
 
-    /// Returns how long nothing is to be drawn, if something is to be drawn then.
+    /// Returns the time until there is something to draw, if something will be drawn then.
     pub(super) fn pause(&self) -> Option<Duration> {
         self.rests
             .filter(|_| self.moved.is_some())
@@ -129,7 +129,7 @@ impl Painter {
         Some(Piece { id: drawing.id, file: place.file, rows })
     }
 
-    /// Takes rows that a worker has drawn; `pixels` is empty if it could not.
+    /// Takes rows that a worker has drawn; `pixels` is empty if it could not draw them.
     pub(super) fn drawn(
         &mut self,
         id: u64,
@@ -158,7 +158,7 @@ impl Painter {
         }
     }
 
-    /// Sends a picture that a finer one follows, unless the page is behind.
+    /// Sends a picture that a finer one will follow, unless the page has not shown the last ones yet.
     fn glimpse(&mut self, picture: Picture, send: &mut impl FnMut(Vec<u8>)) {
         if self.under_way < RESTING_UNDER_WAY {
             self.under_way += 1;
@@ -192,7 +192,7 @@ impl Painter {
         Some(wanted)
     }
 
-    /// Begins a picture. One that is shown already is sent at once.
+    /// Begins a picture. A picture that is already shown is sent at once.
     fn begin(&mut self, wanted: Wanted, send: &mut impl FnMut(Vec<u8>)) {
         if let Some(finished) = self.finished.take().filter(|finished| finished.is_same(&wanted)) {
             send(self.packer.pack(Picture::again(wanted.number, self.packer.before())));
@@ -242,7 +242,7 @@ impl Painter {
         });
     }
 
-    /// Sends a picture whose rows are all there, and begins the next finer one.
+    /// Sends a picture whose rows are complete, and begins the next finer one.
     fn complete(&mut self, drawing: Drawing, send: &mut impl FnMut(Vec<u8>)) {
         let Drawing { wanted, effort, image, asked, begun, .. } = drawing;
         let is_sampled = wanted.scene.samples.most() > 1;
@@ -276,7 +276,7 @@ fn pieces_of(height: u32, side: u32) -> VecDeque<(u32, u32)> {
     (0..height).step_by(side as usize).map(|top| (top, height.min(top + side))).collect()
 }
 
-/// Returns a picture in another size, without any blending.
+/// Returns a picture in another size, without interpolation.
 fn scaled(image: &RgbaImage, screen: Screen) -> RgbaImage {
     let (width, height) = image.dimensions();
     let of = |at: u32, from: u32, to: u32| (u64::from(at) * u64::from(from) / u64::from(to)) as u32;

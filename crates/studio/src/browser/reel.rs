@@ -1,5 +1,5 @@
-//! A worker that makes an animation, and workers that draw its frames. Each has a reel of the same files; one of them
-//! takes the frames in order and encodes them.
+//! A worker that makes an animation, and workers that draw its frames. Each worker has a reel of the same files; one of
+//! them takes the frames in order and encodes them.
 
 use std::io::{Cursor, Write};
 
@@ -14,11 +14,11 @@ use super::packet::File;
 use crate::error::Error;
 use crate::output::{Film, Job, frame_file, png};
 
-/// The frames of a project on their way into a file: an animation, or a zip file of pictures.
+/// A writer of the frames of a project to a file: an animation, or a zip file of pictures.
 #[derive(Debug)]
 pub struct Reel {
     film: Film,
-    /// The pictures, each a frame in its own size.
+    /// The zip file of pictures, each a frame in its own size.
     zip: Option<(ZipWriter<Cursor<Vec<u8>>>, u64)>,
 }
 
@@ -26,7 +26,7 @@ impl Reel {
     /// Takes the files of a project, and the format: `gif`, `apng`, `webp`, or `frames` for a zip file of pictures.
     ///
     /// # Errors
-    /// Fails if the format is unknown, or if a file is not in order.
+    /// Fails if the format is unknown, or if a file is faulty.
     pub fn new(files: Vec<File>, format: &str) -> Result<Self, Error> {
         let (project, _) = project_of("", files)?;
         let container = match format {
@@ -60,7 +60,7 @@ impl Reel {
     /// Adds the next frame, as [`Self::draw`] has returned it.
     ///
     /// # Errors
-    /// Fails if it is no frame, or if the file is beyond the limits.
+    /// Fails if it is no frame, or if the file exceeds its limits.
     pub fn push(&mut self, frame: &[u8]) -> Result<(), Error> {
         let frame = image_of(frame).ok_or_else(|| Error::Output("a frame was cut off".into()))?;
         let Some((zip, count)) = &mut self.zip else { return self.film.push(frame) };
@@ -75,7 +75,7 @@ impl Reel {
     /// Returns the file.
     ///
     /// # Errors
-    /// Fails if there was no frame, or if the file is beyond the limits.
+    /// Fails if there was no frame, or if the file exceeds its limits.
     pub fn finish(self) -> Result<Vec<u8>, Error> {
         match self.zip {
             None => self.film.finish(),

@@ -1,4 +1,4 @@
-//! The messages in TypeScript's words. `web/src/protocol.ts` is what this module writes.
+//! The messages as TypeScript types. This module writes `web/src/protocol.ts`.
 //!
 //! `SNAPSHOTS=overwrite cargo test -p rayfold-studio typescript` writes the file.
 
@@ -13,7 +13,7 @@ use crate::packing::HEADER;
 use crate::runs::{sending, updates};
 use crate::tracks::Track;
 
-/// Defines types of another crate again, with their own fields: one that is missing or added does not compile.
+/// Defines types of another crate again, with their own fields: a missing or an added field does not compile.
 macro_rules! mirror {
     ($($name:ident of $other:ident { $($(#[$attr:meta])* $field:ident: $kind:ty,)* })*) => {
         $(

@@ -287,7 +287,7 @@ mod tests {
 
     use super::*;
 
-    /// The page without a program reads the same cases (`web/tests/site-standing.mjs`).
+    /// The page without a program is tested with the same cases (`web/tests/site-standing.mjs`).
     #[tokio::test]
     async fn what_the_page_without_a_program_computes_is_the_same() {
         let cases: Vec<Value> = serde_json::from_str(include_str!("standing.json")).unwrap();

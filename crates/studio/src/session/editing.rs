@@ -22,7 +22,7 @@ const NO_MODEL: &str = "There is no model (.obj, .ply, .stl, .glb, .gltf) beside
 /// The number of frames of a new animation.
 const FRAMES: u32 = 50;
 
-/// Returns the gesture of this number of the page. It differs from all of the pointer.
+/// Returns the gesture with this number of the page. It differs from all gestures of the pointer.
 pub(super) fn of_page(number: u64) -> u64 {
     number << 1 | 1
 }

@@ -65,19 +65,19 @@ impl Session {
     }
 }
 
-/// Returns the name to which a line refers before its numbers, with the number that stands for it.
+/// Returns the name to which a line refers before its numbers, with the index that stands for it.
 pub(super) fn subject_word(line: &Line) -> Option<(usize, String)> {
     let command = line.command()?;
     let refers = matches!(command.form().subject, Some(Subject::Refers(_) | Subject::Quotes(Quotes::File)));
     refers.then(|| Some((subject_number(command), line.subject()?.to_owned())))?
 }
 
-/// Returns the number that stands for the name before the numbers: it follows all of those.
+/// Returns the index that stands for the name before the numbers: it follows those of all numbers.
 fn subject_number(command: Command) -> usize {
     command.form().numbers().count()
 }
 
-/// Returns the groups that some lines define whole.
+/// Returns the groups that are completely defined by some lines.
 fn groups(lines: &[Line]) -> Vec<String> {
     let end = lines.iter().rposition(|line| line.command() == Some(Command::End)).unwrap_or(0);
     let starts = lines[..end].iter().filter(|line| line.command() == Some(Command::Group));

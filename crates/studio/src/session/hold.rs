@@ -84,7 +84,7 @@ impl Session {
             Drag::new(grip, lines, grabbed, around, keying, neighbours).map(|drag| Held::Drag(drag, at));
     }
 
-    /// Returns the boxes of some lines and of what they can be aligned with.
+    /// Returns the boxes of some lines, and those of the objects with which they can be aligned.
     fn neighbours(&self, project: &Project, lines: &[(usize, Line)]) -> Option<Neighbours> {
         let chosen = self.chosen();
         let own = self.boxes(project, |line| lines.iter().any(|&(own, _)| own == line));

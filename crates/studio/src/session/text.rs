@@ -1,8 +1,8 @@
 //! The text of the page's editor, which sends each of its changes.
 //!
 //! A change applies to one version of a text. The version changes with every other change of the text: a drag, undo,
-//! another program. The page then adapts the changes that it has sent meanwhile, and sends them again. So what is typed
-//! is never lost, and an order of changes exists that both sides have.
+//! another program. The page then adapts the changes that it has sent meanwhile, and sends them again. So no typed text
+//! is lost, and both sides have the changes in the same order.
 
 use super::{Change, Session, TEXT};
 use crate::project::Project;

@@ -139,8 +139,8 @@ impl Session {
         if gesture.is_some() { Change::Moving } else { Change::Still }
     }
 
-    /// Pastes the keys of a text. The text of the keys that were copied last stands for those, whose lines may have moved
-    /// since.
+    /// Pastes the keys of a text. If it is the text of the keys that were copied last, those keys are pasted, because
+    /// their lines may have moved since.
     pub(super) fn paste_keys_of_text(
         &mut self,
         project: &mut Project,

@@ -82,7 +82,7 @@ impl Session {
         objects.or_else(|| edits::places(lights.collect::<Vec<_>>(), shown.time))
     }
 
-    /// Returns the radius of what a `Use` draws, which is not in its numbers.
+    /// Returns the radius of the objects that a `Use` draws, which is not in its numbers.
     pub(super) fn drawn_size(&self, project: &Project, line: usize) -> Option<f64> {
         self.line(project, line).filter(|line| line.command() == Some(Command::Use))?;
         let (shown, scene) = (self.shown(project), self.sound_scene(project)?);
@@ -290,7 +290,7 @@ fn round(x: f64, decimals: usize) -> f64 {
     format!("{x:.decimals$}").parse().unwrap_or(x)
 }
 
-/// Returns the numbers of `Look` but for its `up`, rounded to a visible precision.
+/// Returns the numbers of `Look` without its `up`, rounded to a visible precision.
 fn look_numbers(orbit: &Orbit, step: f64) -> Vec<f64> {
     let places = decimals(step);
     let positions = [orbit.eye(), orbit.target].into_iter().flat_map(|at| at.to_array());
@@ -355,7 +355,7 @@ pub(super) fn lines_path(projection: &Projection, guides: &[[DVec3; 2]]) -> Stri
     guides.iter().filter_map(segment).collect()
 }
 
-/// Returns the edges of what a scene's camera sees, from its eye.
+/// Returns the edges of the volume that a scene's camera sees, from its eye.
 pub(super) fn frustum_path(projection: &Projection, scene: &Scene, bounds: Bounds) -> String {
     let (width, height) = (f64::from(scene.screen.width()), f64::from(scene.screen.height()));
     let own = Projection::new(scene);
