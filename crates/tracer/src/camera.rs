@@ -1,9 +1,8 @@
 //! The ray of each pixel.
 //!
-//! This is the only place that knows how the language numbers its pixels: i from the left, j from the bottom, the
-//! outermost samples on the window's corners. The reference tracer, the packets, and callers who ask for the ray of a
-//! pixel all use it. A position between two pixels is a fraction: column `i + dx` and row `j + dy` have a ray like any
-//! other.
+//! Only this module knows how the language numbers its pixels: i from the left, j from the bottom, the outermost
+//! samples on the window's corners. The reference tracer, the packets, and callers who ask for the ray of a pixel all
+//! use it. A position between two pixels is a fraction: column `i + dx` and row `j + dy` have a ray like any other.
 
 use glam::{DVec2, DVec3};
 use rayfold_scene::model::unit;
@@ -24,7 +23,7 @@ pub(crate) struct Ray {
 /// exact, and rounding errors are proportional to the coordinate itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
-    /// The index that the others are counted from: a whole number, or halfway between two.
+    /// The index from which the others are counted: a whole number, or halfway between two.
     pub(crate) anchor: f64,
     /// The coordinate of the anchor.
     pub(crate) at_anchor: f64,
@@ -101,8 +100,8 @@ fn quotient((high, low): DoubleDouble, by: f64) -> DoubleDouble {
     (quotient, ((-quotient).mul_add(by, high) + low) / by)
 }
 
-/// The extent of a pixel that is the only one of its row or column. Where pixels are points, it is the middle of the
-/// window; where they have an extent, it is all of it.
+/// The extent of a pixel that is the only one of its row or column. If pixels are points, it is at the middle of the
+/// window. If they have an extent, it fills the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Single {
     IsAPoint,
@@ -110,7 +109,7 @@ pub(crate) enum Single {
 }
 
 impl Single {
-    /// Returns the extent that the scene is drawn with.
+    /// Returns the extent with which the scene is drawn.
     pub(crate) fn of(scene: &Scene) -> Self {
         if scene.samples.most() > 1 { Self::IsAll } else { Self::IsAPoint }
     }

@@ -22,9 +22,9 @@ pub struct CutLight {
 
 /// Estimates the light that the depth of a scene cuts off. Returns `None` if it is at most a thousandth.
 ///
-/// Compares pictures with one ray per pixel at the scene's depth and at the greatest depth. They have about 20,000 pixels if the
-/// frame has more; in parallel projection, where a pixel has a size of its own, they are whole. A scene without mirrors and glass
-/// is not drawn.
+/// Compares pictures with one ray per pixel at the scene's depth and at the greatest depth. They have about 20,000
+/// pixels if the frame has more. In parallel projection, in which a pixel is a unit of the world, they have all pixels.
+/// A scene without mirrors and glass is not drawn.
 ///
 /// # Errors
 /// The errors of [`crate::render`].

@@ -1,6 +1,6 @@
-//! The surfaces that a picture shows, without their light: distance, normal, object and colour.
+//! The visible surfaces of a picture, without their light: distance, normal, object and colour.
 //!
-//! The kernels in double precision find the objects. What is returned of a hit is computed as the reference tracer does.
+//! The kernels in double precision find the objects. The data of a hit are computed as the reference tracer does.
 
 use std::borrow::Cow;
 
@@ -32,16 +32,16 @@ use crate::{RenderError, RenderOptions};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
-    /// The distance from the eye along the view axis, in world units. For a camera with parallel rays it is the distance
-    /// from the plane in which they start. It is infinite where nothing is hit, and only there.
+    /// The distance from the eye along the view axis, in world units. For a camera with parallel rays it is the
+    /// distance from the plane in which they start. It is infinite only if nothing is hit.
     pub depth: f32,
-    /// The unit normal in the world, on the side of the viewer: for a mesh with normals their mean at the hit. It is 0
-    /// where nothing is hit.
+    /// The unit normal in the world, on the side of the viewer. For a mesh with normals it is their mean at the hit. It
+    /// is 0 if nothing is hit.
     pub normal: [f32; 3],
-    /// The position of the object in the script, from 1; 0 where nothing is hit.
+    /// The position of the object in the script, from 1; 0 if nothing is hit.
     pub object: u32,
-    /// The share of light that the surface sends back: the sum of its diffuse and its mirror coefficient with patterns,
-    /// pictures and colours of meshes, from 0 to 1; 1 for glass, and 0 where nothing is hit.
+    /// The share of light that the surface reflects, from 0 to 1: the sum of its diffuse and its mirror coefficient
+    /// with patterns, pictures and colours of meshes. It is 1 for glass, and 0 if nothing is hit.
     pub albedo: [f32; 3],
 }
 
@@ -56,8 +56,8 @@ impl Default for FirstHit {
     }
 }
 
-/// Returns what is behind the middle of each pixel of a scene, row by row from the top. It is a surface of the scene as it
-/// is given, seen through a pinhole and through no fog, whatever its lens, its shutter and its number of samples. Uses the
+/// Returns the surface behind the middle of each pixel of a scene, row by row from the top. The scene is used as it is
+/// given, seen through a pinhole and without fog, whatever its lens, its shutter and its number of samples. Uses the
 /// current rayon pool.
 ///
 /// # Errors

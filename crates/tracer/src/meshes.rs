@@ -1,13 +1,13 @@
-//! Meshes as the tracers see them: every face is a triangle, and a table says what a face has beyond one.
+//! Meshes as the tracers use them: every face is a triangle, and a table has the further data of faces.
 //!
 //! A mesh is expanded before a scene is prepared, to the very triangles that a script could write out. So a flat mesh has
 //! the pixels of its triangles, bit for bit. A mesh in a group is expanded once, however often the group is drawn.
 //! Normals, colours at vertices, pictures and the inside of closed glass are looked up by the position of a triangle among all
 //! objects ([`Faces`]), when a ray has hit it.
 //!
-//! The kernels draw meshes of many triangles from one tree in the coordinates of their model, which stays with the model
-//! ([`can_be_shared`]). Then each look of the mesh is one object, in place of its triangles. The order of a hit is that of
-//! the object, and its fraction is the number of the triangle ([`hit_face`]).
+//! The kernels draw meshes of many triangles from one tree in the coordinates of their model, which is stored with the
+//! model ([`can_be_shared`]). Then each look of the mesh is one object, in place of its triangles. The order of a hit
+//! is that of the object, and its fraction is the number of the triangle ([`hit_face`]).
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -37,11 +37,11 @@ pub(crate) struct Expanded<'a> {
 /// The faces of meshes, by their positions among all objects.
 #[derive(Debug, Default)]
 pub(crate) struct Faces {
-    /// In the order of the objects.
+    /// The meshes, in the order of the objects.
     runs: Vec<Run>,
 }
 
-/// The least number of triangles, of all meshes of a model, with which its tree is shared.
+/// The number of triangles, of all meshes of a model, from which on its tree is shared.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shared(usize);
 
@@ -72,10 +72,11 @@ impl Shared {
 /// than 2²⁸, so that an order is exact in `f64`.
 pub(crate) const ONE_FACE: f64 = 1.0 / (1 << 24) as f64;
 
-/// The faces of one mesh, as it is drawn once.
+/// The faces of one mesh in one place of the scene.
 #[derive(Debug)]
 pub(crate) struct Run {
-    /// The position of the first face, and the number of faces; of a mesh whose tree is shared, those of its looks.
+    /// The position of the first face and the number of faces. If the tree of the mesh is shared, these are the
+    /// positions of its looks.
     first: usize,
     count: usize,
     /// Whether the tree of the model is shared.
@@ -88,13 +89,13 @@ pub(crate) struct Run {
     is_linear: bool,
     /// Whether colours of its file that vary within faces, by vertices or pictures, multiply its coefficients.
     has_colors: bool,
-    /// Whether it also glows with the light of its file, where that is no part of its materials.
+    /// Whether it also glows with the light of its file, if that light is no part of its materials.
     glows: bool,
     /// Whether it has a picture by texture coordinates.
     has_image: bool,
     /// Whether it is a closed body of glass.
     is_filled: bool,
-    /// Whether faces can have holes, where they have no hits.
+    /// Whether faces can have holes, in which they are not hit.
     has_holes: bool,
 }
 
@@ -105,7 +106,7 @@ pub(crate) struct Shading {
     pub(crate) normal: DVec3,
     /// The unit normal at which rays are reflected and refracted. It faces the ray.
     pub(crate) onward: DVec3,
-    /// The way from the hit to where shadow rays start, without the offset from the surface.
+    /// The vector from the hit to the start of shadow rays, without the offset from the surface.
     pub(crate) lift: DVec3,
     /// The factor of ambient and diffuse coefficients.
     pub(crate) color: DVec3,
@@ -115,7 +116,7 @@ pub(crate) struct Shading {
     pub(crate) within: bool,
 }
 
-/// The data at the corners of a face that its colours need, as its model has them.
+/// The data at the corners of a face from which its colours are computed, as its model stores them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceCorners {
     /// Texture coordinates.
@@ -127,7 +128,7 @@ pub(crate) struct FaceCorners {
 /// A hit on a face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceHit {
-    /// The point, in coordinates in which a point p of the world is at `(p - center) * scale`.
+    /// The point, in coordinates in which the world's point p has the coordinates `(p - center) * scale`.
     pub(crate) point: DVec3,
     pub(crate) center: DVec3,
     pub(crate) scale: f64,
@@ -158,7 +159,7 @@ pub(crate) fn expanded_count(objects: &[Object]) -> usize {
     objects.iter().map(|object| mesh(object).map_or(1, |mesh| mesh.model().triangle_count())).sum()
 }
 
-/// Returns the mesh that an object is, also in a group.
+/// Returns the mesh of an object, also in a group, if the object is one.
 pub(crate) fn mesh(object: &Object) -> Option<&Mesh> {
     match object {
         Object::Mesh(mesh) => Some(mesh),
@@ -175,7 +176,7 @@ pub(crate) fn mesh(object: &Object) -> Option<&Mesh> {
 pub(crate) struct Colors {
     /// Whether they are linear light.
     is_linear: bool,
-    /// Whether surfaces light each other. Then a colour of a file is diffuse, and none of it is ambient.
+    /// Whether surfaces light each other. If so, a colour of a file is diffuse, and none of it is ambient.
     is_indirect: bool,
 }
 
@@ -243,8 +244,8 @@ pub(crate) fn expanded(objects: &[Object], colors: Colors, shared: Shared) -> (V
     (all, faces)
 }
 
-/// Returns whether a mesh can be drawn from the tree of its model: it has no holes, is not of glass, and its coefficients do
-/// not depend on the place.
+/// Returns whether a mesh can be drawn from the tree of its model. It must have no holes, must not be of glass, and its
+/// coefficients must not depend on the place.
 fn can_be_shared(mesh: &Mesh) -> bool {
     let is_simple = |finish: &Finish| {
         finish.glass.is_none()
@@ -263,14 +264,13 @@ fn parts(mesh: &Mesh, colors: Colors, is_shared: bool) -> Vec<Object> {
     looks.map(|look| mesh.with_material(material(mesh, look, colors)).into()).collect()
 }
 
-/// Returns whether the light that faces of a look give off is looked up where they are hit: because it varies, or because
-/// the colour does.
+/// Returns whether the glow of the faces of a look is computed at each hit, because the glow or the colour varies.
 fn glows_apart(model: &Model, look: usize) -> bool {
     let Look { glow, glow_texture, .. } = &model.looks()[look];
     *glow != DVec3::ZERO && (glow_texture.is_some() || model.is_varied(look))
 }
 
-/// Returns the triangles of a mesh, with the colours of their file as far as a triangle has one.
+/// Returns the triangles of a mesh. A triangle has the colour of its file if that is the same all over it.
 fn triangles(mesh: &Mesh, colors: Colors) -> Vec<Object> {
     let model = mesh.model();
     let materials: Vec<Material> =
@@ -323,13 +323,13 @@ impl Faces {
         self.runs.iter().any(Run::is_shaded)
     }
 
-    /// Returns whether the colour of any face varies, so that equal materials are not equal colours.
+    /// Returns whether the colour of any face varies. If so, equal materials do not imply equal colours.
     pub(crate) fn have_colors(&self) -> bool {
         self.runs.iter().any(|run| run.has_colors || run.glows || run.has_image)
     }
 
-    /// Returns the positions of objects, among so many, that have all materials and all kinds of shapes: of the faces of a mesh
-    /// that look alike only one.
+    /// Returns the positions of objects that together have all materials and all kinds of shapes, out of `count`
+    /// objects. Of the faces of a mesh that look alike it returns only one.
     pub(crate) fn examples(&self, count: usize) -> Vec<u32> {
         let (mut examples, mut next) = (Vec::new(), 0);
         for run in &self.runs {
@@ -368,8 +368,8 @@ impl Faces {
         run.is_some_and(|run| run.model.looks()[run.model.look(order - run.first)].cutoff.is_some())
     }
 
-    /// Returns whether the object at `order` has a hole at a point, which is in coordinates in which a point p of the world is
-    /// at `(p - center) * scale`.
+    /// Returns whether the object at `order` has a hole at a point. The point is in coordinates in which the world's
+    /// point p has the coordinates `(p - center) * scale`.
     pub(crate) fn is_hole(&self, order: usize, point: DVec3, (center, scale): (DVec3, f64)) -> bool {
         let Some(run) = self.run_of(order).filter(|run| run.has_holes) else { return false };
         let (model, k) = (&run.model, order - run.first);
@@ -396,8 +396,9 @@ impl Faces {
         self.run_of(order).is_some_and(|run| run.is_filled)
     }
 
-    /// Returns how much normals can turn, as a sine, where a hit is beside its place by a roundoff of its distance: in
-    /// roundoffs. A point p of the world is at `(p - center) * scale`, and no hit is nearer to the eye than `nearest`.
+    /// Returns an upper bound of the angle by which normals turn, as a sine, if a hit is moved by a roundoff of its
+    /// distance. The bound is in roundoffs. The world's point p has the coordinates `(p - center) * scale`, and no hit
+    /// is nearer to the eye than `nearest`.
     pub(crate) fn steepest(&self, (center, scale): (DVec3, f64), nearest: f64) -> f64 {
         let of_run = |run: &Run| {
             let of_face = |k: usize| {
@@ -417,7 +418,7 @@ impl Faces {
         &self.runs
     }
 
-    /// Returns whether what is seen of the object at `order` varies with the place of a hit on it.
+    /// Returns whether the appearance of the object at `order` varies with the place of a hit on it.
     pub(crate) fn is_varied(&self, order: usize) -> bool {
         self.run_of(order).is_some_and(|run| run.has_normals() || run.is_colored())
     }
@@ -432,8 +433,8 @@ impl Faces {
         self.run_of(order).is_some_and(|run| run.is_shared && order > run.first)
     }
 
-    /// Returns what the face with the `order` of a hit adds to the surface there, or `None` for what is no more than a
-    /// triangle. `material` is that of the object.
+    /// Returns what the face with the `order` of a hit adds to the surface there, or `None` if it is only a triangle.
+    /// `material` is that of the object.
     pub(crate) fn shading(&self, order: f64, material: &Material, hit: FaceHit) -> Option<Shading> {
         let object = order as usize;
         let run = self.run_of(object).filter(|run| run.is_shaded())?;
@@ -483,8 +484,8 @@ impl Run {
         self.is_filled
     }
 
-    /// Returns its model and its placement, if the tree of the model is shared. Then its looks stand for its faces among all
-    /// objects.
+    /// Returns its model and its placement, if the tree of the model is shared. Then its looks are the objects, in
+    /// place of its faces.
     pub(crate) fn shared_model(&self) -> Option<(&Model, Option<&Placement>)> {
         self.is_shared.then(|| (&*self.model, self.placement.as_deref()))
     }
@@ -562,7 +563,8 @@ impl Run {
         })
     }
 
-    /// Returns the corners of a face in coordinates in which a point p of the world is at `(p - center) * scale`.
+    /// Returns the corners of a face, in coordinates in which the world's point p has the coordinates `(p - center) *
+    /// scale`.
     pub(crate) fn corners(&self, k: usize, center: DVec3, scale: f64) -> [DVec3; 3] {
         self.model.corners(k).map(|p| match &self.placement {
             Some(placement) => (placement.point(p) - center) * scale,
@@ -580,7 +582,7 @@ impl Run {
         level_at(texture, place, model.decodes_pictures(self.is_linear))
     }
 
-    /// Returns the place of a point of a face on its picture, from the upper left corner.
+    /// Returns the position on its picture of a point of a face, from the upper left corner.
     #[inline(always)]
     fn place_on(
         &self,
@@ -597,25 +599,25 @@ impl Run {
         self.place_from_top(texture.transformed(mixed(uvs, weights)))
     }
 
-    /// Returns the place of texture coordinates, from the upper left corner of a picture.
+    /// Returns the position of texture coordinates, from the upper left corner of a picture.
     #[inline(always)]
     fn place_from_top(&self, DVec2 { x, y }: DVec2) -> DVec2 {
         DVec2::new(x, if self.model.has_uvs_from_top() { y } else { 1.0 - y })
     }
 }
 
-/// Returns the texture coordinates at a place of a triangle, given by its barycentric weights.
+/// Returns the texture coordinates at a point of a triangle, given by its barycentric weights.
 #[inline(always)]
 fn mixed([a, b, c]: [Vec2; 3], weights: [f64; 3]) -> DVec2 {
     weights[0] * a.as_dvec2() + weights[1] * b.as_dvec2() + weights[2] * c.as_dvec2()
 }
 
-/// Returns the number of the triangle that the order of a hit on a shared model has.
+/// Returns the number of the triangle in the order of a hit on a shared model.
 pub(crate) fn hit_face(order: f64) -> usize {
     (order.fract() / ONE_FACE) as usize
 }
 
-/// Returns how fast the normal changes across a face: the most that it turns over a length, divided by that length.
+/// Returns how fast the normal changes across a face: the largest ratio of the angle that it turns to the length.
 fn bend([a, b, c]: [DVec3; 3], normals: [DVec3; 3]) -> f64 {
     let (p, q) = (b - a, c - a);
     let length = p.length();

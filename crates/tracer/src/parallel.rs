@@ -1,6 +1,6 @@
 //! Parallel work on bands of an image, or on many objects.
 //!
-//! This module is independent of the picture's contents: it gives each worker its own rows, and checks the cancel flag
+//! This module is independent of the picture's contents. It gives each worker its own rows, and checks the cancel flag
 //! between them. The picture does not depend on which worker draws a band.
 
 use core::ops::Range;
@@ -44,9 +44,8 @@ pub(crate) fn all<T: Sync>(items: &[T], f: impl Fn(&T) -> bool + Send + Sync) ->
     }
 }
 
-/// Draws these rows of an image, counted from the top, in bands of `side` rows, the first of which begins at the top of
-/// the image. `draw` gets the buffers that `scratch` makes for a worker, the first row of its band, and the band's
-/// bytes.
+/// Draws these rows of an image, counted from the top, in bands of `side` rows. The first band begins at the top of the
+/// image. `draw` gets the buffers that `scratch` makes for a worker, the first row of its band, and the band's bytes.
 pub(crate) fn bands<T>(
     screen: Screen,
     rows: Range<u32>,

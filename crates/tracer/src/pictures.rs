@@ -31,7 +31,7 @@ impl Panorama {
         Some(Self { picture: file.picture().clone(), is_linear, strength: turn.strength(), turn: turn_of })
     }
 
-    /// Returns the light that comes from where a ray with this unit direction goes.
+    /// Returns the light that comes from this unit direction.
     pub(crate) fn along(&self, direction: DVec3) -> DVec3 {
         self.strength * self.level(Self::place(self.turned(direction)))
     }
@@ -80,7 +80,7 @@ impl Panorama {
     }
 }
 
-/// A picture that alone colours the faces of a model, by their texture coordinates.
+/// A picture that alone defines the colour of the faces of a model, by their texture coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct FacePicture {
     pub(crate) picture: Arc<Picture>,
@@ -89,7 +89,7 @@ pub(crate) struct FacePicture {
     pub(crate) is_from_top: bool,
     /// Whether encoded levels are decoded to linear light.
     pub(crate) is_linear: bool,
-    /// The factor of a picture of the model's file. `None` for one of a material, whose alpha counts.
+    /// The factor of a picture of the model's file. `None` for a picture of a material, whose alpha is used.
     pub(crate) tint: Option<DVec3>,
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn mean(
     interpolated(picture, place, [Wrap::Repeat, down], value)
 }
 
-/// Returns the interpolated value at a place on a picture that goes on by `wraps` across and down.
+/// Returns the interpolated value at a place on a picture. `wraps` defines how the picture continues across and down.
 #[inline]
 fn interpolated(
     picture: &Picture,
@@ -180,7 +180,7 @@ fn interpolated(
     mixed(of_row(rows[0]), of_row(rows[1]), y)
 }
 
-/// Returns the two pixels, of so many, whose middles are around a place, and the share of the second.
+/// Returns the two pixels, out of `count`, whose middles are around a place, and the share of the second.
 pub(crate) fn neighbours(place: f64, count: u32, wrap: Wrap) -> ([u32; 2], f64) {
     // A place that is no number, of an object at the end of all numbers, is the corner.
     let place = if place.is_finite() { place } else { 0.0 };
@@ -208,7 +208,7 @@ pub(crate) fn neighbours(place: f64, count: u32, wrap: Wrap) -> ([u32; 2], f64) 
     (pixels, at - before)
 }
 
-/// Returns a mean of two values, without a rounding error where they are equal.
+/// Returns a mean of two values, without a rounding error if they are equal.
 fn mixed(a: DVec3, b: DVec3, share: f64) -> DVec3 {
     a + share * (b - a)
 }

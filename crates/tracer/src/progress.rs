@@ -12,14 +12,14 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Returns the work that is done, and the work in total, which is 0 before the first pixel. The total of adaptive
+    /// Returns the work that is done, and the total work, which is 0 before the first pixel. The total of adaptive
     /// sampling is an upper bound, which falls when pixels need no more samples.
     pub fn get(&self) -> (u64, u64) {
         let total = self.total.load(Ordering::Relaxed);
         (self.done.load(Ordering::Relaxed).min(total), total)
     }
 
-    /// Sets the work that is done and the work that is left.
+    /// Sets the work that is done and the work that remains.
     pub(crate) fn set(&self, done: u64, left: u64) {
         self.done.store(done, Ordering::Relaxed);
         self.total.store(done.saturating_add(left), Ordering::Relaxed);

@@ -80,7 +80,7 @@ impl<'a> Drawing<'a> {
     /// Prepares a scene, on the current rayon pool.
     ///
     /// # Errors
-    /// If this build leaves out a feature that the scene needs.
+    /// Fails if this build leaves out a feature that the scene needs.
     pub fn new(scene: &'a Scene, options: &'a RenderOptions) -> Result<Self, RenderError> {
         Self::exposed(Exposure::still(scene), options)
     }
@@ -88,7 +88,7 @@ impl<'a> Drawing<'a> {
     /// Prepares a scene that may move while the shutter is open, on the current rayon pool.
     ///
     /// # Errors
-    /// If this build leaves out a feature that the scene needs.
+    /// Fails if this build leaves out a feature that the scene needs.
     pub fn exposed(exposure: Exposure<'a>, options: &'a RenderOptions) -> Result<Self, RenderError> {
         parts::check(exposure.scene())?;
         let scene = exposure.scene();
@@ -114,7 +114,7 @@ impl<'a> Drawing<'a> {
         }))
     }
 
-    /// Draws the picture: of a scene without background with alpha, unless there is a
+    /// Draws the picture. A scene without background gives a picture with alpha, unless there is a
     /// [matte](crate::RenderOptions::matte).
     ///
     /// # Errors
@@ -142,8 +142,8 @@ impl<'a> Drawing<'a> {
         self.scene().background.is_none() && self.options().matte.is_none()
     }
 
-    /// Draws the image, the second half. The result is the same each time. Where a scene has no background, it shows the
-    /// [matte](crate::RenderOptions::matte), or black.
+    /// Draws the image: the second half of [`crate::render`]. The result is the same each time. If a scene has no
+    /// background, the image shows the [matte](crate::RenderOptions::matte), or black.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
@@ -151,9 +151,9 @@ impl<'a> Drawing<'a> {
         self.draw_rows(0..self.scene().screen.height())
     }
 
-    /// Draws some rows of the image, counted from the top. The pixels are exactly those of the whole image. Takes the
-    /// time and memory of those rows, and of the [margin](Self::margin) above and below them. Rows outside the image
-    /// are left out.
+    /// Draws some rows of the image, counted from the top. The pixels are exactly those of the whole image. It takes
+    /// the time and memory of those rows, and of the [margin](Self::margin) above and below them. Rows outside the
+    /// image are left out.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
@@ -180,9 +180,9 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws the picture as [`Self::draw_picture`] does. `each` is called after each pass over the image except the last, with a
-    /// function that makes the picture so far: an estimate of the whole picture, the next one with more samples. With one sample
-    /// per pixel there are none.
+    /// Draws the picture as [`Self::draw_picture`] does. `each` is called after each pass over the image except the
+    /// last, with a function that makes the picture so far: an estimate of the whole picture, each with more samples
+    /// than the one before. With one sample per pixel `each` is not called.
     ///
     /// # Errors
     /// The errors of [`crate::render`], and those of `each`.
@@ -197,9 +197,9 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws the light of the image before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from the
-    /// top, before [`rayfold_scene::Tone`]. With one sample per pixel the reference tracer draws it, which takes as long as
-    /// it has objects.
+    /// Draws the light of the image before its conversion to levels: three numbers from 0 to 1 for each pixel, row by
+    /// row from the top, before [`rayfold_scene::Tone`]. With one sample per pixel the reference tracer draws it, which
+    /// takes longer the more objects there are.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
@@ -213,8 +213,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws the light of the image as [`Self::draw_light`] does, and its cover: four numbers from 0 to 1 for each pixel. The
-    /// light is premultiplied by the cover. A scene with a background covers all.
+    /// Draws the light of the image as [`Self::draw_light`] does, and its cover: four numbers from 0 to 1 for each
+    /// pixel. The light is premultiplied by the cover. A scene with a background covers every pixel.
     ///
     /// # Errors
     /// The errors of [`crate::render`].
@@ -476,7 +476,7 @@ impl<'a, E: Real> Setup<'a, E> {
         Box::new(Scratch::new(self.options.cancel))
     }
 
-    /// Draws a band of so many rows from a row on, into bytes or into pixels.
+    /// Draws a band of this many rows, from a row on, into bytes or into pixels.
     fn draw_band<By: Formulas<E>>(
         &self,
         scratch: &mut Scratch<E>,
@@ -494,7 +494,7 @@ impl<'a, E: Real> Setup<'a, E> {
         draw::<E, By>(&job, options.level.unwrap_or_else(Level::new), band, scratch);
     }
 
-    /// Returns whether a tile may have stopped halfway: with much glass it does if the picture is cancelled.
+    /// Returns whether a tile may have stopped halfway, as it does with much glass if the picture is cancelled.
     fn is_cut_short(&self) -> bool {
         let is_cancelled = || self.options.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed));
         self.prepared.has_glass() && is_cancelled()

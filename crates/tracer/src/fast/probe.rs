@@ -1,6 +1,6 @@
-//! Single rays through the kernels that pictures are made with, and fingerprints of pictures.
+//! Traces single rays with the kernels that draw pictures, and computes fingerprints of pictures.
 //!
-//! Hard cases are about rays that no camera sends; here they can be sent one by one, to any kernel.
+//! Hard cases need rays that no camera sends. Here they can be traced one by one, with any kernel.
 
 use std::sync::Arc;
 
@@ -28,13 +28,13 @@ use crate::fast::transport::surfaces::surface;
 use crate::meshes::{Faces, Shared};
 use crate::{Precision, RenderError, RenderOptions, picture_of_frame};
 
-/// The number that a fingerprint begins with, and the factor of each step.
+/// The start value of a fingerprint, and the factor of each step.
 ///
 /// Source: Fowler, Noll and Vo, FNV-1a with 64 bits.
 const FNV: (u64, u64) = (0xcbf2_9ce4_8422_2325, 0x0100_0000_01b3);
 
-/// Returns a number for the pictures of the first and of the middle frame of a script. It is the same on every machine,
-/// as the pictures are.
+/// Returns a fingerprint of the pictures of the first and of the middle frame of a script. It is the same on every
+/// machine, as the pictures are.
 ///
 /// # Errors
 /// The errors of [`crate::render`].
@@ -46,12 +46,12 @@ pub fn fingerprint(script: &Script, options: &RenderOptions) -> Result<u64, Rend
     Ok(hash(pictures.iter().flat_map(|picture| picture.as_bytes().iter().copied())))
 }
 
-/// Returns a number for some bytes, the same on every machine.
+/// Returns a fingerprint of bytes. It is the same on every machine.
 pub fn hash(bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(FNV.0, |number, byte| (number ^ u64::from(byte)).wrapping_mul(FNV.1))
 }
 
-/// What a ray meets first.
+/// The first hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Position of the object in the script, from 0.
@@ -62,10 +62,9 @@ pub struct Found {
     pub normal: DVec3,
 }
 
-/// The nearest hit of each ray, `(origin, direction)` with a direction of length 1.
+/// Returns the nearest hit of each ray, `(origin, direction)` with a direction of length 1.
 ///
-/// Rays whose origin is the camera's eye are traced as pictures trace them from
-/// there.
+/// Rays whose origin is the camera's eye are traced as camera rays of a picture are.
 ///
 /// # Errors
 /// The errors of [`crate::render`].
@@ -93,7 +92,7 @@ pub fn nearest_hits(
     }
 }
 
-/// The kernels in double precision. They are compiled here alone.
+/// The kernels in double precision. They are compiled in this module alone.
 fn in_double(batch: &Batch<f64>, level: Level, out: &mut Vec<Option<Found>>) {
     on!(level, simd => batch.nearest(simd, out));
 }
@@ -123,7 +122,7 @@ impl<'a> Finder<'a> {
         Ok(Some(Self { ranked, geometry, prepared, level: options.level.unwrap_or_else(Level::new) }))
     }
 
-    /// Returns the scene in whose order the objects are, without meshes, and the faces that its triangles were.
+    /// Returns the scene without meshes, in the order of its objects, and the faces of meshes among its triangles.
     pub(crate) fn scene(&self) -> (&Scene, Option<Arc<Faces>>) {
         (&self.ranked.scene, self.ranked.faces.clone())
     }
@@ -140,13 +139,13 @@ impl<'a> Finder<'a> {
     }
 }
 
-/// As pictures are traced that have something, or numbers, that no kernel can hold.
+/// Traces the rays as pictures are traced whose features or numbers no kernel supports.
 fn one_by_one(scene: &Scene, origin: DVec3, direction: DVec3) -> Option<Found> {
     let hit = crate::reference::nearest(&scene.objects, origin, direction)?;
     Some(Found { object: hit.object, distance: hit.distance, normal: hit.surface.normal })
 }
 
-/// Tiles, where there are none.
+/// The tiles of rays that belong to no image.
 const GRID: Grid = Grid { size: (16, 16), side: (16, 16), margin: MARGIN, lens: None };
 
 struct Batch<'a, E> {

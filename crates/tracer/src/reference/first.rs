@@ -21,7 +21,7 @@ pub(crate) struct FirstSurface {
     pub(crate) distance: f64,
     /// The unit normal that light sees. It faces the ray.
     pub(crate) normal: DVec3,
-    /// The share of light that the surface sends back, from 0 to 1 for each channel.
+    /// The share of light that the surface reflects, from 0 to 1 for each channel.
     pub(crate) albedo: DVec3,
 }
 
@@ -30,8 +30,9 @@ impl<'a> FirstSurfaces<'a> {
         Self(World::of(expanded))
     }
 
-    /// Returns the surface behind column `i` from the left and row `j` from the bottom, of the object that is known to be
-    /// the first there. Returns the nearest surface of all where the ray misses that object by a rounding error.
+    /// Returns the surface behind column `i` from the left and row `j` from the bottom. `order` is the object that is
+    /// known to be the first there. If the ray misses that object by a rounding error, returns the nearest surface of
+    /// all.
     pub(crate) fn of_object(&self, i: f64, j: f64, object: usize) -> Option<FirstSurface> {
         let ray = self.0.rays.ray(i, j);
         let Some(distance) = shapes::distance(&self.0.objects[object], ray) else {

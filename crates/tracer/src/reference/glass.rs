@@ -44,9 +44,9 @@ pub(crate) fn refract(
     Refraction { mirrored: 0.5 * (across + along), direction: if is_flat { direction } else { straight } }
 }
 
-/// Returns the normal at which a ray goes on from a face: the shading normal, or that of the face if a ray would leave on
-/// the wrong side of the face. Both face the ray. `glass` is the glass of the face, with whether the ray comes from within
-/// and whether it has no inside.
+/// Returns the normal at which a ray is reflected or refracted at a face: the shading normal, or the face's own normal
+/// if the ray would leave on the wrong side of the face. Both face the ray. `glass` is the glass of the face, with
+/// whether the ray comes from within and whether it has no inside.
 pub(crate) fn onward_normal(
     direction: DVec3,
     normal: DVec3,

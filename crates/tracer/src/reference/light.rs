@@ -16,7 +16,7 @@ const LAMP: f64 = 8.0 * f64::EPSILON;
 pub(super) struct IncidentLight {
     /// The unit vector towards the light.
     pub(super) towards: DVec3,
-    /// The colour of the light that arrives if nothing occludes it.
+    /// The colour of the light if nothing occludes it.
     pub(super) color: DVec3,
     /// The position of the lamp; `None` for a directional light.
     lamp: Option<DVec3>,

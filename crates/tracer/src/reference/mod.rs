@@ -1,8 +1,8 @@
-//! The reference tracer, which every faster tracer is tested against.
+//! The reference tracer. Every faster tracer is tested against it.
 //!
 //! It traces one ray after another and tests every object for every ray, all in `f64`, in the terms of the scene
-//! language. It is written for clarity and correctness, without packets, tiles or trees. Its own rounding errors have
-//! bounds where they arise ([`Surface::offset`]), relative to the numbers involved.
+//! language. It is written for clarity and correctness, without packets, tiles or trees. Bounds on its own rounding
+//! errors are defined where the errors arise ([`Surface::offset`]), relative to the numbers involved.
 //!
 //! ```
 //! use glam::DVec3;
@@ -111,8 +111,8 @@ pub fn color(scene: &Scene, i: u32, j: u32) -> DVec3 {
         .color(ray, scene.depth.bounces())
 }
 
-/// Returns the nearest hit of a ray. Hits are equal if they are within the bound on rounding errors of each other. If
-/// hits are equal, one without glass wins, and among those the one of the object that comes first.
+/// Returns the nearest hit of a ray. Hits are equal if they are within the bound on rounding errors of each other.
+/// Among equal hits, those without glass win over those with glass, and then the object that comes first wins.
 ///
 /// `direction` is of unit length.
 pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hit> {
@@ -124,7 +124,7 @@ pub fn nearest(objects: &[Object], origin: DVec3, direction: DVec3) -> Option<Hi
     nearest_of(objects, Ray { origin, direction }, None)
 }
 
-/// Returns the nearest hit among objects that are no meshes.
+/// Returns the nearest hit among objects that are not meshes.
 fn nearest_of(objects: &[Object], ray: Ray, faces: Option<&Faces>) -> Option<Hit> {
     if objects.iter().any(|object| matches!(object, Object::Instance(_))) {
         let objects: Vec<Object> = objects.iter().map(|o| shapes::in_world(o).into_owned()).collect();

@@ -63,7 +63,7 @@ const GRADIENTS: [DVec3; 16] = [
     DVec3::new(0.0, -1.0, -1.0),
 ];
 
-/// Returns the dot product with one of the gradients. Their ones and zeros take no branches.
+/// Returns the dot product with one of the gradients. Their coordinates are 1, -1 and 0, so that it takes no branches.
 fn gradient(hash: usize, v: DVec3) -> f64 {
     GRADIENTS[hash % GRADIENTS.len()].dot(v)
 }

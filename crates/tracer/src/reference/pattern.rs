@@ -1,6 +1,6 @@
 //! The coefficients of a surface at a point: patterns.
 //!
-//! Patterns are evaluated in the coordinates of the script, not of the world. A hit in the coordinates of the eye is
+//! Patterns are evaluated in the coordinates of the script, not of the world. So a hit in the coordinates of the eye is
 //! transformed back to them.
 
 use glam::DVec3;
@@ -12,8 +12,8 @@ use super::shapes::{Surface, face};
 use super::whole::{ceil, is_odd};
 use crate::pictures::factor;
 
-/// The distance below which a number of the script is on a wall between cells, relative to the larger of 1 and the
-/// number.
+/// The distance from a wall between cells below which a number of the script is on it, relative to the larger of 1 and
+/// the number.
 const WALL: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// Returns the coefficients of an object's surface.
@@ -40,7 +40,7 @@ pub(crate) fn coefficients(
     own.mixed(&pattern.other, weight(pattern.weight, place, face))
 }
 
-/// Returns the share of the other coefficients. A `face` is perpendicular to an axis, at a number of the script.
+/// Returns the share of the other coefficients. A `face` is perpendicular to an axis, at a coordinate of the script.
 fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
     let odd = |is_odd: bool| if is_odd { 1.0 } else { 0.0 };
     let cell = |axis: usize, size: f64| match face {
@@ -70,7 +70,7 @@ fn weight(weight: Weight, place: DVec3, face: Option<(usize, f64)>) -> f64 {
     }
 }
 
-/// Returns the cell of a number of the script, in units of cells. A number that is nearly on a wall is on it.
+/// Returns the cell of a number of the script, in units of cells. A number near a wall counts as on it.
 fn cell_of_number(x: f64) -> f64 {
     let whole = x.round();
     let x = if (x - whole).abs() <= WALL * x.abs().max(1.0) { whole } else { x };

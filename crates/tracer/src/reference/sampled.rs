@@ -34,7 +34,7 @@ struct Moment<'a> {
     bounces: u32,
 }
 
-/// Draws a scene with the samples of the kernels, and with the largest number of them in every pixel.
+/// Draws a scene with the samples of the kernels, and with the largest number of samples in every pixel.
 ///
 /// # Errors
 /// The errors of [`crate::render`].
@@ -69,8 +69,8 @@ pub(crate) fn render_rows(
     if is_cancelled(options) { Err(RenderError::Cancelled) } else { Ok(image) }
 }
 
-/// Returns the light of a scene, before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from the
-/// top. With one sample it is the light along the ray through the pixel's middle.
+/// Returns the light of a scene, before it becomes levels: three numbers from 0 to 1 for each pixel, row by row from
+/// the top. With one sample it is the light along the ray through the pixel's middle.
 ///
 /// # Errors
 /// The errors of [`crate::render`].
@@ -116,10 +116,11 @@ pub(crate) fn lit_rows(
     if is_cancelled(options) { Err(RenderError::Cancelled) } else { Ok(rows) }
 }
 
-/// Returns what a pixel shows, its colour clamped. Columns count from the left, rows from the top.
+/// Returns the colour and the clear share of a pixel, with the colour clamped. Columns count from the left, rows from
+/// the top.
 type Mean<'a> = dyn Fn(u32, u32) -> Seen + Sync + 'a;
 
-/// Calls `draw` with a function that gives the mean of a pixel, with the largest number of samples.
+/// Calls `draw` with a function that returns the mean of a pixel, with the largest number of samples.
 fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce(&Mean) -> T) -> T {
     let scene = exposure.scene();
     let samples = scene.samples.most();
@@ -158,7 +159,7 @@ fn with_pixels<T>(exposure: Exposure, options: &RenderOptions, draw: impl FnOnce
     })
 }
 
-/// Returns what is seen with a colour in 0..1. A NaN is black.
+/// Returns `Seen` with its colour clamped to 0..1. A NaN becomes black.
 fn clamped(Seen { color, clear }: Seen) -> Seen {
     Seen { color: DVec3::select(color.cmpgt(DVec3::ZERO), color.min(DVec3::ONE), DVec3::ZERO), clear }
 }
@@ -168,8 +169,9 @@ fn is_cancelled(options: &RenderOptions) -> bool {
 }
 
 impl Moment<'_> {
-    /// Returns what a sample of a pixel shows, its colour clamped unless light goes round. Rows count from the top. `number`
-    /// gives its coordinates, `choice` the numbers that decide which rays are followed.
+    /// Returns the colour and the clear share of a sample of a pixel. The colour is clamped unless surfaces light each
+    /// other. Rows count from the top. `number` returns the sample's coordinates, and `choice` the numbers that decide
+    /// which rays are followed.
     fn seen(
         &self,
         scene: &Scene,
@@ -193,7 +195,7 @@ impl Moment<'_> {
         if goes_round { seen } else { clamped(seen) }
     }
 
-    /// Returns the ray from a point of the lens through the point where the eye's own ray is in focus.
+    /// Returns the ray from a point of the lens through the point at which the eye's own ray is in focus.
     fn ray(&self, i: f64, j: f64, number: impl Fn(usize) -> f64) -> Ray {
         let World { scene, rays, .. } = &self.world;
         let ray = rays.ray(i, j);
@@ -227,7 +229,8 @@ type Numbers<'a> = (&'a dyn Fn(usize) -> f64, &'a dyn Fn(u32, Way) -> f64);
 /// An estimate of a picture before it is rounded: the means of independent samples.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// The means of the pixels, row by row from the top, in 0..1 unless light goes round, before [`rayfold_scene::Tone`].
+    /// The means of the pixels, row by row from the top, before [`rayfold_scene::Tone`]. They are in 0..1 unless
+    /// surfaces light each other.
     pub means: Vec<DVec3>,
     /// The standard errors of the means.
     pub errors: Vec<DVec3>,

@@ -17,13 +17,13 @@ use crate::sampling::guide::{Guide, Scattering};
 use crate::sampling::paths::{Way, scattered};
 use crate::sampling::rough::{Energies, Microfacets};
 
-/// The weight below which, in every channel, a ray is not followed once its path has met glass.
+/// The weight, in every channel, below which a ray is not followed once its path has hit glass.
 pub(crate) const FAINT: f64 = 1.0 / 4096.0;
 
 /// The limit of the weight for pictures of linear light, whose tone curve expands dark tones.
 pub(crate) const FAINT_LINEAR: f64 = 1.0 / 65536.0;
 
-/// Returns the share that fog leaves of what a ray brings over a length.
+/// Returns the share that fog leaves of a ray's light over a length.
 pub(crate) fn clearness(length: f64, distance: f64) -> f64 {
     libm::exp(-length / distance)
 }
@@ -34,16 +34,16 @@ pub(super) struct Shader<'a> {
     /// The sampled point of each light, as for [`arriving`].
     pub(super) lights: &'a [DVec3],
     pub(super) cancel: Option<&'a AtomicBool>,
-    /// The random numbers of paths, where light goes round.
+    /// The random numbers of paths, in scenes in which surfaces light each other.
     pub(super) paths: Option<PathNumbers<'a>>,
 }
 
 /// The random numbers of a path.
 #[derive(Clone, Copy)]
 pub(super) struct PathNumbers<'a> {
-    /// Returns the numbers of the direction after so many hits.
+    /// Returns the numbers of the direction after `hits` hits.
     pub(super) direction: &'a dyn Fn(u32) -> (f64, f64),
-    /// Returns the number that decides whether the path goes a way after so many hits.
+    /// Returns the number that decides whether the path continues in a way after `hits` hits.
     pub(super) choice: &'a dyn Fn(u32, Way) -> f64,
     /// The microfacets of rough objects.
     pub(super) energies: &'a Energies,
@@ -63,7 +63,7 @@ struct Path {
     hits: u32,
     /// The number of further diffuse reflections that are followed.
     scatters: u32,
-    /// The share of the pixel that stays clear if the ray reaches nothing; `None` for rays that see the surroundings.
+    /// The share of the pixel that stays clear if the ray hits nothing; `None` for rays that see the surroundings.
     clear: Option<f64>,
 }
 
@@ -72,7 +72,7 @@ struct Path {
 pub(super) struct Seen {
     /// The colour, unclamped.
     pub(super) color: DVec3,
-    /// The share of the ray that reaches nothing, straight or through glass, in a scene without background: 0 to 1.
+    /// The share of the ray that hits nothing, directly or through glass, in a scene without background: 0 to 1.
     pub(super) clear: f64,
 }
 
@@ -86,7 +86,7 @@ impl Shader<'_> {
         self.seen(ray, bounces).color
     }
 
-    /// Returns what a ray from the camera brings.
+    /// Returns the light of a ray from the camera.
     pub(super) fn seen(&self, ray: Ray, bounces: u32) -> Seen {
         let clear = self.world.scene.background.is_none().then_some(1.0);
         self.seen_along(
@@ -123,7 +123,7 @@ impl Shader<'_> {
         Seen { color: held(left * color + (1.0 - left) * fog), clear }
     }
 
-    /// Returns what a hit sends back along the ray.
+    /// Returns the light that a hit sends back along the ray.
     fn seen_at(&self, ray: Ray, hit: &Hit, path: Path) -> Seen {
         let world = self.world;
         let (object, place, local_normal) = world.in_script(hit.object, &hit.surface);
@@ -219,7 +219,7 @@ impl Shader<'_> {
         Seen { color, clear }
     }
 
-    /// Returns how rays go on from a smooth surface with this mirror coefficient.
+    /// Returns the rays that go on from a smooth surface with this mirror coefficient.
     fn onward_of_surface(&self, ray: Ray, hit: &Hit, mirror: DVec3, shading: Option<Shading>) -> Onward {
         let (object, within, is_flat) = self.side(hit, shading);
         let normal = shading.map_or(hit.surface.normal, |shading| shading.onward);
@@ -232,7 +232,7 @@ impl Shader<'_> {
         Onward { factor, mirrored: reflected(ray.direction, normal), refracted }
     }
 
-    /// Returns how rays go on from a microfacet with this normal.
+    /// Returns the rays that go on from a microfacet with this normal.
     fn onward_of_facet(
         &self,
         ray: Ray,
@@ -266,7 +266,8 @@ impl Shader<'_> {
         (object, within, !self.world.has_inside(hit.object, object))
     }
 
-    /// Returns the path of a ray with this factor, and the factor with which it counts; `None` if it is not followed.
+    /// Returns the path of a ray with this factor, and the factor with which the ray counts, or `None` if it is not
+    /// followed.
     fn sent(&self, path: Path, factor: DVec3, way: Way) -> Option<(Path, DVec3)> {
         let weight = held(path.weight * factor.abs());
         let faint = match self.world.scene.tone {
@@ -297,23 +298,24 @@ struct Onward {
     factor: DVec3,
     /// The direction of the mirrored ray.
     mirrored: DVec3,
-    /// The factor and the direction of the refracted ray, and the share of a pixel that it leaves clear; `None` at what is
-    /// opaque.
+    /// The factor and the direction of the refracted ray, and the share of a pixel that it leaves clear; `None` at an
+    /// opaque surface.
     refracted: Option<(DVec3, DVec3, f64)>,
 }
 
-/// Returns the share of what is behind glass that stays clear where nothing is reflected.
+/// Returns the share of the background behind glass that stays clear if nothing is reflected.
 fn clearness_of(glass: Glass) -> f64 {
     (glass.color().element_sum() / 3.0).clamp(0.0, 1.0)
 }
 
-/// Returns the mirrored direction. The normal faces the ray. If rounding has changed the sign, the ray grazes.
+/// Returns the mirrored direction. The normal faces the ray. If rounding has changed the sign of their dot product, the
+/// direction stays parallel to the surface.
 fn reflected(direction: DVec3, normal: DVec3) -> DVec3 {
     (direction - 2.0 * direction.dot(normal).min(0.0) * normal).normalize()
 }
 
-/// Returns where the shadow ray towards a light starts on a face with normals. A face that the start is lifted off can
-/// hide the light; a face that it starts on cannot.
+/// Returns the start of the shadow ray towards a light on a face with normals. A face that the start is lifted off can
+/// hide the light. A face that it starts on cannot.
 fn shadow_start(surface: &Surface, shading: Shading, towards: DVec3) -> DVec3 {
     let Surface { point, normal, offset, .. } = *surface;
     let is_lifted = shading.lift.dot(normal) > offset;
@@ -355,7 +357,7 @@ mod tests {
         scene
     }
 
-    /// Returns the colour along a ray that goes straight down from a height of 5.
+    /// Returns the colour along a ray straight down from a height of 5.
     fn down(scene: &Scene, x: f64) -> f64 {
         let ray = Ray { origin: DVec3::new(x, 5.0, 0.0), direction: DVec3::NEG_Y };
         let world = World::new(scene);

@@ -1,13 +1,13 @@
-//! Whole numbers in `f64`. On targets without an instruction for them, `floor` and the remainder are library calls,
-//! which this module avoids: patterns need some of each in every pixel.
+//! Integers in `f64`. On targets without an instruction for them, `floor` and the remainder are library calls. This
+//! module avoids these calls, because patterns need several in every pixel.
 
-/// The bound from which every number is whole.
+/// The bound from which on every number is an integer.
 const ALL_WHOLE: f64 = (1u64 << f64::MANTISSA_DIGITS) as f64;
 
-/// The bound from which every number is a multiple of 256.
+/// The bound from which on every number is a multiple of 256.
 const ALL_ROUND: f64 = 256.0 * ALL_WHOLE;
 
-/// Returns the largest whole number that is not larger.
+/// Returns the largest integer that is not larger than `x`.
 pub(super) fn floor(x: f64) -> f64 {
     if x.abs() < ALL_WHOLE {
         let towards_zero = x as i64 as f64;
@@ -17,12 +17,12 @@ pub(super) fn floor(x: f64) -> f64 {
     }
 }
 
-/// Returns the smallest whole number that is not smaller.
+/// Returns the smallest integer that is not smaller than `x`.
 pub(super) fn ceil(x: f64) -> f64 {
     -floor(-x)
 }
 
-/// Returns the remainder, from 0 to 255, of a whole number of any size and sign divided by 256; 0 for a NaN.
+/// Returns the remainder, from 0 to 255, of an integer of any size and sign divided by 256; 0 for a NaN.
 pub(super) fn remainder(whole: f64) -> u8 {
     if whole.abs() < ALL_ROUND { whole as i64 as u8 } else { 0 }
 }

@@ -1,5 +1,5 @@
-//! The windows of a room: the parts of the box around a scene's large objects through which the surroundings are seen. And what suns
-//! light through them.
+//! The windows of a room: the parts of the box around a scene's large objects through which the surroundings are seen.
+//! Also the places that suns light through them.
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
@@ -14,25 +14,26 @@ use crate::sampling::guide::Windows;
 use crate::sampling::sky_table::brightness;
 use crate::sampling::{coordinate, pixel_seed};
 
-/// The number of panes along an edge of the box, and of rays through each.
+/// The number of panes along an edge of the box, and of rays through each pane.
 const SIDE: usize = 8;
 const RAYS: u32 = 16;
 
-/// The largest number of objects that are looked at: the largest ones, which walls are.
+/// The largest number of objects that are considered. They are the largest ones, as walls are.
 const MAX_OBJECTS: usize = 32;
 
 /// The number of rays of a sun along an edge of a window.
 const SUN_RAYS: usize = 16;
 
-/// The part of the largest brightness from which on a pane counts.
+/// The share of the largest brightness from which on a pane counts as a window.
 const BRIGHT: f64 = 0.25;
 
-/// The largest part of the box that is open in a room. Elsewhere rays by the cosine find the surroundings as well.
+/// The largest share of the box that is open in a room. With a larger share, rays by the cosine find the surroundings
+/// as well.
 const MAX_OPEN: f64 = 0.05;
 
-/// Returns the windows of a scene; `None` if no ray is scattered, or if the scene is no room.
+/// Returns the windows of a scene, or `None` if no ray is scattered, or if the scene is no room.
 ///
-/// Meshes and glass are not looked at.
+/// Meshes and glass are ignored.
 pub(crate) fn windows(scene: &Scene) -> Option<Windows> {
     if scene.indirect_bounces() == 0 {
         return None;
@@ -58,7 +59,7 @@ pub(crate) fn windows(scene: &Scene) -> Option<Windows> {
     Some(Windows::new(room, found))
 }
 
-/// Returns the largest objects that are no meshes and no glass.
+/// Returns the largest objects that are neither meshes nor glass.
 fn walls(scene: &Scene) -> Vec<&Object> {
     let is_mesh = |object: &Object| match object {
         Object::Mesh(_) => true,
@@ -74,7 +75,7 @@ fn walls(scene: &Scene) -> Vec<&Object> {
     objects.into_iter().map(|(_, object)| object).collect()
 }
 
-/// Returns, for each face of a room, how bright each of its panes is, as seen from places in the room.
+/// Returns, for each face of a room, the brightness of each of its panes as seen from places in the room.
 fn brightness_of_faces(scene: &Scene, walls: &[&Object], room: [DVec3; 2]) -> Vec<Vec<f64>> {
     let panorama = Panorama::of(scene);
     let along = |origin: DVec3, through: DVec3| {
@@ -129,7 +130,7 @@ fn joined(face: usize, panes: &[f64], least: f64, room: [DVec3; 2]) -> Vec<(f64,
     found
 }
 
-/// Adds what suns light of the walls through a window, of which two opposite corners are given.
+/// Adds the parts of walls that suns light through the window with these opposite corners.
 fn add_sun_patches(scene: &Scene, walls: &[&Object], [low, high]: [DVec3; 2], found: &mut Vec<Bright>) {
     let [across, down] = sides_of([low, high]).map(|side| side / SUN_RAYS as f64);
     let on_window = |[column, row]: [f64; 2]| low + column * across + row * down;
@@ -171,9 +172,9 @@ fn nearest(walls: &[&Object], ray: Ray) -> Option<(usize, f64)> {
 /// The part of a wall that a sun lights through a window.
 struct SunPatch {
     wall: usize,
-    /// Where its first ray hits.
+    /// The surface at the hit of its first ray.
     surface: Surface,
-    /// The columns and rows of the window through which its rays come: the first ones, and the last ones.
+    /// The first and the last column and row of the window through which its rays come.
     ends: [[usize; 2]; 2],
     /// A box around the hits.
     bounds: [DVec3; 2],
@@ -197,7 +198,7 @@ impl SunPatch {
         self.rays += 1;
     }
 
-    /// Returns it as a parallelogram on a flat surface, and as a box around it on others.
+    /// Returns it as a parallelogram on a flat surface, and otherwise as a box around it.
     fn bright(&self, along: DVec3, on_window: impl Fn([f64; 2]) -> DVec3) -> Option<Bright> {
         let Surface { point, normal, flat, .. } = self.surface;
         if !flat {
@@ -267,8 +268,8 @@ Box -2.2 1 .5 -2 2 2 white
 ";
     const PLACE: DVec3 = DVec3::new(0.7, 2.9, 0.3);
 
-    /// The light below the ceiling from the part of the floor in which `x` is, by rays with and without a guide: the mean, and the
-    /// deviation of one ray.
+    /// Returns the light below the ceiling from the part of the floor with an x in the range `x`, by rays with and
+    /// without a guide: the mean, and the standard deviation of one ray.
     fn light_from_floor(rest: &str, x: [f64; 2]) -> [(f64, f64); 2] {
         let text = format!("{ROOM}{rest}Trace\n");
         let scene = parse("a.txt", text.as_bytes(), &Limits::default()).script.unwrap().frame(0).unwrap();

@@ -88,7 +88,7 @@ impl<'a> World<'a> {
         self.lights.iter().map(|light| lights::shape(light).middle()).collect()
     }
 
-    /// Returns the light that comes from where a ray goes that hits nothing.
+    /// Returns the light of the surroundings in the direction of a ray that hits nothing.
     pub(super) fn around(&self, direction: DVec3) -> DVec3 {
         match &self.panorama {
             Some(panorama) => panorama.along(direction),
@@ -96,7 +96,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Returns what a face of a mesh adds to the surface of a hit.
+    /// Returns the data that a face of a mesh adds to the surface of a hit.
     pub(super) fn shading(&self, hit: &Hit, direction: DVec3) -> Option<Shading> {
         let Surface { point, normal: face, .. } = hit.surface;
         let material = self.scene.objects[hit.object].material();
@@ -104,7 +104,7 @@ impl<'a> World<'a> {
         self.faces?.shading(hit.object as f64, material, at)
     }
 
-    /// Returns whether an object, which is no instance, is a body that glass fills.
+    /// Returns whether an object that is not an instance is a body that glass fills.
     pub(super) fn has_inside(&self, order: usize, object: &Object) -> bool {
         shapes::has_inside(object) || self.faces.is_some_and(|faces| faces.is_filled(order))
     }
@@ -149,7 +149,8 @@ const PARALLEL: f64 = 1.0 / (1u64 << 20) as f64;
 /// The distance, relative to the numbers in the computation, above which hits are not compared further.
 const APART: f64 = 1.0 / (1u64 << 30) as f64;
 
-/// Returns the distance to the nearest hit of a ray with an object, of which `index` is the position; none in the hole of a face.
+/// Returns the distance to the nearest hit of a ray with the object at position `index`. There is no hit in the hole of
+/// a face.
 fn distance(
     object: &Object,
     ray: Ray,

@@ -1,4 +1,4 @@
-//! Bright things as surfaces see them: balls, flat panes, and boxes and rods in which there is something bright.
+//! Bright objects as surfaces see them: balls, flat panes, and boxes and rods that contain something bright.
 
 #![expect(clippy::needless_range_loop, reason = "lanes of several columns, which become packets")]
 
@@ -9,10 +9,10 @@ use rayfold_scene::{Object, Outline};
 
 use super::places::{in_cone, on_disc};
 
-/// The largest number of things that are bright. Each is asked for at each hit.
+/// The largest number of bright objects. Each is tested at each hit.
 const MAX_COUNT: usize = 16;
 
-/// Faces of a box that are smaller parts of the largest one are left out.
+/// The share of the largest face of a box below which a face is left out.
 const SMALL_FACE: f64 = 1.0 / 64.0;
 
 /// Something bright.
@@ -29,7 +29,7 @@ enum Form {
         radius: f64,
     },
     Pane(Pane),
-    /// A box along the axes that holds it.
+    /// A box along the axes that contains it.
     Within([DVec3; 2]),
     Rod {
         ends: [DVec3; 2],
@@ -44,14 +44,14 @@ struct Pane {
     origin: DVec3,
     /// Vectors in the plane: the radii of a disc, and the sides at the origin of others.
     sides: [DVec3; 2],
-    /// Their products with a vector in the plane are its parts of the sides.
+    /// The dot products of these with a vector in the plane are the vector's coordinates along the sides.
     parts: [DVec3; 2],
     normal: DVec3,
     area: f64,
     middle: DVec3,
-    /// No point is farther from the middle.
+    /// The distance of the farthest point from the middle.
     radius: f64,
-    /// Whether it is not seen from behind.
+    /// Whether only its front is seen.
     is_closed: bool,
 }
 
@@ -90,7 +90,7 @@ impl Pane {
 }
 
 impl Bright {
-    /// Adds what is bright of an object to `found`.
+    /// Adds the bright parts of an object to `found`.
     pub(crate) fn add_object(object: &Object, brightness: f64, found: &mut Vec<Self>) {
         let mut add = |form| found.push(Self { brightness, form });
         match object.outline() {
@@ -123,13 +123,13 @@ impl Bright {
         }
     }
 
-    /// Returns a rectangle of which two opposite corners are given. It is flat along an axis.
+    /// Returns the rectangle with these opposite corners. It is flat along an axis.
     pub(crate) fn rectangle(brightness: f64, corners: [DVec3; 2]) -> Option<Self> {
         let pane = Pane::new(Edge::Rectangle, corners[0], sides_of(corners), false)?;
         Some(Self { brightness, form: Form::Pane(pane) })
     }
 
-    /// Returns a parallelogram of which a corner and the sides there are given. It is seen from where its normal points.
+    /// Returns the parallelogram with this corner and the sides there. It is seen from the side of its normal.
     pub(crate) fn parallelogram(
         brightness: f64,
         origin: DVec3,
@@ -145,7 +145,7 @@ impl Bright {
         Self { brightness, form: Form::Within(bounds) }
     }
 
-    /// Returns about how much light it gives off.
+    /// Returns the approximate power of its light.
     pub(crate) fn power(&self) -> f64 {
         self.brightness
             * match self.form {
@@ -156,7 +156,8 @@ impl Bright {
             }
     }
 
-    /// Returns how much light is at stake in its halves, and these, if it is long; 0 for what is short.
+    /// Returns a measure of the light that a division into halves affects, and the halves, if it is long. The measure
+    /// is 0 for a short one.
     fn halves(&self) -> (f64, [Self; 2]) {
         let with = |forms: [Form; 2]| forms.map(|form| Self { form, ..*self });
         let (length, width, halves) = match self.form {
@@ -246,7 +247,7 @@ pub(crate) fn sides_of([low, high]: [DVec3; 2]) -> [DVec3; 2] {
     [1, 2].map(|k| DVec3::AXES[(flat + k) % 3] * sides)
 }
 
-/// Returns the faces of a box, their normals outwards.
+/// Returns the faces of a box. Their normals point outwards.
 fn faces([low, high]: [DVec3; 2]) -> Vec<Pane> {
     let sides = high - low;
     let face = |face: usize| {
@@ -267,7 +268,7 @@ pub(crate) fn half_area([low, high]: [DVec3; 2]) -> f64 {
     x * y + y * z + z * x
 }
 
-/// Returns the brightest things of all, with long ones in parts.
+/// Returns the brightest of all, with long ones divided into parts.
 pub(crate) fn brightest(mut all: Vec<Bright>) -> Vec<Bright> {
     // The ones to find are those that give most light.
     all.sort_by(|a, b| b.power().total_cmp(&a.power()));
@@ -286,7 +287,7 @@ pub(crate) fn brightest(mut all: Vec<Bright>) -> Vec<Bright> {
     all
 }
 
-/// Vectors, each axis a column.
+/// Vectors, with an array for each axis.
 pub(crate) type Places<const N: usize> = [[f64; N]; 3];
 
 /// Returns one of the vectors.
@@ -305,14 +306,15 @@ fn places<const N: usize>(place: impl Fn(usize) -> DVec3) -> Places<N> {
     all
 }
 
-/// Something bright, as some surfaces see it.
+/// A bright object, as some surfaces see it.
 pub(crate) struct Seen<const N: usize> {
-    /// The light that it gives each surface, about. It is 0 for what the surface is in, or what is behind one of the two.
+    /// The approximate light that it gives each surface. It is 0 if the surface is inside it, or if one of the two is
+    /// behind the other.
     pub(super) weight: [f64; N],
-    /// The weight in a unit of solid angle of a cone, and of area of a pane.
+    /// The weight per unit of solid angle for a cone, and per area for a pane.
     scale: [f64; N],
-    /// Of a pane: its origin, from the place, and the distance of its plane from the place, along its normal. Of others: the axis of
-    /// a cone around it, and 1 - cos of half of its angle.
+    /// For a pane: its origin relative to the place, and the distance of its plane from the place along its normal. For
+    /// others: the axis of a cone around it, and 1 - cos of the cone's half angle.
     view: [[f64; N]; 4],
 }
 
@@ -326,7 +328,7 @@ impl<const N: usize> Seen<N> {
         }
     }
 
-    /// Leaves out the surfaces for which `is_kept` is false.
+    /// Excludes the surfaces for which `is_kept` is false.
     #[inline(always)]
     pub(super) fn keep(&mut self, is_kept: &[bool; N]) {
         for k in 0..N {
@@ -341,7 +343,7 @@ impl<const N: usize> Seen<N> {
         (DVec3::new(x, y, z), last)
     }
 
-    /// Adds the density of directions towards it, times the weight. `bright` is what is seen.
+    /// Adds the density of directions towards it, times the weight. `bright` is the object that is seen.
     #[inline(always)]
     pub(super) fn add_density(&self, bright: &Bright, directions: &Places<N>, sums: &mut [f64; N]) {
         // A little more, for the rounding of directions to an edge.
@@ -369,7 +371,8 @@ impl<const N: usize> Seen<N> {
         }
     }
 
-    /// Adds those of a pane. `holds` says whether a place is on it, by the parts of its sides.
+    /// Adds the density for a pane. `holds` returns whether a place is on it, by the place's coordinates along the
+    /// sides.
     #[inline(always)]
     fn add_of_pane(
         &self,
@@ -389,7 +392,8 @@ impl<const N: usize> Seen<N> {
         }
     }
 
-    /// Returns the directions of two numbers from 0 to 1 towards it, for each surface. `bright` is what is seen.
+    /// Returns the directions towards it for two numbers from 0 to 1, for each surface. `bright` is the object that is
+    /// seen.
     #[inline(always)]
     pub(super) fn towards(&self, bright: &Bright, numbers: &[[f64; N]; 2]) -> Places<N> {
         match &bright.form {
@@ -411,7 +415,7 @@ impl<const N: usize> Seen<N> {
         }
     }
 
-    /// Returns those towards a pane. `point` gives the parts of its sides that two numbers stand for.
+    /// Returns the directions towards a pane. `point` returns the coordinates along the sides for two numbers.
     #[inline(always)]
     fn towards_pane(
         &self,
@@ -432,7 +436,7 @@ mod tests {
 
     use super::*;
 
-    /// The solid angle of what is bright, by directions towards it and by all directions.
+    /// Returns the solid angle of bright objects, computed by directions towards them and by all directions.
     fn solid_angles(all: &[Bright], place: DVec3, normal: DVec3) -> (f64, f64) {
         let column = |v: DVec3| v.to_array().map(|x| [x]);
         let seen: Vec<_> = all.iter().map(|one| one.seen(&column(place), &column(normal))).collect();

@@ -1,20 +1,20 @@
 //! A density of directions, in cells on the six faces of a cube.
 //!
-//! A direction is found on a cube by one division, and has its density by one root.
+//! A direction is located on a cube by one division, and its density takes one square root.
 
 use glam::DVec3;
 
 /// The parts along an edge of a cell that is divided.
 const PARTS: usize = 8;
 
-/// A density of directions that is even in each cell of the cube, and in each part of some cells.
+/// A density of directions that is constant in each cell of the cube, or in each part of a divided cell.
 #[derive(Clone, Debug)]
 pub(crate) struct CubeTable {
     /// The cells along an edge of the cube.
     side: usize,
     /// The share of all cells before each cell, and 1.
     before: Vec<f64>,
-    /// The first cell to look at for numbers in each of equal parts from 0 to 1.
+    /// The first cell to search for a number, for each of equal intervals of 0 to 1.
     first: Vec<u32>,
     /// For each cell, one more than its place in `parts_before`; 0 for cells that are not divided.
     divided: Vec<u16>,
@@ -22,14 +22,15 @@ pub(crate) struct CubeTable {
     parts_before: Vec<[f64; PARTS * PARTS + 1]>,
 }
 
-/// Returns the sum of the weights before each one, of their total, and 1.
+/// Returns the sum of the weights before each one as a share of their total, and 1.
 fn shares_before(weights: &[f64]) -> impl Iterator<Item = f64> {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
     weights.iter().map(move |&of| (sum / total, sum += of).0).chain([1.0])
 }
 
-/// Returns the interval of such sums in which a number from 0 to 1 is, and its place there. It is not before `first`.
+/// Returns the interval of such sums that contains a number from 0 to 1, and the number's place in it. The interval is
+/// not before `first`.
 fn interval(before: &[f64], first: usize, u: f64) -> (usize, f64) {
     let mut at = first;
     while at + 2 < before.len() && before[at + 1] <= u {
@@ -40,8 +41,8 @@ fn interval(before: &[f64], first: usize, u: f64) -> (usize, f64) {
 }
 
 impl CubeTable {
-    /// Makes a table of cells with these weights, of which not all are 0. At most `divided` cells, those with the largest weights,
-    /// and those beside them are divided: `weight` gives the weight of a direction for each unit of solid angle.
+    /// Makes a table of cells with these weights, not all 0. At most `divided` cells, those with the largest weights,
+    /// and their neighbours are divided. `weight` returns the weight of a direction per unit of solid angle.
     pub(crate) fn new(
         side: usize,
         mut cells: Vec<f64>,
@@ -94,7 +95,7 @@ impl CubeTable {
         share * (before[part + 1] - before[part]) * (PARTS * PARTS) as f64 / solid
     }
 
-    /// Returns the direction of two numbers from 0 to 1.
+    /// Returns the direction for two numbers from 0 to 1.
     pub(crate) fn direction(&self, u: f64, v: f64) -> DVec3 {
         let first = self.first[(u * (self.first.len() - 1) as f64) as usize];
         let (cell, u) = interval(&self.before, first as usize, u);
@@ -110,14 +111,14 @@ impl CubeTable {
     }
 }
 
-/// Returns a cell and those that touch it.
+/// Returns a cell and its neighbours.
 fn around(side: usize, cell: usize) -> impl Iterator<Item = u32> {
     let beside = [-0.01, 0.5, 1.01];
     let places = beside.into_iter().flat_map(move |v| beside.map(|u| [u, v]));
     places.map(move |place| self::cell(within(side, cell, place).0, side).0 as u32)
 }
 
-/// Returns the weights of the parts of a cell: the mean of those of their corners and middles.
+/// Returns the weights of the parts of a cell: the means of those at their corners and centres.
 fn weights_of_parts(side: usize, cell: usize, weight: &impl Fn(DVec3) -> f64) -> Vec<f64> {
     let at = |column: f64, row: f64| within(side, cell, [column, row].map(|place| place / PARTS as f64));
     let corners: Vec<f64> = (0..(PARTS + 1) * (PARTS + 1))
@@ -133,18 +134,19 @@ fn weights_of_parts(side: usize, cell: usize, weight: &impl Fn(DVec3) -> f64) ->
     (0..PARTS * PARTS).map(of_part).collect()
 }
 
-/// Returns the solid angle that a cell would have if all of it were like the place (s, t) on its face.
+/// Returns the solid angle that a cell would have if all of it were as at the place (s, t) on its face.
 fn solid_angle(side: usize, [s, t]: [f64; 2]) -> f64 {
     let stretch = 1.0 + s * s + t * t;
     4.0 / ((side * side) as f64 * stretch * stretch.sqrt())
 }
 
-/// Returns the number of the cell, of so many along an edge, of a place from -1 to 1.
+/// Returns the number of the cell at a place from -1 to 1, for `cells` cells along an edge.
 fn place(at: f64, side: usize) -> usize {
     ((0.5 * (at + 1.0) * side as f64) as usize).min(side - 1)
 }
 
-/// Returns the cell of a direction, of so many along an edge, and its place on the face, from -1 to 1.
+/// Returns the cell of a direction, for `cells` cells along an edge, and the direction's place on the face, from -1
+/// to 1.
 pub(crate) fn cell(direction: DVec3, side: usize) -> (usize, [f64; 2]) {
     let size = direction.abs();
     let (axis, [major, s, t]) = if size.x >= size.y && size.x >= size.z {

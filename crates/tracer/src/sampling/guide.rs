@@ -1,12 +1,13 @@
-//! A guide of scattered rays to bright light: to what glows, to windows, and to the bright parts of a sky's picture.
+//! Guides scattered rays to bright light: to glowing surfaces, to windows, and to the bright parts of a sky's picture.
 //!
-//! Chance alone rarely finds a small pane that glows, or the sun of a sky. So beside the ray that a surface scatters by the cosine,
-//! another one is aimed at these. Each of the two counts for the density that the language asks for, divided by the sum of the
-//! densities of both ways of drawing: the balance heuristic of Veach and Guibas (1995). The expectation stays as it is, and no ray
-//! counts for more than it would without a guide.
+//! Random directions rarely hit a small pane that glows, or the sun of a sky. So a surface scatters two rays: one drawn
+//! by the cosine, and one aimed at bright light. Each of the two counts with the density that the language defines,
+//! divided by the sum of the densities of both ways of drawing: the balance heuristic of Veach and Guibas (1995). The
+//! expectation stays the same, and no ray counts for more than it would without a guide.
 //!
-//! Cones around boxes hold what glows, and the windows of a room. The sky is drawn by a table of how much brighter than the
-//! mean it is, since the cosine finds the rest as well (Karlík, Šik, Vévoda, Skřivan and Křivánek, 2019).
+//! Glowing objects and the windows of a room are aimed at by cones around boxes. The sky is sampled by a table of its
+//! brightness above the mean, because the cosine samples the rest as well (Karlík, Šik, Vévoda, Skřivan and Křivánek,
+//! 2019).
 
 #![expect(clippy::needless_range_loop, reason = "lanes of several columns, which become packets")]
 
@@ -20,31 +21,32 @@ use super::bright::{Bright, Places, Seen, at, brightest};
 use super::sky_table::{SkyTable, brightness};
 use crate::pictures::Panorama;
 
-/// The part of the light from all around that is weighed against what is bright. Walls often keep most of it out.
+/// The share of the light from all around that is compared with the bright light. Walls often keep out most of the
+/// light from all around.
 const OPENNESS: f64 = 0.2;
 
-/// From so large a part of all light on, what is bright is always aimed at.
+/// The share of all light from which on rays are always aimed at the bright light.
 const BRIGHT: f64 = 0.4;
 
 /// The bright light of a scene at a moment.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
-    /// Glowing things, and after them the windows.
+    /// Glowing objects, and after them the windows.
     lights: Vec<Bright>,
     /// The number of those that glow.
     glowing: usize,
     /// The box in which windows are seen.
     room: Option<[DVec3; 2]>,
     sky: Option<(Arc<SkyTable>, Panorama)>,
-    /// The light that the bright parts of the sky give a surface, about.
+    /// The approximate light of the bright parts of the sky at a surface.
     sky_weight: f64,
-    /// The light that a surface gets from all around, about.
+    /// The approximate light from all around at a surface.
     around: f64,
 }
 
 impl Guide {
-    /// Returns the guide of each moment of a scene; `None` if nothing is bright, or if no ray is scattered. `windows` are those of
-    /// the first moment.
+    /// Returns the guide of each moment of a scene, or `None` if nothing is bright, or if no ray is scattered.
+    /// `windows` are those of the first moment.
     pub(crate) fn of(moments: &[Scene], windows: Option<Windows>) -> Vec<Option<Self>> {
         let of = |scene: &Scene| {
             if scene.indirect_bounces() == 0 {
@@ -76,8 +78,8 @@ impl Guide {
         Self { lights, glowing, room: windows.map(|windows| windows.room), sky, sky_weight, around }
     }
 
-    /// Returns the rays that surfaces scatter: besides those by the cosine others towards light, and the factors with which they count.
-    /// `seen` is room to work in.
+    /// Returns the rays that surfaces scatter: those by the cosine, those aimed at light, and the factors with which
+    /// both count. `seen` is working memory.
     #[inline(always)]
     pub(crate) fn scattered<const N: usize>(
         &self,
@@ -116,7 +118,7 @@ impl Guide {
         Aimed { directions: aimed, factors }
     }
 
-    /// Finds how surfaces see each of the lights. Returns about the light that they get from all.
+    /// Finds how surfaces see each of the lights. Returns the approximate light that they get from all of them.
     #[inline(always)]
     fn see<const N: usize>(&self, hits: &Scattering<N>, seen: &mut Vec<Seen<N>>) -> [f64; N] {
         seen.clear();
@@ -146,8 +148,8 @@ impl Guide {
         core::array::from_fn(|k| self.sky_weight + from_glowing[k] + from_windows[k])
     }
 
-    /// Returns for each direction the sum of the densities of the ways to aim there, each times its weight. Those that are not wanted
-    /// are of no use.
+    /// Returns, for each direction, the sum of the densities with which it can be aimed at, each times its weight.
+    /// Results for directions that are not wanted are undefined.
     #[inline(always)]
     fn weighted_densities<const N: usize>(
         &self,
@@ -167,7 +169,8 @@ impl Guide {
         sums
     }
 
-    /// Returns the directions of surfaces towards light, of those that are aimed. The sums are below those of all weights.
+    /// Returns the directions towards light of the surfaces that aim. The sums choose the lights, and are below those
+    /// of all weights.
     #[inline(always)]
     fn towards_light<const N: usize>(
         &self,
@@ -220,7 +223,7 @@ impl Guide {
 
 /// Hits at which light is scattered.
 pub(crate) struct Scattering<const N: usize> {
-    /// Whether there is a hit. What the others get is of no use.
+    /// Whether there is a hit. Results for other lanes are undefined.
     pub(crate) is_hit: [bool; N],
     /// The numbers of the directions.
     pub(crate) numbers: [[f64; N]; 2],
@@ -254,7 +257,7 @@ impl Scattering<1> {
 /// Rays that are aimed at light.
 pub(crate) struct Aimed<const N: usize> {
     pub(crate) directions: Places<N>,
-    /// The factors with which the rays by the cosine count, and these. They are 0 for a ray that is none.
+    /// The factors with which the rays by the cosine count, and the aimed ones. The factor is 0 if there is no ray.
     pub(crate) factors: [[f64; N]; 2],
 }
 

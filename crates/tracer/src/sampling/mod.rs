@@ -1,9 +1,11 @@
-//! Where the rays of a pixel go when a pixel is a mean: which point of its square, of the lens, of the lights, and when.
+//! The points of the rays of a pixel that is a mean: a point of its square, of the lens and of each light, and a
+//! moment.
 //!
-//! Each of these takes one to three dimensions of a [sequence](sobol) that fills the cube of all of them evenly, another
-//! arrangement for each pixel, so that neighbours err independently. A point depends on column, row, and number of the sample
-//! alone: what stands still from frame to frame does not flicker. [`places`] maps numbers to places, [`film`] sums
-//! up and says where more rays are due. Nothing here knows how rays are traced.
+//! Each of these takes one to three dimensions of a [sequence](sobol) that fills the cube of all of them evenly. Each
+//! pixel has its own arrangement of the sequence, so that the errors of neighbours are independent. A point depends
+//! only on the column, the row and the number of the sample, so parts that do not move from frame to frame do not
+//! flicker. [`places`] maps numbers to places. [`film`] sums samples and decides which pixels need more. This module
+//! does not depend on how rays are traced.
 
 pub(crate) mod bright;
 pub(crate) mod cube_table;
@@ -18,26 +20,27 @@ mod sobol;
 
 use rayfold_scene::{Camera, Light, Scene};
 
-/// Dimensions of the pixel's square, which come first: every picture has them.
+/// The number of dimensions of the pixel's square. They come first, because every picture has them.
 const SQUARE: usize = 2;
 
-/// Which dimensions stand for what; what a scene does not have takes none, so that those of low numbers, which are the
-/// most even, are put to use.
+/// The dimensions of each feature. A feature that a scene lacks takes none, so that the lowest dimensions, which are
+/// the most even, are used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Dimensions {
-    /// The first of three (a lamp) or two (a sun) for each light that has an extent, in the order of the script.
+    /// For each light with an extent, the first of its dimensions: three of a lamp, two of a sun, in the order of the
+    /// script.
     pub(crate) lights: Vec<Option<usize>>,
     /// The first of two.
     pub(crate) lens: Option<usize>,
     pub(crate) time: Option<usize>,
-    /// How many there are.
+    /// The number of dimensions.
     count: usize,
     /// The number of directions that paths draw after scattering hits, two dimensions each.
     directions: usize,
 }
 
 impl Dimensions {
-    /// Those of scenes that are the same one at several moments; it has a time if there is more than one.
+    /// Returns the dimensions for a scene at these moments. There is a time if there is more than one moment.
     pub(crate) fn new(moments: &[Scene]) -> Self {
         let lights = moments.iter().map(|scene| scene.lights.len()).max().unwrap_or(0);
         let mut count = SQUARE;
@@ -54,18 +57,18 @@ impl Dimensions {
     }
 }
 
-/// Whether rays start in more than one point of a lens.
+/// Returns whether rays start in more than one point of a lens.
 pub(crate) fn has_lens(scene: &Scene) -> bool {
     scene.lens.radius() > 0.0 && scene.camera != Camera::Orthographic
 }
 
-/// What a pixel's points are made from.
+/// Returns the seed of a pixel's points.
 #[inline(always)]
 pub(crate) const fn pixel_seed(column: u32, row: u32) -> u32 {
     sobol::mixed(column ^ sobol::mixed(row ^ 0x9e37_79b9))
 }
 
-/// The coordinate of a sample along a dimension, above 0 and below 1.
+/// Returns the coordinate of a sample along a dimension, above 0 and below 1.
 pub(crate) fn coordinate(pixel_seed: u32, sample: u32, dimension: usize) -> f64 {
     unit(sobol::scrambled(reversed(pixel_seed, sample, dimension), seed(pixel_seed, dimension)))
 }
@@ -80,7 +83,8 @@ fn independent(pixel_seed: u32, sample: u32, dimension: usize) -> f64 {
     unit(sobol::mixed(seed(pixel_seed, dimension) ^ sobol::mixed(sample.wrapping_add(0x51ed_270b))))
 }
 
-/// Dimensions without numbers of their own use those of others, the samples in another order.
+/// Returns the point of a sample along a dimension, before it is scrambled, as 32 bits in reverse order. Dimensions
+/// without numbers of their own use those of others, with the samples in another order.
 fn reversed(pixel_seed: u32, sample: u32, dimension: usize) -> u32 {
     let set = (dimension / sobol::OWN) as u32;
     let sample = if set == 0 {
@@ -97,28 +101,28 @@ const fn seed(pixel_seed: u32, dimension: usize) -> u32 {
     sobol::mixed(pixel_seed.wrapping_add((dimension as u32 + 1).wrapping_mul(0x9e37_79b9)))
 }
 
-/// The middle of the cell that 32 bits in reverse order name.
+/// Returns the middle of the cell that 32 bits in reverse order denote.
 #[inline(always)]
 const fn unit(reversed: u32) -> f64 {
     (reversed.reverse_bits() as f64 + 0.5) * (1.0 / 4_294_967_296.0)
 }
 
-/// How the points of samples are arranged; but for measurements the default.
+/// The arrangement of the points of samples. All but the default are for measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampler {
-    /// Sobol's sequence in all dimensions, scrambled as Owen does.
+    /// Sobol's sequence in all dimensions, with Owen scrambling.
     #[default]
     Sobol,
     /// Its first two dimensions for each pair of dimensions, in another order for each.
     Pairs,
     /// Each for itself.
     Independent,
-    /// The default, with points of other pixels: a truth that shares none with a picture.
+    /// The default, with the points of other pixels: a ground truth that shares no points with a picture.
     Others(u8),
 }
 
 impl Sampler {
-    /// Added to the column of a pixel, whose points it has then.
+    /// Returns the number that is added to the column of a pixel to find the pixel whose points are used.
     const fn aside(self) -> u32 {
         match self {
             Self::Sobol | Self::Pairs | Self::Independent => 0,
@@ -127,14 +131,14 @@ impl Sampler {
     }
 }
 
-/// Samples whose coordinates are asked for at once, at most.
+/// The largest number of samples whose coordinates are computed at once.
 pub(crate) const BATCH: usize = 256;
 
 /// The points of samples, before they are scrambled: the same for all pixels.
 #[derive(Debug)]
 pub(crate) struct Points {
     sampler: Sampler,
-    /// Of the pixels whose points are taken: so many columns.
+    /// The number of columns between a pixel and the one whose points it uses.
     aside: u32,
     first: u32,
     /// A row for each dimension.
@@ -142,20 +146,20 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Those of the samples from `first` on, up to `end`.
+    /// Makes the points of the samples from `first` up to `end`.
     pub(crate) fn new(dimensions: &Dimensions, sampler: Sampler, first: u32, end: u32) -> Self {
         let own = (dimensions.count + 2 * dimensions.directions).min(sobol::OWN);
         let row = |dimension| (first..end).map(|sample| sobol::reversed(sample, dimension)).collect();
         Self { sampler, aside: sampler.aside(), first, rows: (0..own).map(row).collect() }
     }
 
-    /// Returns the number from which the points of a pixel are made.
+    /// Returns the seed of a pixel's points.
     #[inline(always)]
     pub(crate) const fn pixel_seed(&self, column: u32, row: u32) -> u32 {
         pixel_seed(column.wrapping_add(self.aside), row)
     }
 
-    /// The coordinate of a sample of a pixel along a dimension.
+    /// Returns the coordinate of a sample of a pixel along a dimension.
     #[inline(always)]
     pub(crate) fn coordinate(&self, dimension: usize, pixel_seed: u32, sample: u32) -> f64 {
         match self.sampler {
@@ -165,7 +169,7 @@ impl Points {
         }
     }
 
-    /// The coordinates of at most [`BATCH`] samples of pixels along a dimension: those of [`coordinate`].
+    /// Computes the coordinates of at most [`BATCH`] samples of pixels along a dimension, as [`coordinate`] does.
     #[inline(always)]
     pub(crate) fn coordinates(
         &self,
@@ -256,8 +260,8 @@ mod tests {
         }
     }
 
-    /// The error of the mean of a discontinuous function falls faster than that of independent points: slope -1/2 would
-    /// be a wrong shuffle.
+    /// The error of the mean of a discontinuous function falls faster than with independent points. A slope of -1/2
+    /// would mean a wrong shuffle.
     #[test]
     fn errors_of_edges_fall_with_the_slope_of_nets() {
         let error = |samples: u32| {

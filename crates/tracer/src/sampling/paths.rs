@@ -1,8 +1,8 @@
-//! Paths of light: where rays go from a surface, and which of them are followed.
+//! Paths of light: the directions in which rays go on from a surface, and the choice of rays that are followed.
 //!
-//! If light goes round, a hit can send on several rays, and no ray is left out because its factor is small. A ray whose
-//! factor is small is followed with a chance in proportion, and counts for more then. So the expectation is exact, and a
-//! sample has a bounded number of rays.
+//! In scenes in which surfaces light each other, a hit can send on several rays, and no ray is dropped because its
+//! factor is small. A ray with a small factor is followed with a chance in proportion to it, and counts for more then.
+//! So the expectation is exact, and the number of rays of a sample is bounded.
 
 use glam::DVec3;
 
@@ -22,7 +22,7 @@ impl Way {
     /// The number of ways.
     pub(crate) const COUNT: usize = 3;
 
-    /// The factor below which a ray is followed with a chance only. A power of two.
+    /// The factor below which a ray is followed only with a chance. It is a power of two.
     const fn enough(self) -> f64 {
         match self {
             Self::Mirrored | Self::Refracted => 1.0 / 32.0,
@@ -55,8 +55,8 @@ pub(crate) const fn choice_dimension(hits: u32, way: Way) -> usize {
     0x2000 + Way::COUNT * hits as usize + way as usize
 }
 
-/// Returns a unit vector on the side of `normal`, with a density in proportion to the cosine between the two. `u` and `v` are
-/// its random numbers, from 0 to 1. A vector that is below the `face` is mirrored to above it.
+/// Returns a unit vector on the side of `normal`, with a density in proportion to the cosine of the angle between them.
+/// `u` and `v` are its random numbers, from 0 to 1. A vector below the `face` is mirrored to above it.
 #[inline(always)]
 pub(crate) fn scattered((u, v): (f64, f64), normal: DVec3, face: DVec3) -> DVec3 {
     let at = on_disc(u, v);

@@ -1,10 +1,10 @@
-//! From numbers in a cube to places: all of these maps take equal volumes to equal areas or volumes.
+//! Maps from numbers in a cube to places. All of them map equal volumes to equal areas or volumes.
 
 use glam::{DVec2, DVec3};
 
-/// A point of the disc of radius 1, by the map of Shirley and Chiu (1997), which keeps squares compact.
+/// Returns a point of the disc of radius 1, by the map of Shirley and Chiu (1997), which keeps squares compact.
 ///
-/// Both numbers lie between 0 and 1, and not both at the middle.
+/// Both numbers are between 0 and 1, and not both in the middle.
 #[inline(always)]
 pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
@@ -16,7 +16,8 @@ pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
     if is_wide { DVec2::new(cosine, sine) } else { DVec2::new(sine, cosine) }
 }
 
-/// A unit vector in a cone around z, uniform in its solid angle; `spread` is 1 - cos of the cone's half angle, at most 2.
+/// Returns a unit vector in a cone around z, uniform in its solid angle. `spread` is 1 - cos of the cone's half angle,
+/// at most 2.
 #[inline(always)]
 pub(crate) fn in_cone(u: f64, v: f64, spread: f64) -> DVec3 {
     let disc = on_disc(u, v);
@@ -26,19 +27,19 @@ pub(crate) fn in_cone(u: f64, v: f64, spread: f64) -> DVec3 {
     DVec3::new(disc.x * across, disc.y * across, 1.0 - depth)
 }
 
-/// A point of the ball of radius 1.
+/// Returns a point of the ball of radius 1.
 #[inline(always)]
 pub(crate) fn in_ball(u: f64, v: f64, w: f64) -> DVec3 {
     in_cone(u, v, 2.0) * cube_root(w)
 }
 
-/// 1 - cos of half an angle in degrees.
+/// Returns 1 - cos of half an angle in degrees.
 pub(crate) fn spread(degrees: f64) -> f64 {
     let sine = libm::sin(degrees.to_radians() / 4.0);
     2.0 * sine * sine
 }
 
-/// Of angles up to 45 degrees, to 1e-11: Taylor's series.
+/// Returns the sine of an angle of up to 45 degrees, with an error of at most 1e-11, by Taylor's series.
 #[inline(always)]
 fn sine(x: f64) -> f64 {
     let s = x * x;
@@ -53,7 +54,8 @@ fn cosine(x: f64) -> f64 {
     1.0 + s * (-0.5 + s * (1.0 / 24.0 + s * (-1.0 / 720.0 + s * tail)))
 }
 
-/// Of a number above 0 and below 1, to 1e-15 of it: a guess from its exponent, and three steps of Halley's method.
+/// Returns the cube root of a number above 0 and below 1, with a relative error of at most 1e-15: an estimate from its
+/// exponent, and three steps of Halley's method.
 #[inline(always)]
 fn cube_root(x: f64) -> f64 {
     let mut root = f64::from_bits(x.to_bits() / 3 + (0x3ff << 52) / 3 * 2);
@@ -86,7 +88,7 @@ mod tests {
         }
     }
 
-    /// How far the counts of equal cells are from the mean, in standard deviations of all.
+    /// Returns the difference of chi-squared of the counts of equal cells from its mean, in standard deviations.
     fn unevenness(cells: usize, cell: impl Fn(&mut fastrand::Rng) -> usize) -> f64 {
         let (mut counts, mut dice) = (vec![0u32; cells], dice());
         let mean = 1000.0;

@@ -22,7 +22,7 @@ const TURNS: usize = 48;
 /// The share of light that microfacets of a width do not hide, by the cosine of the view.
 #[derive(Debug)]
 pub(crate) struct Energy {
-    /// By `(1 + α)·c/(c + α)` of a cosine c: most changes at cosines around α.
+    /// The table is indexed by `(1 + α)·c/(c + α)` of a cosine c, because it changes most at cosines around α.
     table: [f64; STEPS + 1],
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Energies(Arc<HashMap<u64, Arc<Energy>>>);
 /// The microfacets of a surface.
 #[derive(Clone, Debug)]
 pub(crate) struct Microfacets {
-    /// Their width, above 0.
+    /// The width, above 0.
     alpha: f64,
     energy: Arc<Energy>,
 }

@@ -1,6 +1,6 @@
-//! A table of how much brighter than its mean each part of a sky's picture is.
+//! A table of the brightness of each part of a sky's picture above its mean.
 //!
-//! Cells are wider than the picture's pixels, so that all that is bright between pixels is in a cell that counts.
+//! Cells are wider than the picture's pixels, so that bright light between pixels is in a cell that counts.
 
 use core::f64::consts::{PI, TAU};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -11,10 +11,12 @@ use rayfold_scene::assets::Picture;
 use super::cube_table::{CubeTable, cell};
 use crate::pictures::Panorama;
 
-/// The fewest and the most columns in which a picture is read. Those of larger ones are left out evenly.
+/// The least and the largest number of columns in which a picture is read. Columns of larger pictures are left out
+/// evenly.
 const COLUMNS: (u32, u32) = (256, 2048);
 
-/// The columns of the picture along an edge of a cell, in the middle of a face. At its corners a third.
+/// The number of the picture's columns along an edge of a cell in the middle of a face. At the face's corners it is a
+/// third of this.
 const COLUMNS_OF_CELL: u32 = 4;
 
 /// The largest number of cells that are divided.
@@ -25,7 +27,7 @@ const DIVIDED: usize = 256;
 pub(crate) struct SkyTable {
     /// The mean brightness of the picture.
     pub(crate) mean: f64,
-    /// The integral over all directions of how much brighter than the mean it is.
+    /// The integral of the brightness above the mean over all directions.
     pub(crate) excess: f64,
     /// The density in proportion to that.
     pub(crate) directions: CubeTable,
@@ -43,7 +45,7 @@ type Known = (Weak<Picture>, bool, Option<Arc<SkyTable>>);
 static LAST: Mutex<Option<Known>> = Mutex::new(None);
 
 impl SkyTable {
-    /// Returns the table of a picture; `None` if no part of it is bright. The last one is kept.
+    /// Returns the table of a picture, or `None` if no part of it is bright. The last table is cached.
     pub(crate) fn of(panorama: &Panorama) -> Option<Arc<Self>> {
         let (picture, is_linear) = panorama.picture();
         let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
@@ -59,7 +61,7 @@ impl SkyTable {
         table
     }
 
-    /// Makes the table of a picture of this width, of which `brightness` gives that of a place.
+    /// Makes the table of a picture of this width. `brightness` returns the brightness at a place.
     fn new(width: u32, brightness: impl Fn([f64; 2]) -> f64) -> Option<Self> {
         let columns = width.clamp(COLUMNS.0, COLUMNS.1) as usize;
         let rows = columns / 2;

@@ -1,10 +1,11 @@
-//! Points that fill a cube evenly: Sobol's sequence, scrambled as Owen does, another way for each pixel and dimension.
+//! Points that fill a cube evenly: Sobol's sequence with Owen scrambling, which differs for each pixel and dimension.
 //!
-//! The direction numbers are those of Joe and Kuo, "Constructing Sobol sequences with better two-dimensional projections"
-//! (2008); the scrambling is the hash of Laine and Karras (2011) with the constants of Vegdahl (2021), on the bits in
-//! reverse order, as in Burley, "Practical hash-based Owen scrambling" (2020). It knows nothing of what points are for.
+//! The direction numbers are those of Joe and Kuo, "Constructing Sobol sequences with better two-dimensional
+//! projections" (2008). The scrambling is the hash of Laine and Karras (2011) with the constants of Vegdahl (2021), on
+//! the bits in reverse order, as in Burley, "Practical hash-based Owen scrambling" (2020). This module does not depend
+//! on the use of the points.
 
-/// Dimensions that have direction numbers of their own.
+/// The number of dimensions that have direction numbers of their own.
 pub(super) const OWN: usize = 21;
 
 /// The numbers of a polynomial: its degree, its inner coefficients as bits, and the first direction numbers.
@@ -31,7 +32,7 @@ const POLYNOMIALS: [(u32, u32, &[u32]); OWN - 1] = [
     (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
 ];
 
-/// For each dimension, what each bit of an index adds, bits in reverse order: the lowest is the half.
+/// For each dimension, the number that each bit of an index adds. Bits are in reverse order: the lowest is the half.
 static DIRECTIONS: [[u32; 32]; OWN] = directions();
 
 const fn directions() -> [[u32; 32]; OWN] {
@@ -69,7 +70,8 @@ const fn directions() -> [[u32; 32]; OWN] {
     all
 }
 
-/// The point of that index along a dimension below [`OWN`], as 32 bits in reverse order: the lowest is the half.
+/// Returns the point with this index along a dimension below [`OWN`], as 32 bits in reverse order: the lowest is the
+/// half.
 pub(super) fn reversed(index: u32, dimension: usize) -> u32 {
     let mut bits = index;
     let mut point = 0;
@@ -80,8 +82,8 @@ pub(super) fn reversed(index: u32, dimension: usize) -> u32 {
     point
 }
 
-/// An Owen scramble of a number whose bits are in reverse order, another for each seed: each bit is turned or not by a hash of
-/// those that count for more, which stand below it.
+/// Returns an Owen scramble, one for each seed, of a number whose bits are in reverse order. Each bit is flipped or not
+/// by a hash of the more significant bits, which are stored below it.
 #[inline(always)]
 pub(super) const fn scrambled(reversed: u32, seed: u32) -> u32 {
     let mut x = reversed;
@@ -93,7 +95,7 @@ pub(super) const fn scrambled(reversed: u32, seed: u32) -> u32 {
     x
 }
 
-/// A hash whose bits each depend on all bits of `x` (Wellons' lowbias32, 2018).
+/// Returns a hash. Each of its bits depends on all bits of `x` (Wellons' lowbias32, 2018).
 #[inline(always)]
 pub(super) const fn mixed(mut x: u32) -> u32 {
     x ^= x >> 16;
@@ -107,7 +109,7 @@ pub(super) const fn mixed(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// The cells of equal size in which the first `2^bits` points lie, along one dimension.
+    /// Returns the cells of equal size, along one dimension, in which the first `2^bits` points lie.
     fn cells(bits: u32, point: impl Fn(u32) -> u32) -> Vec<u32> {
         let mut cells: Vec<u32> = (0..1 << bits).map(|k| point(k).reverse_bits() >> (32 - bits)).collect();
         cells.sort_unstable();

@@ -1,8 +1,8 @@
 //! The topology of a tree of very many boxes, in a fraction of a second.
 //!
-//! From the top down, boxes are parted at the best of a few planes across each axis, by the surface areas of both sides (Wald,
-//! "On fast construction of SAH-based bounding volume hierarchies", 2007). All of it happens in one array, which is
-//! sorted in place. Each part depends on its own boxes alone, so that the tree is the same for any number of threads.
+//! From the top down, boxes are split at the best of a few planes across each axis, by the surface areas of both sides
+//! (Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007). All work is done in one array, which
+//! is sorted in place. Each subtree depends only on its own boxes, so the tree is the same for any number of threads.
 
 use glam::{Vec3A, Vec4, Vec4Swizzles};
 use obvhs::aabb::Aabb;
@@ -11,22 +11,23 @@ use rayon::prelude::*;
 /// The number of slices along an axis.
 const SLICES: usize = 16;
 
-/// The number of boxes below which they count as few, and the number of their slices. They are parted across the axis along
-/// which their middles are farthest apart.
+/// The number of boxes below which they count as few, and the number of slices that few boxes have. They are split
+/// across the axis along which their middles are farthest apart.
 const FEW: usize = 32;
 const FEW_SLICES: usize = 8;
 
-/// The level from which boxes are parted in equal halves, so that no tree is deep.
+/// The level from which boxes are split into equal halves, so that no tree is deep.
 const DEEP: usize = 40;
 
 /// The number of boxes up to which one thread makes a subtree.
 const ALONE: usize = 8192;
 
-/// The number of boxes whose slices several threads count, and the number that one counts at a time.
+/// The number of boxes from which several threads count the slices, and the number that one thread counts at a time.
 const COUNTED_TOGETHER: usize = 65_536;
 const CHUNK: usize = 16_384;
 
-/// A node: the index of its first child, which the second one follows, or the place of its first box in [`Grown::order`].
+/// A node. For children, the index of the first one; the second follows it. For a leaf, the place of its first box in
+/// [`Grown::order`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Twig {
     pub(super) first: u32,
@@ -41,7 +42,7 @@ pub(super) struct Grown {
     pub(super) order: Vec<u32>,
 }
 
-/// The bits that make a number of ordinary size of an index. Subnormal numbers are slow.
+/// The bits that are combined with an index to make a normal floating-point number. Subnormal numbers are slow.
 const MARK: u32 = 0x4000_0000;
 
 /// A box. The last lane of `low` holds the bits of its index.
@@ -67,7 +68,7 @@ impl Item {
     }
 }
 
-/// The smallest and the largest corner of a box. The last lanes mean nothing.
+/// The smallest and the largest corner of a box. The last lanes have no meaning.
 #[derive(Clone, Copy)]
 struct Span {
     low: Vec4,
@@ -120,14 +121,14 @@ impl Slice {
 
 type Slices<const N: usize> = [[Slice; N]; 3];
 
-/// Numbers the slices of the boxes between some middles.
+/// Assigns boxes to slices between the least and the greatest of their middles.
 #[derive(Clone, Copy)]
 struct Ruler<const N: usize> {
     from: Vec4,
     scale: Vec4,
 }
 
-/// The number that rounds another of ordinary size to a whole one when it is added, and leaves it in the last bits.
+/// The number that rounds another number to a whole one if it is added, and leaves that in the last bits.
 const WHOLE: f32 = 12_582_912.0;
 
 impl<const N: usize> Ruler<N> {
@@ -142,13 +143,13 @@ impl<const N: usize> Ruler<N> {
         Self { from: middles.low, scale: size.map(scale) }
     }
 
-    /// Returns the numbers of the slices of a middle, along each axis.
+    /// Returns the slices of a middle, along each axis.
     fn of(&self, middle: Vec4) -> [usize; 3] {
         let place = (middle - self.from) * self.scale - 0.5 + WHOLE;
         [place.x, place.y, place.z].map(|x| x.to_bits() as usize % N)
     }
 
-    /// Returns the number of the slice of a middle along one axis.
+    /// Returns the slice of a middle along one axis.
     fn along(&self, axis: usize, middle: Vec4) -> usize {
         let place = (middle[axis] - self.from[axis]) * self.scale[axis] - 0.5 + WHOLE;
         place.to_bits() as usize % N
@@ -184,7 +185,7 @@ impl<const N: usize> Ruler<N> {
         counts.reduce(|| [[Slice::EMPTY; N]; 3], join)
     }
 
-    /// Moves the items before a slice to the front. Returns their number, and the middles of both sides.
+    /// Moves the items before a slice to the front. Returns their number, and the range of middles on both sides.
     fn part(&self, items: &mut [Item], (axis, slice): (usize, usize)) -> (usize, [Span; 2]) {
         let mut sides = [Span::EMPTY; 2];
         let (mut first, mut end) = (0, items.len());
@@ -203,14 +204,14 @@ impl<const N: usize> Ruler<N> {
     }
 }
 
-/// A subtree: made by one thread, with the root first, or of two.
+/// A subtree: made by one thread, with the root first, or joined from two.
 enum Subtree {
     Nodes(Vec<Twig>),
     Pair(Box<[Subtree; 2]>),
 }
 
 impl Grown {
-    /// Makes a tree of boxes, of which there is at least one. A leaf has at most `most`.
+    /// Makes a tree of at least one box. A leaf has at most `most` boxes.
     pub(super) fn new(boxes: &[Aabb], most: usize) -> Self {
         let item = |(index, of): (usize, &Aabb)| Item::new(index as u32, of.min, of.max);
         Self::of(boxes.par_iter().enumerate().map(item).collect(), most)
@@ -237,7 +238,7 @@ impl Grown {
 }
 
 impl Subtree {
-    /// Adds the nodes to all, of which the one at `at` is the root.
+    /// Appends the nodes to `all`. The root is at `at`.
     fn flatten(self, at: usize, all: &mut Vec<Twig>) {
         let first = all.len() as u32;
         match self {
@@ -259,7 +260,8 @@ impl Subtree {
     }
 }
 
-/// Makes the subtree, at a level, of items whose middles are within `middles`. `from` is the place of the first item.
+/// Makes the subtree of items at a level. Their middles are within `middles`, and `from` is the place of the first
+/// item.
 fn grow((items, from): (&mut [Item], usize), middles: Span, most: usize, level: usize) -> Subtree {
     if items.len() <= ALONE.max(most) {
         let mut nodes = Vec::with_capacity(items.len());
@@ -296,7 +298,7 @@ fn grow_alone(
     grow_alone((nodes, children + 1), (second, from + middle), other, most, level + 1);
 }
 
-/// Parts items in two. Returns the number of the first ones, and the middles of both.
+/// Splits items into two sets. Returns the number of the first ones, and the range of middles of both.
 fn part(items: &mut [Item], middles: Span, level: usize) -> (usize, [Span; 2]) {
     if level >= DEEP {
         return halve(items, middles);
@@ -306,7 +308,7 @@ fn part(items: &mut [Item], middles: Span, level: usize) -> (usize, [Span; 2]) {
     parted.unwrap_or((items.len() / 2, [middles; 2]))
 }
 
-/// Parts items in halves across the axis along which their middles are farthest apart.
+/// Splits items into halves across the axis along which their middles are farthest apart.
 fn halve(items: &mut [Item], middles: Span) -> (usize, [Span; 2]) {
     let axis = (middles.high - middles.low).xyz().max_position();
     let half = items.len() / 2;
@@ -343,8 +345,8 @@ fn part_many(items: &mut [Item], middles: Span) -> Option<(usize, [Span; 2])> {
     Some(ruler.part(items, place))
 }
 
-/// Returns the first slice of the second side where the sum of both sides' areas, each times the number of its boxes, is
-/// least, after that sum; `None` if all boxes are in one slice.
+/// Returns the first slice of the second side for which the sum of both sides' areas, each times the number of its
+/// boxes, is smallest. That sum comes first. Returns `None` if all boxes are in one slice.
 fn best<const N: usize>(slices: &[Slice; N]) -> Option<(f32, usize)> {
     let mut behind = [None; N];
     let mut side = Slice::EMPTY;

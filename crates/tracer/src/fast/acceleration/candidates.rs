@@ -27,7 +27,7 @@ impl Masks {
     }
 }
 
-/// Returns the bits of a kind whose array begins at `from` and has `count` items, moved to the front.
+/// Returns the bits of a kind, moved to the front. The array of the kind begins at `from` and has `count` items.
 #[inline(always)]
 fn of_kind(bits: u64, from: usize, count: usize) -> u64 {
     if from >= MASKED || count == 0 {

@@ -99,8 +99,8 @@ pub(crate) fn nearest_in<S: Simd, E: Real>(
     )
 }
 
-/// As [`nearest_in`], but skips nodes of which `is_missed` says, by their number and how far the rays are followed, that no
-/// ray meets anything in them, and ends once `visit` returns false.
+/// Works as [`nearest_in`], but skips a node if `is_missed` returns that no ray hits anything in it, given its number
+/// and how far the rays are followed. Ends once `visit` returns false.
 #[inline(always)]
 pub(crate) fn nearest_past<S: Simd, E: Real>(
     simd: S,

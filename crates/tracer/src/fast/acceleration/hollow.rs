@@ -1,8 +1,8 @@
-//! Balls that hold no surface, for trees of bodies that lie around one another.
+//! Balls without surfaces, for trees of bodies that lie around one another.
 //!
-//! The boxes of such bodies overlap and separate nothing: from a place within them all, every ray would test every body.
-//! But a ray whose search begins and ends in a ball without surfaces has no hit there, because a ball is convex. A node
-//! has a ball that lies in the balls of all bodies below it, as far as they have one in common.
+//! The boxes of such bodies overlap and separate nothing: from a place within them all, every ray would test every
+//! body. But a ray whose search begins and ends in a ball without surfaces has no hit there, because a ball is convex.
+//! The ball of a node lies within the balls of all bodies below it, if these have a common part.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -27,7 +27,7 @@ pub(crate) struct Hollows<E> {
 
 impl<E: Real> Hollows<E> {
     /// Makes the balls of the nodes of a tree. `of_item` returns the ball of an object, by its index. Returns `None` if
-    /// fewer than half of the nodes with children have one: bodies that lie apart have a ball each, and none together.
+    /// fewer than half of the nodes with children have one, because bodies beside each other have no common ball.
     pub(crate) fn new(tree: &Tree<E>, of_item: impl Fn(usize) -> Option<Hollow>) -> Option<Self> {
         let mut balls: Vec<Option<Hollow>> = vec![None; tree.nodes.len()];
         // Children come after their parents.
@@ -53,7 +53,8 @@ impl<E: Real> Hollows<E> {
         has_many.then(|| Self { balls: balls.into_iter().map(ball).collect() })
     }
 
-    /// Returns whether all rays begin and end in a node's ball, or are followed nowhere: those with a negative distance.
+    /// Returns whether all rays begin and end in a node's ball. Rays with a negative distance are not followed, and
+    /// always count.
     #[inline(always)]
     pub(crate) fn hold<S: Simd>(&self, simd: S, at: usize, ray: Ray<S, E>, distance: Lanes<S, E>) -> bool {
         let (center, square) = self.balls[at];

@@ -68,8 +68,8 @@ impl OverlapClusters {
 }
 
 /// Returns whether some objects, picked regardless of their order, are so close that all objects near them may be a
-/// cluster. Along a line, neighbours among the picked objects are at most as many times farther apart as there are
-/// objects between them.
+/// cluster. Along a line, the distance between neighbouring picked objects grows at most with the number of objects
+/// between them.
 fn may_have_crowds(boxes: &[Aabb], place: &(impl Fn(u32) -> Vec3A + Sync)) -> bool {
     // Fibonacci hashing (Knuth, The Art of Computer Programming, 6.4).
     let is_picked = |at: &u32| at.wrapping_mul(0x9e37_79b9) < u32::MAX / SAMPLED;

@@ -1,9 +1,9 @@
 //! A bounding volume hierarchy for scenes of many objects.
 //!
-//! `obvhs` groups the objects, and their overlap [clusters](crate::fast::acceleration::overlap). Very many objects without such
-//! clusters, and the triangles of a large model, are [parted by planes](crate::fast::acceleration::binned), which is sooner
-//! done. The bounding boxes are computed here, in the kernels' precision and wide enough for every rounding error of their tests ([`padded`]). So the tree never
-//! hides an object that a test of all objects would hit.
+//! `obvhs` groups the objects, and their overlap [clusters](crate::fast::acceleration::overlap). Very many objects
+//! without such clusters, and the triangles of a large model, are [split by planes](crate::fast::acceleration::binned),
+//! which is faster. The bounding boxes are computed here, in the kernels' precision and wide enough for every rounding
+//! error of their tests ([`padded`]). So the tree never hides an object that a test of all objects would hit.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -30,7 +30,7 @@ use crate::parallel::map;
 /// The largest number of objects in a leaf.
 const LEAF: u32 = 4;
 
-/// The number of objects from which they are parted by planes.
+/// The number of objects from which they are split by planes.
 pub(crate) const VERY_MANY: usize = 4096;
 
 /// A node: its bounding box and its contents.

@@ -1,27 +1,29 @@
-//! Whether a ray passes a triangle near enough, and which of two triangles at an edge is behind the other, decided in `f64`
-//! whatever the kernels compute with.
+//! Decides in `f64` whether a ray passes a triangle near enough, and which of two triangles at an edge is behind the
+//! other, whatever precision the kernels use.
 //!
-//! The side on which a ray passes an edge is the sign of a volume. It is worked out with a bound on the error, and where
-//! that leaves the sign open as a sum of numbers that do not overlap, which is exact (Shewchuk, "Adaptive precision
-//! floating-point arithmetic and fast robust geometric predicates", 1997). Products must not underflow; the numbers that
-//! kernels hold are far from it.
+//! The side on which a ray passes an edge is the sign of a volume. It is computed with a bound on the error. If that
+//! leaves the sign open, it is computed as a sum of numbers that do not overlap, which is exact (Shewchuk, "Adaptive
+//! precision floating-point arithmetic and fast robust geometric predicates", 1997). Products must not underflow; the
+//! numbers that kernels hold are far from it.
 
 use glam::DVec3;
 
 use crate::fast::arithmetic::real::Real;
 
-/// Rounding errors of a volume of three edges or a direction in `f64`, as a part of the product of their magnitudes,
-/// generously: two roundings of the differences, and six of the sums and products.
+/// The rounding error of a volume of three edges or a direction in `f64`, as a part of the product of their magnitudes.
+/// It is generous: two roundings of the differences, and six of the sums and products.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
 /// The ends of an edge.
 pub(crate) type Edge = [DVec3; 2];
 
-/// How far beside an edge a ray may pass that is meant to meet it, in roundoffs of the distance: the direction itself is rounded.
+/// The distance from an edge, in roundoffs of the distance along the ray, within which a ray aimed at the edge may
+/// pass, because the direction itself is rounded.
 const ON_EDGE: f64 = 16.0 * <f64 as Real>::ROUNDOFF;
 
-/// Whether the ray from `origin` along `direction` meets the plane of a triangle ahead, and passes within it or on an edge, or
-/// within `reach` of one of the edges of which `is_wide` holds; `reach` depends on how far along the ray that is.
+/// Returns whether the ray from `origin` along `direction` hits a triangle: it meets the plane ahead, and passes within
+/// the triangle, on an edge, or within `reach` of an edge for which `is_wide` holds. `reach` depends on the distance
+/// along the ray.
 pub(crate) fn passes(
     corners: [DVec3; 3],
     origin: DVec3,
@@ -50,20 +52,21 @@ pub(crate) fn passes(
         })
 }
 
-/// Whether a ray passes within `reach` of an edge ahead; `reach` depends on how far along the ray that is.
+/// Returns whether a ray passes within `reach` of an edge ahead. `reach` depends on the distance along the ray.
 pub(crate) fn is_beside([p, q]: Edge, origin: DVec3, direction: DVec3, reach: impl Fn(f64) -> f64) -> bool {
     let (along, aside) = nearest_of_edge(p - origin, q - origin, direction);
     along >= 0.0 && aside <= reach(along)
 }
 
-/// Whether, of two triangles with one edge, that with the corner `apex` is behind that with the corner `other` where a ray from
-/// `origin` passes the edge: both are on one side of it, as at an outline, and the plane of the other lies between.
+/// Returns whether, of two triangles with a common edge, the one with the corner `apex` is behind the one with the
+/// corner `other`, as seen along a ray from `origin` that passes the edge. Both are on one side of the ray, as at an
+/// outline, and the plane of the other lies between.
 pub(crate) fn is_behind([p, q]: Edge, apex: DVec3, other: DVec3, origin: DVec3) -> bool {
     let side = orientation([p, q, apex], origin);
     side != 0 && side == orientation([p, q, other], origin) && orientation([p, q, other], apex) == -side
 }
 
-/// The side of a triangle's plane on which a point lies.
+/// Returns the side of a triangle's plane on which a point lies.
 fn orientation(corners: [DVec3; 3], point: DVec3) -> i32 {
     let [a, b, c] = corners;
     volume(corners.map(|corner| corner - point), || {
@@ -71,8 +74,8 @@ fn orientation(corners: [DVec3; 3], point: DVec3) -> i32 {
     })
 }
 
-/// The point of an edge from `p` to `q` that is nearest to the line through zero along a direction of length 1: how far
-/// along the line it lies, and how far from it.
+/// Returns the point of an edge from `p` to `q` that is nearest to the line through zero along a direction of length 1:
+/// its distance along the line, and its distance from the line.
 fn nearest_of_edge(p: DVec3, q: DVec3, direction: DVec3) -> (f64, f64) {
     let across = |v: DVec3| v - v.dot(direction) / direction.length_squared() * direction;
     let (from, edge) = (across(p), across(q - p));
@@ -82,7 +85,7 @@ fn nearest_of_edge(p: DVec3, q: DVec3, direction: DVec3) -> (f64, f64) {
     (point.dot(direction), across(point).length())
 }
 
-/// The sign of `u · (v × w)`, where its rounding errors leave it open from `exactly`.
+/// Returns the sign of `u · (v × w)`. If rounding errors leave it open, `exactly` computes it.
 fn volume([u, v, w]: [DVec3; 3], exactly: impl FnOnce() -> i32) -> i32 {
     let size = |v: DVec3| v.abs().element_sum();
     let volume = u.dot(v.cross(w));
@@ -93,7 +96,7 @@ fn sign(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
-/// The sign of a sum of volumes `u · (v × w)`, each with its own sign.
+/// Returns the sign of a sum of volumes `u · (v × w)`, each with its own sign.
 fn exact(volumes: &[(f64, [DVec3; 3])]) -> i32 {
     // From the smallest to the largest; none overlaps another.
     let mut sum: Vec<f64> = Vec::new();
@@ -115,7 +118,7 @@ fn add_product(sum: &mut Vec<f64>, [x, y, z]: [f64; 3]) {
     }
 }
 
-/// Shewchuk's GROW-EXPANSION, zeros left out.
+/// Adds a number to an expansion by Shewchuk's GROW-EXPANSION, and omits zeros.
 fn add(sum: &mut Vec<f64>, term: f64) {
     let mut carried = term;
     let mut kept = 0;
@@ -156,7 +159,7 @@ mod tests {
         passes(corners, origin, direction, |_| -1.0, |_| true)
     }
 
-    /// `intersects` by whole numbers.
+    /// Computes `intersects` with whole numbers.
     fn truth(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> bool {
         let volume = |[u, v, w]: [DVec3; 3]| {
             let [u, v, w] = [u, v, w].map(|v| v.to_array().map(|x| x as i128));

@@ -24,7 +24,7 @@ pub(crate) trait Real:
     + Sync
     + 'static
 {
-    /// Whether it is `f64`. Code for what is drawn in `f64` alone is left out of programs for `f32`.
+    /// Whether it is `f64`. Code for features that are drawn only in `f64` is left out of the `f32` kernels.
     const IS_DOUBLE: bool;
 
     /// The largest relative error of one rounding.
@@ -126,8 +126,8 @@ pub(crate) trait Fused<S: Simd>: SimdFloat<S> {
 
 impl<S: Simd, T: SimdFloat<S>> Fused<S> for T {}
 
-/// Returns whether the instruction set has a fused multiply-add. With packets of 128 bits that of Arm has one, and the relaxed one
-/// of WebAssembly, on machines where a test has shown that it is fused.
+/// Returns whether the instruction set has a fused multiply-add. Of those with packets of 128 bits, Arm's has one, and
+/// so has WebAssembly's relaxed one, on machines where a test has shown that it is fused.
 #[inline(always)]
 fn has_fused<S: Simd, T: SimdFloat<S>>() -> bool {
     cfg!(any(target_arch = "aarch64", target_feature = "relaxed-simd")) || size_of::<T>() > 16

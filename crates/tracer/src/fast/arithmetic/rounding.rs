@@ -49,14 +49,14 @@ pub(crate) const BOX: f64 = 32.0;
 /// pixel. The other errors of the direction are in [`BOUNDS`].
 pub(crate) const MARGIN: f64 = 1.0 / 32.0;
 
-/// The sine of the angle between a ray and a triangle's plane, in roundoffs, below which it is noise. Such a ray is in
-/// the plane, and misses.
+/// The sine of the angle between a ray and a triangle's plane, in roundoffs, below which it is only rounding error.
+/// Such a ray counts as in the plane, and misses.
 ///
 /// The sine is `normal · direction`, of two vectors of length 1: 1 roundoff of each of the two, and 1 of each of the
 /// two sums that are left with fused multiply-add.
 pub(crate) const GRAZING: f64 = 4.0;
 
-/// The sine of the angle between the light and a triangle's plane, in roundoffs, below which it is noise.
+/// The sine of the angle between the light and a triangle's plane, in roundoffs, below which it is only rounding error.
 ///
 /// Such a triangle has no shadow. If it had one, its sides would bound a line without ends. The direction of the light
 /// and the normal are both rounded in all three coordinates, which turns each by up to √3 roundoffs, and the sides are
@@ -123,10 +123,10 @@ pub(crate) const BEAM: f64 = 16.0;
 /// Returns a bound on the rounding error of distances to triangles that are not hit at a grazing angle, relative to 1
 /// plus the distance. Nearer than that a ray may start beyond the plane.
 ///
-/// The height above the plane has 9 roundoffs and the slope 4. A ray is [settled] if the slope is below 1/32, so the
-/// errors of the height are at most 32 times as large along the ray: 9 · 32 = 288 and 4 · 32 = 128. The sum is 416; the
-/// bound is 512. The second term is the error of a normal that was computed in `f64` from corners before they were
-/// rounded.
+/// The height above the plane has an error of 9 roundoffs, and the slope one of 4. A ray is [settled] if the slope is
+/// below 1/32, so the errors of the height are at most 32 times as large along the ray: 9 · 32 = 288 and 4 · 32 = 128.
+/// The sum is 416; the bound is 512. The second term is the error of a normal that was computed in `f64` from corners
+/// before they were rounded.
 ///
 /// [settled]: crate::fast::rays::predicate::settle
 pub(crate) const fn distance_error<E: Real>() -> f64 {

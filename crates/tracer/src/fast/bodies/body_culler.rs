@@ -21,15 +21,15 @@ const WIDER: f64 = 64.0;
 pub(super) struct BodyCuller<E> {
     pub(super) boxes: Vec<Shape>,
     balls: Vec<Ball<E>>,
-    /// The slabs of those that are flat: few of the rays that come near the sphere of one come near it.
+    /// The slabs of flat bodies. Few of the rays that come near the bounding sphere of a flat body come near its slab.
     slabs: Vec<Option<Slab<E>>>,
     /// The bits of all bodies.
     pub(super) all: u64,
-    /// Whether the bodies are so few that any search asks for each of them, and none for the tree.
+    /// Whether there are so few bodies that any search tests each of them, and no search uses the tree.
     pub(super) is_short: bool,
 }
 
-/// The largest number of bodies that are searched one by one.
+/// The largest number of bodies that are tested one by one.
 const SHORT: usize = 16;
 
 /// The thickness, in diameters of the bounding sphere, below which a body is flat.
@@ -116,13 +116,13 @@ impl<E: Real> BodyCuller<E> {
     }
 }
 
-/// The change of height along a ray below which the ray is level: less than any rounding error of a height.
+/// The change of height along a ray below which the ray counts as level: less than any rounding error of a height.
 const LEVEL: f64 = 1e-30;
 
 /// The length by which a ray may enter a slab later than its hit, relative to 1 and to the distance.
 const LATER: f64 = 1e-6;
 
-/// The part by which the hole of a ring is taken to be smaller.
+/// The part by which the hole of a ring is assumed to be smaller.
 const HOLE: f64 = 1e-6;
 
 impl<E: Real> Slab<E> {
@@ -221,7 +221,7 @@ mod tests {
         assert!(met > all / 20 && near < all / 2, "{met} of {all} meet, {near} come near");
     }
 
-    /// Returns the rays that meet the body and those that come near it, as bits.
+    /// Returns the rays that hit the body and those that come near it, as bits.
     #[inline(always)]
     fn found<S: Simd>(
         simd: S,

@@ -1,12 +1,13 @@
 //! Capsules: the union of two balls and of the cylinder between their centres.
 //!
-//! The body is convex, so a ray has one interval in it: from the first place where it enters one of the three to the
+//! The body is convex, so a ray has one interval in it: from the first point where it enters one of the three to the
 //! last where it leaves one. Where the side meets the round ends, the interval of a ball overlaps that of the cylinder,
 //! so that no ray passes between them.
 //!
 //! As for cones, the ray's parameter is counted from its point nearest to the end a, so that the numbers are no larger
-//! than the body. The three discriminants have errors of a few roundoffs of the squares of these numbers, the ends of
-//! the interval across the ray such of the body's size: as those of a cone, less than 16, within the bound of bodies.
+//! than the body. The three discriminants have errors of a few roundoffs of the squares of these numbers. Across the
+//! ray, the ends of the interval have errors of less than 16 roundoffs of the body's size, as for a cone, within the
+//! bound of bodies.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -38,7 +39,7 @@ impl<E: Real> Capsule<E> {
         Self { radius: E::narrow(radius), height: E::narrow(height) }
     }
 
-    /// Returns the interval of each ray in the body. It is that of no numbers where `hit` is not set.
+    /// Returns the interval of each ray in the body. Lanes in which `hit` is not set have an empty interval.
     #[inline(always)]
     fn stretch<S: Simd>(&self, simd: S, ray: Local<S, E>) -> Stretch<S, E> {
         let (zero, one) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, 1.0));

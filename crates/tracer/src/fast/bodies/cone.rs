@@ -5,10 +5,10 @@
 //! of the caps to the first place where it leaves them.
 //!
 //! The ray's parameter is counted from its point nearest to the end a, so that the numbers of the side are no larger
-//! than the body. The quadratic is `A·t² + 2·B·t + C`. Its discriminant is `n² - x²`, with `n = r·s - k·dz·ρ⃗`,
-//! `x = ρ⃗ × s`, and s the part of the direction perpendicular to the axis. So errors across the ray are a few
-//! roundoffs of the body's size, far less than the offset of a new ray from the surface. (Products of sum and
-//! difference would need square roots, whose rounding errors are as large as those of the squares.)
+//! than the body. The quadratic is `A·t² + 2·B·t + C`. Its discriminant is `n² - x²`, with `n = r·s - k·dz·ρ⃗`, `x = ρ⃗
+//! × s`, and s the part of the direction perpendicular to the axis. So the errors across the ray are a few roundoffs of
+//! the body's size, far less than the offset of a new ray from the surface. (Products of sum and difference would need
+//! square roots, whose rounding errors are as large as those of the squares.)
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;

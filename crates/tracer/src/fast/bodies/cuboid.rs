@@ -124,7 +124,7 @@ fn face<S: Simd, E: Real>(
     (here.select(low.select(zero - half, half), within), here.select(forwards.select(zero - one, one), zero))
 }
 
-/// A box in its frame, by half of its lengths.
+/// A box in its frame, given by its half lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CuboidForm {
     pub(super) half: DVec3,

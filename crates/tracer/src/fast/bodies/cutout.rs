@@ -1,8 +1,8 @@
 //! Triangles with holes: faces of models whose alpha is below a cutoff in some places, where they have no hits.
 //!
-//! Rays meet them by the test of all triangles. Where they do, each lane looks up the alpha, with the function of the
-//! reference tracer. As bodies they are found apart from triangles without holes, whose code is the same with and without
-//! them.
+//! Rays hit them by the same test as all triangles. In each lane with a hit the alpha is looked up, with the function
+//! of the reference tracer. They are bodies, so they are found separately from triangles without holes, whose code is
+//! the same with and without them.
 
 use std::sync::Arc;
 
@@ -41,8 +41,8 @@ pub(super) struct Cutout<E> {
     holes: Arc<Holes>,
 }
 
-/// The corners of a triangle whose neighbours are not known. What passes beside it within the rounding errors meets it, so
-/// that there is no gap to any neighbour.
+/// The corners of a triangle whose neighbours are not known. A ray that passes beside it within the rounding errors
+/// hits it, so that there is no gap to any neighbour.
 #[derive(Debug)]
 struct Alone([DVec3; 3]);
 
@@ -70,7 +70,7 @@ impl<E: Real> Cutout<E> {
         Self { triangle, corners: Alone(form.triangle.vertices), order: order as usize, holes }
     }
 
-    /// Offers the hits of the rays beside its holes.
+    /// Offers the hits of the rays outside of its holes.
     #[inline(never)]
     pub(super) fn intersect<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
         simd.vectorize(
@@ -125,7 +125,7 @@ pub(super) struct CutoutForm {
     radius: f64,
 }
 
-/// Returns a triangle with holes, of which `order` is the position in the script.
+/// Returns a triangle with holes. `order` is its position in the script.
 pub(in crate::fast) fn cutout(triangle: RenderSpaceTriangle, order: u32) -> Solid {
     let [a, b, c] = triangle.vertices;
     let center = (a + b + c) / 3.0;

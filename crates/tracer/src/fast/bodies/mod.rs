@@ -172,13 +172,13 @@ pub(super) struct Body<E> {
     /// The offset of a new ray from the surface, without the part that depends on the hit point.
     offset: E,
     order: E,
-    /// The number of objects that it is: looks of a model, whose orders follow each other.
+    /// The number of objects that the body stands for: the looks of a model, whose orders follow each other.
     looks: usize,
     shape: Shape<E>,
 }
 
 impl<E: Real> Body<E> {
-    /// Makes a body of one of the `objects`. `holes` are those of the triangles that have some.
+    /// Makes a body of one of the `objects`. `holes` are the holes of triangles.
     fn new(solid: &Solid, objects: &[Object], holes: Option<&Arc<Holes>>) -> Self {
         let mut looks = 1;
         let shape = match solid.form {
@@ -253,14 +253,14 @@ impl<E: Real> Body<E> {
         BodyHit { point, normal: self.turned_back(simd, normal), within }
     }
 
-    /// Returns the height of the ray origins above the end b, as exact as that above the end a. So a cap in the plane
-    /// of a face is hit at the face's distance.
+    /// Returns the height of the ray origins above the end b, as exactly as above the end a. So a cap in the plane of a
+    /// face is hit at the face's distance.
     #[inline(always)]
     fn over<S: Simd>(&self, simd: S, end: [E; 3], ray: Ray<S, E>) -> Lanes<S, E> {
         Vec3::splat(simd, self.axes[2]).dot(ray.origin.sub(Vec3::splat(simd, end)))
     }
 
-    /// Offers the hits of the rays with the body, one of the tree. Planes are intersected separately.
+    /// Offers the hits of the rays with the body, which is in the tree. Planes are intersected separately.
     // Out of line, so that all searches for bodies share one piece of code.
     #[inline(never)]
     fn intersect<S: Simd>(&self, simd: S, ray: Ray<S, E>, nearest: &mut Nearest<S, E>) {
@@ -297,7 +297,7 @@ impl<E: Real> Body<E> {
         }
     }
 
-    /// Offers the hits of the rays with the body, a plane, if any of the `open` rays hits it.
+    /// Offers the hits of the rays with the body, which is a plane, if any of the `open` rays hits it.
     #[inline(always)]
     fn meet_plane<S: Simd>(&self, simd: S, ray: Ray<S, E>, open: Mask<S, E>, nearest: &mut Nearest<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
@@ -373,21 +373,21 @@ pub(super) struct Bodies<E> {
     /// The planes first, then the other bodies in the order of the tree's leaves.
     bodies: Vec<Body<E>>,
     planes: usize,
-    /// The planes that shadow rays ask for first: all, or the first ones, which are opaque, if those of glass are asked for
-    /// apart.
+    /// The planes that shadow rays test first: all, or the opaque ones, which come first, if glass is tested
+    /// separately.
     first_planes: usize,
     way: Way<E>,
     /// The bounding volumes of the bodies of the tree, if a mask has enough bits.
     few: Option<BodyCuller<E>>,
-    /// Balls without surfaces in the tree, where many bodies lie around one another.
+    /// Balls without surfaces in the tree, if many bodies lie around one another.
     hollows: Option<Hollows<E>>,
 }
 
 /// The mask of all bodies, for any number of them.
 pub(super) const ANY: u64 = u64::MAX;
 
-/// The structures that are searched for bodies. One match decides, so that a scene with a tree alone does not check for
-/// planes.
+/// The structures that are searched for bodies. A single match decides, so a scene that has only a tree does not check
+/// for planes.
 #[derive(Debug)]
 enum Way<E> {
     Tree(Tree<E>),
@@ -396,7 +396,7 @@ enum Way<E> {
 }
 
 impl<E: Real> Bodies<E> {
-    /// Makes the bodies of some `objects`. `holes` are those of the triangles that have some.
+    /// Makes the bodies of some `objects`. `holes` are the holes of triangles.
     pub(super) fn new(solids: &[Solid], objects: &[Object], holes: Option<&Arc<Holes>>) -> Self {
         let (mut planes, mut bounded): (Vec<Solid>, Vec<Solid>) =
             solids.iter().copied().partition(|solid| solid.bounds().is_none());
@@ -416,8 +416,8 @@ impl<E: Real> Bodies<E> {
         Self { bodies, planes: count, first_planes: count, way, few, hollows }
     }
 
-    /// Lets shadow rays ask for glass apart from opaque bodies. Returns the bodies of glass as bits, or `None` if there are too
-    /// many bodies for a mask, or if some are glass in part.
+    /// Makes shadow rays test glass separately from opaque bodies. Returns the bodies of glass as bits, or `None` if
+    /// there are too many bodies for a mask, or if some are only partly of glass.
     pub(super) fn part_glass(&mut self, is_glass: impl Fn(E) -> bool) -> Option<u64> {
         if self.few.is_none() && self.bodies.len() > self.planes {
             return None;
@@ -477,8 +477,8 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Offers the hits of the rays with the bodies of the tree; only with those of the mask `bits`, if the bodies have
-    /// bits.
+    /// Offers the hits of the rays with the bodies of the tree. If the bodies have bits, only those of the mask `bits`
+    /// are tested.
     #[inline(always)]
     pub(super) fn meet_bounded<S: Simd>(
         &self,
@@ -518,8 +518,8 @@ impl<E: Real> Bodies<E> {
         *nearest = with;
     }
 
-    /// Returns the rays of `lit` that hit none of the bodies of the mask `bits` nearer than `far`. A ray that has hit one asks
-    /// for no more.
+    /// Returns the rays of `lit` that hit none of the bodies of the mask `bits` nearer than `far`. A ray that has hit
+    /// one tests no more bodies.
     #[inline(always)]
     fn unoccluded_by_few<S: Simd>(
         &self,
@@ -684,8 +684,8 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Offers the hits of shadow rays with the planes of glass and with the bodies of the mask `bits`, where glass is asked for
-    /// apart.
+    /// Offers the hits of shadow rays with the planes of glass and with the bodies of the mask `bits`, if glass is
+    /// tested separately.
     #[inline(always)]
     pub(super) fn meet_glass<S: Simd>(
         &self,
@@ -705,13 +705,13 @@ impl<E: Real> Bodies<E> {
         }
     }
 
-    /// Returns whether shadow rays ask for planes of glass apart.
+    /// Returns whether shadow rays test planes of glass separately.
     pub(super) fn has_planes_of_glass(&self) -> bool {
         BUILT.planes && self.first_planes < self.planes
     }
 
-    /// Returns the rays of `lit` that hit no plane and no body of the mask `bits` nearer than `far`; where glass is asked for
-    /// apart, no opaque plane.
+    /// Returns the rays of `lit` that hit no plane and no body of the mask `bits` nearer than `far`. If glass is tested
+    /// separately, only opaque planes count.
     #[inline(always)]
     pub(super) fn unoccluded<S: Simd>(
         &self,
@@ -765,8 +765,8 @@ impl<E: Real> Bodies<E> {
     }
 }
 
-/// Returns what shadow rays start a search with, and the distances at which they are still lit. Lanes in the dark get a
-/// negative distance, so that nothing is searched for them.
+/// Returns the initial hits of a search by shadow rays, and the distances at which they are still lit. Lanes in the
+/// dark get a negative distance, so that nothing is searched for them.
 #[inline(always)]
 fn shadow_limit<S: Simd, E: Real>(
     simd: S,

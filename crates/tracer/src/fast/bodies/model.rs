@@ -38,13 +38,15 @@ use crate::scale::below_inverse;
 /// The number of triangles that one thread makes at a time.
 const ALONE: usize = 4096;
 
-/// The distance from the middle at which rays begin, in radii of the bounding sphere: what touches the sphere is ahead of them.
+/// The distance from the middle at which rays begin, in radii of the bounding sphere, so that any surface that touches
+/// the sphere is ahead of them.
 const FAR_ENOUGH: f64 = 1.125;
 
-/// The triangles of a model, in coordinates in which it is in a cube from -1 to 1. Those of one leaf stand side by side.
+/// The triangles of a model, in coordinates in which it is in a cube from -1 to 1. Those of one leaf are contiguous.
 #[derive(Debug)]
 struct ModelTree<E> {
-    /// The middle of the model's bounding box is the origin here, and 1 in its file is `scale` here.
+    /// The middle of the model's bounding box, which is the origin of these coordinates. A length of 1 in its file is
+    /// `scale` in them.
     center: DVec3,
     scale: f64,
     /// Half of the lengths of its bounding box.
@@ -54,7 +56,7 @@ struct ModelTree<E> {
     tree: Tree<E>,
     /// The triangles, with their numbers in the file as orders.
     facets: Vec<Facet<E>>,
-    /// The normals at their corners, zeros for a flat one; empty if all are flat. They are as exact as those of the file.
+    /// The normals at their corners, zeros for a flat one; empty if all are flat. They are as exact as in the file.
     normals: Vec<[[f32; 3]; 3]>,
     /// The texture coordinates and the colour factors at their corners; empty if there are none.
     uvs: Vec<[Vec2; 3]>,
@@ -62,7 +64,7 @@ struct ModelTree<E> {
     /// Their corners, as indices among the positions of the model, which are unrounded.
     corners: Vec<[u32; 3]>,
     positions: Vec<DVec3>,
-    /// The place here of each triangle of the file.
+    /// The index here of each triangle of the file.
     index: Vec<u32>,
     /// The look of each triangle of the file; empty if all have the first.
     looks: Vec<u32>,
@@ -149,7 +151,7 @@ impl<E: Real> ModelTree<E> {
 }
 
 impl<E: Real> ModelTree<E> {
-    /// Returns the triangle of this number in the file, and its place here.
+    /// Returns the triangle with this number in the file, and its index here.
     #[inline(always)]
     fn facet(&self, face: usize) -> (&Facet<E>, usize) {
         let at = self.index[face] as usize;
@@ -219,7 +221,7 @@ pub(super) struct ModelForm {
 }
 
 impl ModelForm {
-    /// Makes the form of a model that is placed in the world, or has the world's coordinates.
+    /// Makes the form of a model that is placed in the world, or that already has the world's coordinates.
     pub(super) fn new(model: &Model, placement: Option<&Placement>, place: Place) -> (Frame, Self) {
         let tree = ModelTree::<f64>::of(model);
         let (rotation, scale) = placement.map_or((DMat3::IDENTITY, 1.0), |p| (p.rotation(), p.scale()));
@@ -282,7 +284,7 @@ impl<E: Real> SharedModel<E> {
         }
     }
 
-    /// Moves rays to before they enter the bounding sphere.
+    /// Moves rays back to before they enter the bounding sphere.
     #[inline(always)]
     fn entering<S: Simd>(&self, simd: S, Local { origin, direction }: Local<S, E>) -> Entering<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -339,7 +341,7 @@ impl<E: Real> SharedModel<E> {
         );
     }
 
-    /// Returns the orders of hits on these faces, with those of their looks.
+    /// Returns the orders of hits on these faces: those of the looks of the faces.
     #[inline(always)]
     fn with_looks<S: Simd>(
         &self,
@@ -450,7 +452,7 @@ impl<E: Real> ModelFaces<E> {
         of_normals ^ of_uvs ^ of_colors
     }
 
-    /// Returns a point of the scene and a direction in the coordinates of the triangles.
+    /// Converts a point of the scene and a direction to the coordinates of the triangles.
     #[inline(always)]
     pub(in crate::fast) fn enter<S: Simd>(
         &self,
@@ -464,7 +466,7 @@ impl<E: Real> ModelFaces<E> {
         (turned(point), turned(direction))
     }
 
-    /// Returns a direction and a way in the coordinates of the triangles as those of the scene.
+    /// Converts a direction and an offset from the coordinates of the triangles to those of the scene.
     #[inline(always)]
     pub(in crate::fast) fn leave<S: Simd>(
         &self,
@@ -488,7 +490,7 @@ mod tests {
     use super::*;
     use crate::fast::acceleration::tree::Content;
 
-    /// Reads a sheet with waves, of squares of two triangles each, and normals.
+    /// Makes a wavy sheet with normals, of squares of two triangles each.
     fn sheet(side: usize) -> Arc<Model> {
         let mut text = String::new();
         for (x, z) in (0..=side).flat_map(|x| (0..=side).map(move |z| (x, z))) {

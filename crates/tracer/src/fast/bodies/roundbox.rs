@@ -1,23 +1,26 @@
 //! Boxes with round edges: all points within a radius of a smaller box, the core.
 //!
 //! Along a ray the square of the distance from the core is a convex function of the ray's parameter. It consists of at
-//! most seven parabolas, which meet, with equal slopes, where the ray enters and leaves the three slabs of the core. The
-//! ray enters the body in the last parabola whose beginning is outside and goes down. So there is one square root, there
-//! are no tests of faces, edges and corners, and no seam between them: if rounding chooses the parabola beside the right
-//! one, both have the same value and slope there. A ray leaves the body where the reversed ray enters it.
+//! most seven parabolas, which meet, with equal slopes, where the ray enters and leaves the three slabs of the core.
+//! The ray enters the body in the last parabola that begins outside and descends there. So there is only one square
+//! root, there are no tests of faces, edges and corners, and there is no seam between them. If rounding selects the
+//! parabola next to the right one, both have the same value and slope there. A ray leaves the body where the reversed
+//! ray enters it.
 //!
-//! Most rays leave no slab before they enter the body. So the beginnings where a slab is entered are looked at first. The
-//! parabola found so is no higher than the function behind it as long as no other slab is entered, so a ray that misses
-//! it misses the body. The beginnings where a slab is left are looked at for rays that leave one before they enter the
-//! body. A ray that starts outside the bounding box needs no place where it leaves.
+//! Most rays leave no slab before they enter the body. So the beginnings at which a ray enters a slab are examined
+//! first. As long as the ray enters no other slab, the parabola found in this way is no higher than the function after
+//! it, so a ray that misses the parabola misses the body. The beginnings at which a ray leaves a slab are examined only
+//! for rays that leave one before they enter the body. For a ray that starts outside the bounding box, the point where
+//! it leaves the body is not needed.
 //!
-//! A ray is beside the core along an axis by comparisons of its parameter with those of the slabs alone. So a place that
-//! is outside has an axis along which it is. A ray along a slab gets a small step across it: then its parameters there
-//! are large numbers of the right signs.
+//! Whether a ray is beside the core along an axis is decided only by comparing its parameter with those of the slabs.
+//! So a point outside the core is always outside along some axis. A ray parallel to a slab gets a small slope across
+//! it, so that its parameters there are large numbers of the right signs.
 //!
 //! As for cones, the ray's parameter is counted from its point nearest to the body's centre, so that the numbers are no
-//! larger than the body. The places beside the core have errors of two roundoffs of that, the discriminant is one of a
-//! cross product, and the ends of the interval have errors across the ray of less than 16: within the bound of bodies.
+//! larger than the body. The points beside the core have errors of two roundoffs of the body's size, and the
+//! discriminant is that of a cross product. Across the ray, the ends of the interval have errors of less than 16
+//! roundoffs, within the bound of bodies.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -38,7 +41,7 @@ pub(super) struct Roundbox<E> {
     radius: E,
     /// The distance of the bounding box from the core, with the rounding errors of tests against the box.
     reach: E,
-    /// Half of the lengths of that box, and a bound on the rounding errors of the moment of a ray and of distances.
+    /// The half lengths of that box, and a bound on the rounding errors of the moment of a ray and of distances.
     outer: [E; 3],
     slack: E,
     /// The inverse of the radius, and whether rounding errors are more than a small part of the radius.
@@ -46,10 +49,11 @@ pub(super) struct Roundbox<E> {
     is_sharp: bool,
 }
 
-/// The least step of a ray along an axis, for a direction of length 1.
+/// The smallest absolute component of a ray along an axis, for a direction of length 1.
 const LEAST_STEP: f64 = 1e-30;
 
-/// The radius, in units of half of the greatest length, below which normals are computed as exactly as the ends of intervals.
+/// The radius, in units of half of the greatest length, below which normals need the same accuracy as the ends of
+/// intervals.
 const SHARP_TO_SEE: f64 = 1e-5;
 
 /// The widening of the bounding box, in roundoffs of the body's size.
@@ -64,17 +68,18 @@ struct Slab<S: Simd, E: Real> {
     /// The parameters at which rays enter and leave it.
     near: Lanes<S, E>,
     far: Lanes<S, E>,
-    /// The places of the rays, at the parameter 0, beyond the face by which they enter, and that by which they leave.
+    /// At the parameter 0, the distances of the rays beyond the face by which they enter, and beyond that by which they
+    /// leave.
     before: Lanes<S, E>,
     behind: Lanes<S, E>,
-    /// The parameters at which rays enter and leave that of the bounding box.
+    /// The parameters at which rays enter and leave the slab of the bounding box.
     outer: [Lanes<S, E>; 2],
 }
 
-/// The place of rays beyond the core along an axis, at the parameter 0, and how it grows.
+/// The distance of rays beyond the core along an axis at the parameter 0, and its slope.
 type Beside<S, E> = (Lanes<S, E>, Lanes<S, E>);
 
-/// The places where rays enter the body: the parameter, and the vector there from the core.
+/// The points where rays enter the body: the parameter, and the vector there from the core.
 struct Entry<S: Simd, E: Real> {
     at: Lanes<S, E>,
     from_core: Vec3<S, E>,
@@ -101,7 +106,7 @@ impl<S: Simd, E: Real> Slab<S, E> {
         Self { half, place, direction, near, far, before, behind, outer: [near - grown, far + grown] }
     }
 
-    /// Returns the place of rays beyond it at a parameter.
+    /// Returns the distance of rays beyond it at a parameter.
     #[inline(always)]
     fn beyond(&self, simd: S, at: Lanes<S, E>) -> Lanes<S, E> {
         let place = at.fused_mul_add(self.direction, self.place);
@@ -114,7 +119,7 @@ impl<S: Simd, E: Real> Slab<S, E> {
         begin.simd_lt(self.far) & self.far.simd_lt(end)
     }
 
-    /// Returns the place of rays beyond it from a parameter on.
+    /// Returns the distance of rays beyond it from a parameter on.
     #[inline(always)]
     fn from(&self, simd: S, at: Lanes<S, E>) -> Beside<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -125,7 +130,7 @@ impl<S: Simd, E: Real> Slab<S, E> {
 }
 
 impl<S: Simd, E: Real> Slabs<S, E> {
-    /// Returns the slabs as seen by rays, from their points nearest to the body's centre.
+    /// Returns the slabs relative to rays, whose parameter counts from their points nearest to the body's centre.
     #[inline(always)]
     fn new(simd: S, roundbox: &Roundbox<E>, place: Vec3<S, E>, direction: Vec3<S, E>) -> Self {
         let Roundbox { core: [x, y, z], reach, .. } = *roundbox;
@@ -143,14 +148,14 @@ impl<S: Simd, E: Real> Slabs<S, E> {
         ])
     }
 
-    /// Returns the parameters at which rays enter and leave the bounding box: the first is greater for those that miss.
+    /// Returns the parameters at which rays enter and leave the bounding box. For rays that miss, the first is greater.
     #[inline(always)]
     fn outer(&self) -> [Lanes<S, E>; 2] {
         let Self([x, y, z]) = self;
         [x.outer[0].max(y.outer[0]).max(z.outer[0]), x.outer[1].min(y.outer[1]).min(z.outer[1])]
     }
 
-    /// Returns where rays enter the body whose core has a distance of the root of `square`.
+    /// Returns where rays enter the body. Its surface is at the distance of the root of `square` from the core.
     #[inline(always)]
     fn entry(&self, simd: S, square: Lanes<S, E>) -> Entry<S, E> {
         let Self([x, y, z]) = self;
@@ -179,7 +184,7 @@ impl<S: Simd, E: Real> Slabs<S, E> {
         }
     }
 
-    /// Returns where the parabola that begins at a parameter goes down through the value `square`.
+    /// Returns where the parabola that begins at a parameter descends through the value `square`.
     #[inline(always)]
     fn crossing(&self, simd: S, begin: Lanes<S, E>, square: Lanes<S, E>) -> Entry<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -198,15 +203,15 @@ impl<S: Simd, E: Real> Slabs<S, E> {
     }
 }
 
-/// Returns the step of rays along an axis, not 0.
+/// Returns the component of rays along an axis, which is never 0.
 #[inline(always)]
 fn not_along<S: Simd, E: Real>(simd: S, step: Lanes<S, E>) -> Lanes<S, E> {
     let (zero, least) = (constant::<S, E>(simd, 0.0), constant::<S, E>(simd, LEAST_STEP));
     step.simd_gt(zero).select(step.max(least), step.min(zero - least))
 }
 
-/// Returns the later beginning of the parabola in which rays enter the body, given a parameter at which they are at a
-/// face of one slab, and the other two slabs.
+/// Returns the later of the possible beginnings of the parabola in which rays enter the body, given a parameter at
+/// which they are at a face of one slab, and the other two slabs.
 #[inline(always)]
 fn later<S: Simd, E: Real>(
     simd: S,
@@ -261,8 +266,8 @@ impl<E: Real> Roundbox<E> {
         exit
     }
 
-    /// Returns the rays whose lines meet the bounding box, by the three planes through a line and along an axis. It is the
-    /// test that misses soonest, because it has no division.
+    /// Returns the rays whose lines meet the bounding box, by the three planes through a line and along an axis. It is
+    /// the fastest test to detect a miss, because it has no division.
     #[inline(always)]
     fn passes<S: Simd>(&self, simd: S, Local { origin, direction }: Local<S, E>) -> Mask<S, E> {
         let [x, y, z] = self.outer.map(|half| splat::<S, E>(simd, half));
@@ -329,8 +334,8 @@ impl<E: Real> Roundbox<E> {
         BodyHit { point, normal: normal.scale(within.select(zero - one, one)), within }
     }
 
-    /// Returns the outer normal at the hit of each ray, where the radius is not much more than rounding errors, and whether the ray
-    /// starts within.
+    /// Returns the outer normal at the hit of each ray, for a radius that is not much more than the rounding errors,
+    /// and whether the ray starts within.
     #[inline(always)]
     fn sharp<S: Simd>(&self, simd: S, ray: Local<S, E>) -> (Vec3<S, E>, Mask<S, E>) {
         let zero = constant::<S, E>(simd, 0.0);
@@ -368,15 +373,15 @@ fn clamped<S: Simd, E: Real>(simd: S, place: Lanes<S, E>, half: E) -> Lanes<S, E
     place.max(constant::<S, E>(simd, 0.0) - half).min(half)
 }
 
-/// A box with round edges in its frame, by half of its lengths.
+/// A box with round edges in its frame, given by its half lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoundboxForm {
     pub(super) half: DVec3,
     pub(super) radius: f64,
 }
 
-/// The radius, in units of the body's numbers, below which edges are sharp for all rounding errors. They are drawn with
-/// this radius, so that no ray passes through them.
+/// The radius, in units of the body's numbers, below which edges are sharp as far as rounding errors allow to tell.
+/// Such edges are drawn with this radius, so that no ray passes through them.
 const SHARP: f64 = 1.0 / (1u64 << 46) as f64;
 
 impl RoundboxForm {

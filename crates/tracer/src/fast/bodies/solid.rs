@@ -72,7 +72,7 @@ pub(super) trait Form {
         None
     }
 
-    /// Returns a ball that holds nothing of its surface, as computed; `None` if there is no useful one.
+    /// Returns a ball that contains no part of its surface, as computed; `None` if there is no useful one.
     fn hollow(&self, _: &Frame) -> Option<Hollow> {
         None
     }
@@ -130,7 +130,7 @@ impl Span {
         Self { axis: frame.axes[2], half, hole }
     }
 
-    /// Returns the one along the shortest side of a box.
+    /// Returns the pair of planes across the shortest side of a box.
     pub(super) fn of_box(frame: &Frame, half: DVec3) -> Option<Self> {
         let number = half.to_array().iter().position(|&length| length == half.min_element())?;
         Some(Self { axis: frame.axes[number], half: half[number], hole: 0.0 })
@@ -171,8 +171,8 @@ impl Solid {
         self.form.form().is_near(place, near, !is_square(axes[2]))
     }
 
-    /// Returns the centre and the radius of a bounding sphere, wide enough for rounding errors. For a plane it is its
-    /// point alone.
+    /// Returns the centre and the radius of a bounding sphere, wide enough for rounding errors. For a plane it is only
+    /// its point.
     pub(super) fn ball(&self) -> (DVec3, f64) {
         let (center, radius) = self.form.form().ball(&self.frame);
         (center, radius + WIDER * self.extent())
@@ -184,7 +184,7 @@ impl Solid {
         self.form.form().slab(&self.frame)
     }
 
-    /// Returns a ball that holds nothing of its surface, as computed; `None` for shapes without a useful one.
+    /// Returns a ball that contains no part of its surface, as computed; `None` for shapes without a useful one.
     pub(super) fn hollow(&self) -> Option<Hollow> {
         self.form.form().hollow(&self.frame).filter(|&(_, radius)| radius > 0.0)
     }

@@ -1,8 +1,9 @@
-//! The objects that a ray can meet within one of glass: that object, and those that reach into the box around it.
+//! The objects that a ray can hit while it is within an object of glass: that object, and those that reach into the box
+//! around it.
 //!
-//! A ray within a sphere or a box leaves it where it meets it next. Up to there it is in the box around the object. So if all
-//! rays of a packet are within the same object and meet it again, nothing is searched for but the objects that reach into
-//! that box.
+//! A ray within a sphere or a box leaves it at its next hit with it. Up to there it is in the box around the object. So
+//! if all rays of a packet are within the same object and hit it again, only the objects that reach into that box are
+//! tested.
 
 use crate::fast::acceleration::candidates::Masks;
 use crate::fast::rays::bounds::Bounds;
@@ -10,8 +11,9 @@ use crate::fast::rays::kind::{ByKind, Kind, Row};
 use crate::fast::rays::placed::RenderSpaceShape;
 use crate::fast::shapes::Solid;
 
-/// The distance from the surface of an object at which a ray within it may start, and beside it may meet an object, in
-/// the kernels' coordinates. Both are millions of times smaller in double precision, in which glass is drawn.
+/// The distance from the surface of an object within which a ray in the object may start, and within which it may hit
+/// another object outside, in the kernels' coordinates. Both are millions of times smaller in double precision, in
+/// which glass is drawn.
 const ROOM: f64 = 1e-6;
 
 /// An object of glass that has an inside.
@@ -20,12 +22,12 @@ pub(crate) struct Enclosure {
     pub(crate) kind: Kind,
     /// The index in the array of its kind.
     pub(crate) index: u32,
-    /// The other objects that a ray can meet within it.
+    /// The other objects that a ray within it can hit.
     pub(crate) others: Masks,
 }
 
-/// Returns the enclosures by the orders of the objects. `in_row` are all solids in the order of the row, at most as many as a mask
-/// has bits; `has_inside` is whether the object of an order is of glass and has an inside.
+/// Returns the enclosures by the orders of the objects. `in_row` are all solids in the order of the row, at most as
+/// many as a mask has bits. `has_inside` returns whether the object of an order is of glass and has an inside.
 pub(crate) fn enclosures(
     in_row: &[&Solid],
     (row, counts): (Row, ByKind<usize>),
@@ -50,7 +52,7 @@ pub(crate) fn enclosures(
     all
 }
 
-/// Returns whether a solid may reach into the ball or the box around one, within [`ROOM`].
+/// Returns whether a solid may reach into the ball or the box around another, to within [`ROOM`].
 fn reaches_into(solid: &Solid, other: &Solid) -> bool {
     let ((low, high), (from, to)): (Bounds, Bounds) = (solid.shape.bounds(), other.shape.bounds());
     let overlap = (from - ROOM).cmple(high).all() && (to + ROOM).cmpge(low).all();

@@ -54,8 +54,8 @@ impl<E: Real> Extensions<E> {
         if E::IS_DOUBLE && BUILT.glass { self.glass.as_ref() } else { None }
     }
 
-    /// Lets shadow rays ask for glass apart from opaque objects. `orders` are those of the row of all objects. Returns the
-    /// objects of glass, or `None` if the bodies cannot be parted.
+    /// Makes shadow rays test glass separately from opaque objects. `orders` are those of the row of all objects.
+    /// Returns the objects of glass, or `None` if the bodies cannot be separated.
     pub(crate) fn part_glass(&mut self, orders: impl Iterator<Item = u32>) -> Option<GlassBits> {
         let glass = self.glass.as_ref()?;
         let is_glass = |order: E| glass.of(order).is_some();
@@ -76,13 +76,13 @@ impl<E: Real> Extensions<E> {
         if E::IS_DOUBLE && parts::BUILT.fogs { self.fog.as_ref() } else { None }
     }
 
-    /// Returns the faces of meshes, if any has more than a triangle.
+    /// Returns the faces of meshes, if any of them has data beyond its triangle.
     #[inline(always)]
     pub(crate) fn shaded(&self) -> Option<&ShadedFaces<E>> {
         if parts::BUILT.meshes { self.shaded.as_ref() } else { None }
     }
 
-    /// Returns the surfaces from which paths go on, if light goes round.
+    /// Returns the surfaces that scatter paths, if light goes round.
     #[inline(always)]
     pub(crate) fn paths(&self) -> Option<&Paths> {
         if E::IS_DOUBLE && parts::BUILT.paths { self.paths.as_ref() } else { None }

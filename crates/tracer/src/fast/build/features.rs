@@ -20,7 +20,7 @@ pub(crate) struct Needs {
     pub(crate) shadows: bool,
     /// Whether there are more objects than a mask has bits.
     pub(crate) tree: bool,
-    /// Whether there is more than objects of these kinds, suns, and a background of one colour.
+    /// Whether the scene has more than objects of these kinds, suns, and a background of one colour.
     pub(crate) beyond: bool,
     pub(crate) glass: bool,
 }
@@ -39,7 +39,7 @@ impl Needs {
     /// Rejects a scene whose features this build lacks.
     ///
     /// # Errors
-    /// If the build lacks a feature of the scene.
+    /// Fails if the build lacks a feature of the scene.
     pub(crate) fn check(self) -> Result<(), RenderError> {
         let mut missing = None;
         Kind::each(|kind| {

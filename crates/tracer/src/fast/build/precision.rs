@@ -1,4 +1,4 @@
-//! The choice of the precision that a scene is traced with.
+//! The choice of the precision in which a scene is traced.
 //!
 //! Bounds on the rounding errors of the `f32` kernels are compared with the size of a pixel and of a level. An error is
 //! invisible if it moves an outline or a shadow by less than a small part of a pixel, or a colour by less than a part
@@ -48,11 +48,11 @@ const START: f64 = OFFSET + POINT;
 /// [`LATE`]: crate::fast::arithmetic::rounding::LATE
 const SHADOW: f64 = 16.0;
 
-/// The accumulated rounding error of the place in a face for which its normals are mixed, in roundoffs of its distance: 6 of
-/// the ray's direction and of the distance along it, and 8 of the sides of the edges.
+/// The accumulated rounding error of the point in a face at which its normals are interpolated, in roundoffs of its
+/// distance: 6 of the ray's direction and of the distance along it, and 8 of the sides of the edges.
 const MIXED: f64 = 16.0;
 
-/// The number of pairs of an occluder and a possible receiver that are compared before the search is given up.
+/// The number of pairs of an occluder and a possible receiver after which the search is given up.
 const PAIRS: usize = 1 << 22;
 
 /// The number of triangles in whose shadows rays may always be in doubt, and the largest share of all triangles.
@@ -106,8 +106,8 @@ pub(crate) fn resolve(options: &RenderOptions, geometry: &Geometry, scene: &Scen
     Some(if single { Precision::F32 } else { Precision::F64 })
 }
 
-/// Returns whether rays go on from faces with normals of their own, or pixels have several rays from such faces. For these the
-/// errors of normals have bounds for `f64` alone.
+/// Returns whether faces with normals of their own spawn rays, or pixels have several rays from such faces. In these
+/// cases the errors of normals have bounds only for `f64`.
 fn bends_rays(geometry: &Geometry, scene: &Scene) -> bool {
     let is_mirror = |object: &Object| object.material().mirror() != DVec3::ZERO;
     geometry.faces.is_some() && (scene.samples.most() > 1 || geometry.examples(scene).any(is_mirror))
@@ -270,8 +270,9 @@ fn is_enough(geometry: &Geometry, scene: &Scene, colors: &Colors) -> bool {
         && !surfaces_z_fight(geometry, scene, pixel)
 }
 
-/// Returns whether many triangles are so small beside the scene that each ray towards a sun that passes near one is in doubt,
-/// and is decided exactly. That takes hundreds of times as long as a ray in `f64`, which is not in doubt.
+/// Returns whether many triangles are so small compared with the scene that each ray towards a sun that passes near one
+/// is in doubt, and must be decided exactly. That takes hundreds of times as long as a ray in `f64`, which is not in
+/// doubt.
 fn are_shadows_in_doubt(geometry: &Geometry, roundoff: f64) -> bool {
     // The width of the doubt at an edge, for points of coordinates up to 1 (`Prism`).
     let width = 2.0 * side_of_going_on::<f32>() * roundoff;

@@ -64,7 +64,7 @@ pub(crate) struct Sunlight<E> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Search {
     Masks,
-    /// Lists, and the tree in place of long ones.
+    /// Lists, and the tree where lists would be long.
     Lists,
     Tree,
 }
@@ -98,7 +98,7 @@ pub(crate) struct Prepared<E> {
     pub(crate) sights: Option<TileLists>,
     /// The background, unclamped, for reflected rays. For a sky, its first colour.
     pub(crate) background: [E; 3],
-    /// There is no background: what camera rays reach is counted as cover.
+    /// There is no background, so hits of camera rays are counted as cover.
     is_clear: bool,
     /// A background that depends on the ray's direction.
     sky: Option<Sky<E>>,
@@ -113,9 +113,9 @@ pub(crate) struct Prepared<E> {
     /// The bounding spheres of the objects of the row and of the bodies with bounding boxes, for scenes with glass and
     /// few objects.
     balls: Option<[BoundingSpheres; 2]>,
-    /// The objects of glass, if shadow rays ask for them apart.
+    /// The objects of glass, if shadow rays test them separately.
     glass_bits: Option<GlassBits>,
-    /// The objects of glass within which rays meet little else, by their orders, in scenes of few objects.
+    /// The objects of glass within which rays can hit few other objects, by their orders, in scenes of few objects.
     enclosures: Vec<Option<Enclosure>>,
 }
 
@@ -124,7 +124,7 @@ impl<E: Real> Prepared<E> {
     /// leaf.
     ///
     /// # Errors
-    /// If the build leaves out a feature of the scene.
+    /// Fails if the build leaves out a feature of the scene.
     pub(crate) fn new(
         scene: &Scene,
         geometry: &Geometry,
@@ -286,7 +286,7 @@ impl<E: Real> Prepared<E> {
         if E::IS_DOUBLE && parts::BUILT.pictures { self.panorama.as_ref() } else { None }
     }
 
-    /// Returns whether all camera rays that hit nothing bring the same.
+    /// Returns whether all camera rays that hit nothing have the same colour.
     #[inline(always)]
     fn has_one_backdrop(&self) -> bool {
         self.is_clear() || self.sky().is_none() && self.panorama().is_none()
@@ -304,26 +304,26 @@ impl<E: Real> Prepared<E> {
         E::IS_DOUBLE && BUILT.glass && self.needs.glass
     }
 
-    /// Returns whether rays can be within objects of glass whose surroundings are known.
+    /// Returns whether rays can be within objects of glass for which the nearby objects are known.
     #[inline(always)]
     pub(crate) fn has_enclosures(&self) -> bool {
         E::IS_DOUBLE && BUILT.glass && !self.enclosures.is_empty()
     }
 
-    /// Returns what rays meet within the object of this order, if it is known.
+    /// Returns the objects that rays can hit within the object of this order, if they are known.
     #[inline(always)]
     pub(crate) fn enclosure(&self, order: usize) -> Option<&Enclosure> {
         self.enclosures.get(order)?.as_ref()
     }
 
-    /// Returns the objects of glass, if shadow rays ask for opaque objects first, and for those after them.
+    /// Returns the objects of glass, if shadow rays test opaque objects first, and then glass.
     #[inline(always)]
     pub(crate) fn glass_apart(&self) -> Option<GlassBits> {
         if E::IS_DOUBLE && BUILT.glass { self.glass_bits } else { None }
     }
 
-    /// Returns the objects that shadow rays ask for first, as bits: of the row of all objects, and of the bodies. They are all,
-    /// or the opaque ones.
+    /// Returns the objects that shadow rays test first, as bits: of the row of all objects, and of the bodies. These
+    /// are all objects, or the opaque ones.
     #[inline(always)]
     pub(crate) fn asked_first(&self) -> [u64; 2] {
         match self.glass_apart() {
@@ -332,20 +332,20 @@ impl<E: Real> Prepared<E> {
         }
     }
 
-    /// Returns all objects: by masks, or the whole tree.
+    /// Returns all objects: as masks, or as the whole tree.
     #[inline(always)]
     pub(crate) fn all(&self) -> Candidates<'static> {
         Candidates { masks: self.masks(u64::MAX), list: None, kinds: self.needs.kinds }
     }
 
-    /// Returns the candidates of the rays of a queue, which is filled up to whole packets: objects, and bodies as bits.
+    /// Returns the candidates of the rays of a queue, which is padded to whole packets: objects, and bodies as bits.
     #[inline(always)]
     pub(crate) fn met_by<S: Simd>(&self, simd: S, queue: &RayBatch<E>) -> (Candidates<'static>, u64) {
         let Some([shapes, bodies]) = &self.balls else { return (self.all(), ANY) };
         (Candidates::masked(self.masks(shapes.met_by(simd, queue))), bodies.met_by(simd, queue))
     }
 
-    /// Returns the objects whose bits are set in a word for the row of all objects.
+    /// Returns the objects whose bits are set in a word with the order of the row of all objects.
     #[inline(always)]
     pub(crate) fn masks(&self, bits: u64) -> Masks {
         Masks::split(bits, self.row, self.counts)
@@ -389,7 +389,7 @@ fn mirror_planes(scene: &Scene, solids: &[Solid]) -> Vec<(DVec3, f64)> {
     planes
 }
 
-/// Returns whether it spawns rays: a mirror, anywhere on it, or glass.
+/// Returns whether it spawns rays, because it is glass, or a mirror in some place.
 fn mirrors(material: &Material) -> bool {
     let finish = material.finish();
     let other = || finish?.pattern.map(|pattern| pattern.other.mirror());

@@ -1,6 +1,7 @@
-//! Which of equal hits counts: one without glass goes before one with it, and among those the first in the script.
+//! The winner among equal hits: hits without glass come before those with glass, and within each group the first in the
+//! script wins.
 //!
-//! The kernels take the hit of the lowest order. So they are given the objects in the order in which they count.
+//! The kernels take the hit with the lowest order. So the objects are sorted by precedence before.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,13 +11,13 @@ use rayfold_scene::{Object, Scene};
 use crate::meshes::{Expanded, Faces, Shared};
 use crate::parts::BUILT;
 
-/// A scene whose objects stand in the order in which equal hits count.
+/// A scene whose objects are in the order of precedence of equal hits.
 #[derive(Debug)]
 pub(crate) struct Ranked<'a> {
     pub(crate) scene: Cow<'a, Scene>,
     /// The faces that its triangles are.
     pub(crate) faces: Option<Arc<Faces>>,
-    /// Positions in the script, if they are others.
+    /// The positions in the script, if they differ from that order.
     places: Option<Vec<usize>>,
 }
 
@@ -34,7 +35,7 @@ impl<'a> Ranked<'a> {
         Self { scene, faces, places: Some(places) }
     }
 
-    /// The position in the script of an object.
+    /// Returns the position of an object in the script.
     pub(crate) fn in_script(&self, order: usize) -> usize {
         let order = self.faces.as_ref().map_or(order, |faces| faces.origin(order));
         self.places.as_ref().map_or(order, |places| places[order])

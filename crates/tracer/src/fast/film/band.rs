@@ -31,7 +31,7 @@ pub(crate) struct Tile {
 /// The destination of a tile's pixels: the bytes of its rows, from the image's left edge.
 pub(crate) struct Band<'a> {
     pub(crate) bytes: &'a mut [u8],
-    /// The pixels of its rows, in place of the bytes, in scenes without background.
+    /// The pixels of its rows, instead of the bytes, in scenes without background.
     pub(crate) lit: &'a mut [Lit],
     pub(crate) rows: u32,
     /// The columns and rows of the whole image.
@@ -72,7 +72,7 @@ impl Band<'_> {
     }
 }
 
-/// Returns how many rays the packets of a tile have, those beyond its edges included, from its columns and rows.
+/// Returns how many rays the packets of a tile have, including those beyond its edges, given its columns and rows.
 #[inline(always)]
 pub(crate) fn rays_of<S: Simd, E: Real>((columns, rows): (u32, u32)) -> usize {
     let (width, height) = packet_shape::<S, E>();
@@ -161,7 +161,7 @@ pub(crate) fn write_lit<S: Simd, E: Real>(
     });
 }
 
-/// Calls `each` with the column and row of each pixel of a tile, and its place in the columns of its rays.
+/// Calls `each` with the column and row of each pixel of a tile, and the index of its ray.
 #[inline(always)]
 fn each_pixel<S: Simd, E: Real>(tile: Tile, mut each: impl FnMut((usize, usize), usize)) {
     let (width, height) = packet_shape::<S, E>();

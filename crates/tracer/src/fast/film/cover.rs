@@ -1,18 +1,19 @@
-//! The cover of pixels, in scenes without background: a separate step after the hits of camera rays are known, and one after
+//! The cover of pixels, in scenes without background: one step after the hits of camera rays are known, and one after
 //! those of rays through glass.
 
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, Hits, RayBatch};
 use crate::fast::transport::ray_queue::RayQueues;
 
-/// Gives the first `count` pixels the cover of their camera rays: 1 if the ray hits anything. A packet has so many `lanes`.
+/// Gives the first `count` pixels the cover of their camera rays: 1 if the ray hits anything. A packet has `lanes`
+/// lanes.
 #[inline(never)]
 pub(crate) fn cover_hits<E: Real>(hits: &Hits<E>, count: usize, lanes: usize, cover: &mut Column<E>) {
     cover.0[..count].fill(E::narrow(1.0));
     each_miss(hits, count, lanes, |ray| cover.0[ray] = E::narrow(0.0));
 }
 
-/// Counts the rays of a batch that have come through glass alone and hit nothing, and makes them black.
+/// Counts the rays of a batch that have passed only through glass and hit nothing, and makes them black.
 #[inline(never)]
 pub(crate) fn let_through<E: Real>(
     waiting: &mut RayQueues<E>,

@@ -162,8 +162,8 @@ pub(crate) fn draw<S: Simd, E: Real, N: Kernel<E>>(
 }
 
 impl<E: Real> Scratch<'_, E> {
-    /// Traces the rays that mirrors and glass have spawned, and adds their colours to those of the previous hits. In scenes
-    /// without glass it notes which come near what is watched.
+    /// Traces the rays that mirrors and glass have spawned, and adds their colours to those of the previous hits. In
+    /// scenes without glass it records which rays come near the watched boxes.
     #[inline(always)]
     pub(crate) fn follow<S: Simd, N: Kernel<E>>(
         &mut self,
@@ -247,7 +247,7 @@ fn follow_paths<S: Simd, E: Real, N: Kernel<E>>(
     follow_queued::<S, E, N>(simd, scene, (soft, Some(numbers)), scratch);
 }
 
-/// Traces the queued rays, those of paths if there are numbers for them, until none is left.
+/// Traces the queued rays until none is left. If `numbers` are given, these are the rays of paths.
 #[inline(always)]
 fn follow_queued<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
@@ -320,11 +320,11 @@ pub(crate) struct HitBatch<'a, 'b, E> {
     pub(crate) next: Option<&'a mut RayBatch<E>>,
     /// The queues for spawned rays, in scenes with glass.
     pub(crate) waiting: &'a mut RayQueues<'b, E>,
-    /// The lights of which each ray samples its own point.
+    /// The lights for which each ray samples its own point.
     pub(crate) soft: Option<SoftLight<'a, E>>,
     /// Whether the rays are those of the camera.
     pub(crate) is_first: bool,
-    /// The random numbers of paths, where light goes round.
+    /// The random numbers of paths, if light goes round.
     pub(crate) paths: Option<PathNumbers<'a>>,
 }
 
@@ -416,7 +416,7 @@ fn shade_beyond<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     go_on::<S, E, N, EYE>(simd, scene, is_painted, met, hits);
 }
 
-/// Replaces the nearest hits by those that win, where objects share surfaces.
+/// Replaces the nearest hits by those that win, if objects share surfaces.
 #[inline(always)]
 fn settle_shared<S: Simd, E: Real, N: Kernel<E>, const EYE: bool>(
     simd: S,

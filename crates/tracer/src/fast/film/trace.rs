@@ -14,8 +14,8 @@ use crate::fast::rays::packet::{Nearest, Ray};
 use crate::fast::rays::pixels::{AlongAxis, FromEye};
 use crate::fast::transport::search::{nearest, nearest_from_inside};
 
-/// Calls `each` with the column and the row numbers of the tile's pixels, packet by packet. They count from an
-/// `anchor`, from the left and from the bottom, and are whole numbers or halves.
+/// Calls `each` with the column and the row numbers of the tile's pixels, packet by packet. Columns count from an
+/// `anchor` to the right, and rows upwards. The numbers are whole or halves.
 #[inline(always)]
 fn each_packet<S: Simd, E: Real>(
     simd: S,
@@ -140,8 +140,8 @@ pub(crate) fn trace_queue<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     );
 }
 
-/// Traces the rays of a queue of a scene with glass and few objects, in which it is known what rays can meet within objects
-/// of glass.
+/// Traces the rays of a queue in a scene with glass and few objects, in which the possible hits within objects of glass
+/// are known.
 #[inline(never)]
 pub(crate) fn trace_queue_of_glass<S: Simd, E: Real, F: Features<E>>(
     simd: S,

@@ -1,4 +1,4 @@
-//! Finds the pixels whose rays, or the rays that go on from them, come near some boxes, whatever they hit.
+//! Finds the pixels whose rays, or the rays that continue from them, come near some boxes, whatever they hit.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -12,7 +12,7 @@ use crate::fast::rays::packet::{Ray, no_lane};
 use crate::fast::shapes::Shape;
 use crate::fast::transport::hulls::{Hulls, Region};
 
-/// Boxes, and where shadow rays go.
+/// Boxes, and the directions of shadow rays.
 #[derive(Debug)]
 pub(crate) struct Watch<E> {
     boxes: Vec<Padded<E>>,
@@ -23,7 +23,7 @@ pub(crate) struct Watch<E> {
     lamps: Vec<(DVec3, f64)>,
 }
 
-/// A box as packets are tested against it, with a ball around it.
+/// A box in the form in which packets are tested against it, with a ball around it.
 #[derive(Debug)]
 struct Padded<E> {
     low: [E; 3],
@@ -39,7 +39,8 @@ impl<E: Real> Padded<E> {
         Self { low, high, middle, radius: E::narrow(0.5 * bounds.0.distance(bounds.1)) }
     }
 
-    /// The rays from points in directions around one that can come near: as far off it as a sine says.
+    /// Returns the rays from these points that can come near. The directions differ from a given one by at most an
+    /// angle with this sine.
     #[inline(always)]
     fn near<S: Simd>(&self, simd: S, crossing: &Crossing<S, E>, start: Vec3<S, E>, sine: E) -> Mask<S, E> {
         let way = Vec3::splat(simd, self.middle).sub(start);
@@ -51,7 +52,7 @@ impl<E: Real> Padded<E> {
 }
 
 impl<E: Real> Watch<E> {
-    /// Of at most 64 boxes in the lengths of the scene.
+    /// Makes the watch for at most 64 boxes, given in the lengths of the scene.
     pub(crate) fn new(geometry: &Geometry, boxes: &[Bounds]) -> Self {
         let place = |at: DVec3| (at - geometry.center) * geometry.scale;
         let boxes: Vec<Bounds> = boxes.iter().map(|(low, high)| (place(*low), place(*high))).collect();
@@ -73,8 +74,8 @@ impl<E: Real> Watch<E> {
         }
     }
 
-    /// Notes for each ray of a queue whether it comes near a box, or a shadow ray of its hit does. With `EYE` they are those of the
-    /// camera, and start at the origin; others are those of a pixel of the queue.
+    /// Records for each ray of a queue whether it, or a shadow ray of its hit, comes near a box. With `EYE` the rays
+    /// are those of the camera, and start at the origin; others belong to a pixel of the queue.
     #[inline(never)]
     pub(crate) fn note<S: Simd, const EYE: bool>(
         &self,

@@ -81,8 +81,8 @@ impl<E: Real> Lamp<E> {
         }
     }
 
-    /// Returns the shadow rays from points off a surface to the lamp. A ray from the lamp's own position goes back into
-    /// the surface.
+    /// Returns the shadow rays from points off a surface to the lamp. If a point is at the lamp's own position, its ray
+    /// goes back into the surface.
     #[inline(always)]
     pub(in crate::fast) fn rays<S: Simd>(&self, simd: S, start: Vec3<S, E>) -> Rays<S, E> {
         let middle = Vec3::splat(simd, self.position);

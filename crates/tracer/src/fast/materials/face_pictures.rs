@@ -1,4 +1,4 @@
-//! Pictures that lie on the faces of a model by texture coordinates, looked up in lanes.
+//! Pictures on the faces of a model, by texture coordinates, looked up in lanes.
 //!
 //! These are the functions of [`crate::pictures`], with the same results in `f64`. Only the pixels themselves are read lane by
 //! lane.
@@ -15,8 +15,8 @@ use crate::pictures::FacePicture;
 pub(super) struct Looked<E> {
     /// Texture coordinates at the corners, by corner and axis.
     coordinates: [[[E; 16]; 2]; 3],
-    /// The columns and rows around the place of a hit, and the shares of the second of each: left, right, share, first, second,
-    /// share.
+    /// The columns and rows around the place of a hit, with the weights of the second ones: left, right, weight, first,
+    /// second, weight.
     around: [[E; 16]; 6],
     /// The values of the picture there.
     values: [[E; 16]; 3],
@@ -37,8 +37,8 @@ impl<E: Real> Looked<E> {
         }
     }
 
-    /// Returns the factors of a picture where faces are hit. `bits` are the lanes that hit some, and the others have any
-    /// number.
+    /// Returns the factors of a picture where faces are hit. `bits` are the lanes with such hits; the other lanes have
+    /// any number.
     #[inline(always)]
     pub(super) fn factors<S: Simd>(
         &mut self,
@@ -106,7 +106,7 @@ impl<E: Real> Looked<E> {
     }
 }
 
-/// Returns the two pixels, of so many, whose middles are around places, and the shares of the second.
+/// Returns the two pixels, out of `count`, whose middles are around each place, and the weights of the second ones.
 #[inline(always)]
 fn neighbours<S: Simd, E: Real>(
     simd: S,
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::pictures;
 
-    /// Checks that the pixels around places, one in each lane, are those that the reference takes.
+    /// Checks that the pixels around places, one in each lane, are those that the reference selects.
     fn check<S: Simd>(simd: S, places: &[f64; 8], count: u32, wrap: Wrap) {
         for at in (0..places.len()).step_by(Lanes::<S, f64>::LEN) {
             let place = Lanes::<S, f64>::from_slice(simd, &places[at..at + Lanes::<S, f64>::LEN]);

@@ -1,9 +1,9 @@
 //! The faces of meshes: normals at vertices, colours at vertices, and the inside of closed glass.
 //!
-//! Normals are mixed in lanes. The weights of a hit come from the edges that the tests of its triangle use, so that a
-//! hit needs nothing but its triangle and the three normals. Hits on a model with a tree of its own are moved into the
-//! model's coordinates for it, and the normals back. As patterns are, colours are computed lane by lane, with the functions
-//! of the reference tracer.
+//! Normals are mixed in lanes. The weights of a hit come from the edges that the tests of its triangle use, so a hit
+//! needs only its triangle and the three normals. Hits on a model with a tree of its own are converted to the model's
+//! coordinates for this, and the normals are converted back. Colours, like patterns, are computed lane by lane, with
+//! the functions of the reference tracer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,15 +23,15 @@ use crate::fast::shapes::triangle::{Facet, Triangle};
 use crate::meshes::{FaceHit, Faces, Run, hit_face};
 use crate::pictures::FacePicture;
 
-/// The faces of a scene, at least one of which has more than a triangle.
+/// The faces of a scene, if at least one of them has data beyond its triangle.
 #[derive(Debug)]
 pub(crate) struct ShadedFaces<E> {
     faces: Arc<Faces>,
-    /// The runs of faces that have more than triangles.
+    /// The runs of faces that have data beyond their triangles.
     runs: Vec<ShadedRun<E>>,
     /// Whether any are drawn from the trees of their models.
     has_models: bool,
-    /// Whether any of those have a picture that alone colours their faces.
+    /// Whether any of those have a picture and nothing else that colours their faces.
     has_pictures: bool,
     /// The scene, for its materials.
     scene: Scene,
@@ -46,7 +46,7 @@ struct ShadedRun<E> {
     orders: Range<usize>,
     /// The index among all runs of faces.
     index: usize,
-    /// The faces in their model, if they are drawn from its tree. Then their normals are there.
+    /// The faces in their model, if they are drawn from its tree. In that case the normals are stored there.
     model: Option<ModelFaces<E>>,
     /// The unit normals at the corners of each face; zeros for a flat one. Empty if all are flat.
     normals: Vec<[[E; 3]; 3]>,
@@ -54,7 +54,7 @@ struct ShadedRun<E> {
     is_colored: bool,
     /// The picture of the faces of a model that is drawn from its tree, if nothing else colours them.
     picture: Option<FacePicture>,
-    /// The index of refraction of glass, or 0; and 1 for a closed body of glass.
+    /// The index of refraction of glass, or 0. Then 1 for a closed body of glass, or 0.
     ior: E,
     is_filled: E,
 }
@@ -65,13 +65,13 @@ struct Gathered<E> {
     edges: [[[E; 16]; 3]; 3],
     moments: [[[E; 16]; 3]; 3],
     normals: [[[E; 16]; 3]; 3],
-    /// 1 for lanes that hit such a face.
+    /// 1 for lanes that hit such a face, else 0.
     is_face: [E; 16],
     /// For lanes that hit glass: its index of refraction, and 1 if it is the inside of a closed body. 0 for all others.
     ior: [E; 16],
     is_filled: [E; 16],
-    /// The lanes whose faces have more than normals: the lane, the index of the run in this list, and whether the face is
-    /// shaded by the functions of the reference tracer alone, because it has holes.
+    /// The lanes whose faces have more than normals: the lane, the index of the run in this list, and whether only the
+    /// functions of the reference tracer shade the face, because it has holes.
     more: [(usize, usize, bool); 16],
     more_count: usize,
 }
@@ -89,9 +89,9 @@ impl<E: Real> ShadedFaces<E> {
         Some(Self { faces, runs, has_models, has_pictures, scene, center, scale })
     }
 
-    /// Gives hits the normals and colours of their faces. Rays that go on from them start as from triangles.
-    /// `EYE` says that the rays start at the eye, and count for 1. `triangle` returns the triangle that an object is, unless
-    /// it is a body.
+    /// Gives hits the normals and colours of their faces. Rays that continue from them start as from triangles. With
+    /// `EYE` the rays start at the eye and have a weight of 1. `triangle` returns the triangle of an object, unless the
+    /// object is a body.
     #[inline(never)]
     pub(crate) fn shade<'t, S: Simd, const EYE: bool>(
         &self,
@@ -141,7 +141,7 @@ impl<E: Real> ShadedFaces<E> {
         );
     }
 
-    /// Returns the index of the run of an object among those here.
+    /// Returns the index here of the run of an object.
     #[inline(always)]
     fn run_of(&self, order: usize) -> Option<usize> {
         let at = match &self.runs[..] {
@@ -151,8 +151,8 @@ impl<E: Real> ShadedFaces<E> {
         self.runs[at].orders.contains(&order).then_some(at)
     }
 
-    /// Reads from the normals of all hits on models with trees of their own, independently of each other, so that memory brings
-    /// them while others are still on their way.
+    /// Touches the normals of all hits on models with trees of their own, independently of each other, so that their
+    /// memory accesses overlap.
     #[inline(always)]
     fn fetch<S: Simd>(&self, hits: &Hits<E>) {
         let mut sum = 0;
@@ -173,8 +173,8 @@ impl<E: Real> ShadedFaces<E> {
         std::hint::black_box(sum);
     }
 
-    /// Gathers the faces of open lanes, and takes their bits: those of one model that is drawn from its tree, which is
-    /// returned, or those of all other objects.
+    /// Gathers the faces of open lanes, and clears their bits. The faces are those of one model that is drawn from its
+    /// tree, which is returned, or those of all other objects.
     #[inline(always)]
     fn gather<'t>(
         &self,
@@ -229,8 +229,7 @@ impl<E: Real> ShadedFaces<E> {
         first.and_then(|run| self.runs[run].model.as_ref())
     }
 
-    /// Adds the colours of faces. A face with holes is shaded by the functions of the reference
-    /// tracer alone.
+    /// Adds the colours of faces. A face with holes is shaded only by the functions of the reference tracer.
     #[inline(never)]
     fn add_more<S: Simd, const EYE: bool>(
         &self,
@@ -350,7 +349,7 @@ impl<E: Real> Gathered<E> {
         }
     }
 
-    /// Takes the face that a lane hits: its edges, and the normals at its corners.
+    /// Stores the face that a lane hits: its edges, and the normals at its corners.
     #[inline(always)]
     #[allow(
         clippy::needless_range_loop,
@@ -392,8 +391,8 @@ impl<E: Real> Gathered<E> {
         factors.mul(Vec3::load(simd, &hits.diffuse, at)).store(&mut hits.diffuse, at);
     }
 
-    /// Mixes the normals of the gathered faces, in the coordinates of their `model` if they have one, and lifts the starts of
-    /// their shadow rays. Returns the weights of the corners.
+    /// Interpolates the normals of the gathered faces, in the coordinates of their `model` if they have one, and lifts
+    /// the starts of their shadow rays. Returns the weights of the corners.
     #[inline(always)]
     fn mix<S: Simd>(
         &self,
@@ -491,7 +490,7 @@ impl<E: Real> Gathered<E> {
 }
 
 impl<E: Real> Hits<E> {
-    /// Leaves no hit with a face of a mesh, in a scene without.
+    /// Records that no hit is on a face of a mesh, in a scene without meshes.
     pub(crate) fn forget_faces(&mut self) {
         if !self.face[0].is_empty() {
             let columns = [&mut self.face, &mut self.place, &mut self.under, &mut self.onward];
@@ -499,7 +498,8 @@ impl<E: Real> Hits<E> {
         }
     }
 
-    /// Lets rays go on from the hits after all lights were added: from the faces, and by their normals.
+    /// Sets the origins and normals for rays that continue from the hits, after all lights were added: those of the
+    /// faces.
     pub(crate) fn leave_faces(&mut self) {
         if self.place[0].is_empty() {
             return;
@@ -511,21 +511,21 @@ impl<E: Real> Hits<E> {
     }
 }
 
-/// Loads three vectors. `map` of arrays is not inlined.
+/// Loads three vectors. It exists because `map` of arrays is not inlined.
 #[inline(always)]
 fn loaded<S: Simd, E: Real>(simd: S, columns: &[[[E; 16]; 3]; 3]) -> [Vec3<S, E>; 3] {
     let [a, b, c] = columns;
     [Vec3::load(simd, a, 0), Vec3::load(simd, b, 0), Vec3::load(simd, c, 0)]
 }
 
-/// Returns vectors that point to the same side as others, each itself or its opposite.
+/// Returns vectors on the same side as others: each itself or its opposite.
 #[inline(always)]
 fn towards<S: Simd, E: Real>(simd: S, v: Vec3<S, E>, side: Vec3<S, E>) -> Vec3<S, E> {
     let is_away = v.dot(side).simd_lt(constant::<S, E>(simd, 0.0));
     v.scale(is_away.select(constant::<S, E>(simd, -1.0), constant::<S, E>(simd, 1.0)))
 }
 
-/// Returns normals of triangles, on the sides from which their corners go round counterclockwise.
+/// Returns normals of triangles, on the sides from which their corners appear counterclockwise.
 #[inline(always)]
 fn normals_of_faces<S: Simd, E: Real>(_: S, edges: &[Vec3<S, E>; 3]) -> Vec3<S, E> {
     edges[1].cross(edges[2])

@@ -1,8 +1,8 @@
 //! Finishes beyond the coefficients that all surfaces have: highlights, patterns of other coefficients, pictures, and glow.
 //!
-//! Both are worked out lane by lane, with the functions of the plain tracer: they are powers and lattices of few pixels,
-//! which must be the same bytes everywhere. Patterns are read off the numbers of the script, so that a hit is taken back
-//! to where the script has it.
+//! They are computed lane by lane, with the functions of the plain tracer. Only few pixels need them, and their powers
+//! and lattices must give the same bytes everywhere. Patterns depend on the numbers of the script, so a hit is
+//! converted back to the script's coordinates.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -18,7 +18,7 @@ use crate::fast::rays::packet::Ray;
 use crate::parallel::map;
 use crate::reference::{self, coefficients, highlight};
 
-/// The surfaces of a scene that has some of these.
+/// The surfaces of a scene that uses some of these.
 #[derive(Debug)]
 pub(crate) struct Finishes {
     scene: Scene,
@@ -28,20 +28,20 @@ pub(crate) struct Finishes {
     pub(crate) has_highlights: bool,
     /// The glow of each object; empty if none glows.
     glows: Vec<DVec3>,
-    /// The square of the cosine from which the highlights of each object can be seen: [`NEVER`] without, and negative if they
-    /// can be seen from anywhere.
+    /// The square of the cosine from which the highlights of each object can be seen: [`NEVER`] without highlights, and
+    /// negative if they can be seen from anywhere.
     least_cosines: Vec<f32>,
-    /// The mirror coefficients of each object, and whether its coefficients depend on the place of a hit; empty if they are not
-    /// asked for: without patterns and rough mirrors.
+    /// The mirror coefficients of each object, and whether its coefficients depend on the position of the hit. Empty if
+    /// they are not needed: without patterns and rough mirrors.
     mirrors: Vec<(DVec3, bool)>,
     /// The highlights of each object; empty if none has any.
     shines: Vec<Option<Shine>>,
 }
 
-/// More than the square of any cosine.
+/// A value above the square of any cosine.
 const NEVER: f32 = 2.0;
 
-/// The brightness below which no highlight can be seen.
+/// The brightness below which no highlight is visible.
 const UNSEEN: f64 = 1.0 / (1u64 << 63) as f64;
 
 /// The highlights of a packet of hits.
@@ -50,12 +50,12 @@ pub(crate) struct Gloss<'a> {
     sum: [DVec3; 16],
     /// The highlights on rough mirrors, times the weights of the rays.
     of_mirrors: [DVec3; 16],
-    /// Whether any light adds something.
+    /// Whether any light adds a highlight.
     pub(crate) is_seen: bool,
 }
 
 impl Finishes {
-    /// None if no object has any.
+    /// Returns `None` if no object has any of these.
     pub(crate) fn new(scene: &Scene, geometry: &Geometry) -> Option<Self> {
         let finishes = || scene.objects.iter().filter_map(|object| object.material().finish());
         finishes().next()?;
@@ -105,7 +105,7 @@ impl Finishes {
         !self.glows.is_empty()
     }
 
-    /// Adds the glow of the objects to the colours of the hits; `EYE` says that the rays count for 1.
+    /// Adds the glow of the objects to the colours of the hits. With `EYE` the rays have a weight of 1.
     #[inline(never)]
     pub(crate) fn glow<E: Real, const EYE: bool>(
         &self,
@@ -128,8 +128,8 @@ impl Finishes {
         }
     }
 
-    /// Mixes the coefficients of patterns and the factors of pictures into the colours and diffuse coefficients of the hits, and notes the mirror
-    /// coefficients of all; `EYE` says that the rays count for 1.
+    /// Mixes the coefficients of patterns and the factors of pictures into the colours and diffuse coefficients of the
+    /// hits, and stores the mirror coefficients of all. With `EYE` the rays have a weight of 1.
     #[inline(never)]
     pub(crate) fn paint<E: Real, const EYE: bool>(
         &self,
@@ -169,8 +169,8 @@ impl Finishes {
         }
     }
 
-    /// Along an axis to which the ray is square a hit lies where the ray starts, so that walls between cells are met where
-    /// they are.
+    /// Along an axis that is perpendicular to the ray, a hit has the coordinate of the ray's start, so that walls
+    /// between cells are exact.
     fn coefficients_at(
         &self,
         order: usize,
@@ -192,8 +192,8 @@ impl Finishes {
         coefficients(object, place, normal, &surface, self.scene.tone == Tone::Srgb)
     }
 
-    /// Returns the lanes whose highlights of a light in the direction `towards` can be seen. `orders` are those of the objects
-    /// that the lanes meet, along `direction`.
+    /// Returns the lanes in which the highlights of a light in the direction `towards` are visible. `orders` are those
+    /// of the objects that the lanes hit, along `direction`.
     #[inline(always)]
     pub(crate) fn shines<S: Simd, E: Real>(
         &self,
@@ -222,7 +222,7 @@ impl Finishes {
     }
 }
 
-/// Returns the square of the cosine from which the highlights of a finish in a light can be seen, and a little less.
+/// Returns slightly less than the square of the cosine from which the highlights of a finish in a light are visible.
 fn least_cosine(finish: &Finish, light: f64) -> f32 {
     match finish.shine {
         _ if finish.rough.is_some() => -1.0,
@@ -234,7 +234,7 @@ fn least_cosine(finish: &Finish, light: f64) -> f32 {
     }
 }
 
-/// Returns whether the coefficients of a surface depend on the place of a hit.
+/// Returns whether the coefficients of a surface depend on the position of a hit.
 fn is_painted(finish: &Finish) -> bool {
     finish.pattern.is_some() || finish.image.as_ref().is_some_and(|image| image.map() != ImageMap::Uv)
 }
@@ -248,16 +248,16 @@ fn write<E: Real>(columns: &mut [impl AsMut<[E]>; 3], lane: usize, color: DVec3)
 /// A surface in a light.
 #[derive(Clone, Copy)]
 pub(crate) struct Lit<S: Simd, E: Real> {
-    /// Which lanes it reaches.
+    /// The lanes that the light reaches.
     pub(crate) lanes: Mask<S, E>,
     /// The unit vector towards it.
     pub(crate) towards: Vec3<S, E>,
-    /// What arrives of its colour.
+    /// The share of its colour that arrives.
     pub(crate) color: Vec3<S, E>,
 }
 
 impl Gloss<'_> {
-    /// Adds the highlights of a light; `ray` are the rays that see them, `orders` what they meet.
+    /// Adds the highlights of a light. `ray` are the rays that see them, and `orders` those of their hits.
     #[inline(never)]
     pub(crate) fn add<S: Simd, E: Real>(
         &mut self,
@@ -277,8 +277,8 @@ impl Gloss<'_> {
         }
     }
 
-    /// Adds the highlights that a light makes on rough mirrors. `mirror` are their coefficients times the weights of the rays, from
-    /// that of the first lane on.
+    /// Adds the highlights of a light on rough mirrors. `mirror` are their coefficients times the weights of the rays,
+    /// from the first lane on.
     #[inline(never)]
     pub(crate) fn add_rough<S: Simd, E: Real>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Fog: a step after lighting, which mixes the fog's colour into what hits bring, by their distance.
+//! Fog: a step after lighting, which mixes the fog's colour into the colours of hits, by their distance.
 //!
 //! It is computed lane by lane, so that the exponential is the same on every machine. Rays that hit nothing have the
 //! fog's colour already: it is the background of a scene with fog.
@@ -25,9 +25,9 @@ impl Fog {
         Some(Self { color, distance: scale * distance })
     }
 
-    /// Mixes the fog into the colours of the hits. Stores what it leaves of the rays' weight ([`Hits::clearness`]), and
-    /// the mirror coefficients times that. `mirror` returns those of an object by its order; `is_painted` says that
-    /// the hits have them already. With `EYE` the rays have a weight of 1.
+    /// Mixes the fog into the colours of the hits. Stores the rest of the rays' weight ([`Hits::clearness`]), and the
+    /// mirror coefficients times that. `mirror` returns the coefficients of an object by its order; `is_painted` says
+    /// that the hits already contain them. With `EYE` the rays have a weight of 1.
     #[inline(never)]
     pub(crate) fn dim<E: Real, const EYE: bool>(
         &self,

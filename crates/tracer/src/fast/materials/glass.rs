@@ -23,12 +23,12 @@ pub(crate) struct Glass<E> {
     faint: f64,
 }
 
-/// The objects of glass, as bits, in scenes whose shadow rays ask for opaque objects first.
+/// The objects of glass, as bits, in scenes whose shadow rays test opaque objects first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GlassBits {
-    /// Those of the row of all objects.
+    /// The bits of the row of all objects.
     pub(crate) shapes: u64,
-    /// Those of the bodies that have bounding boxes.
+    /// The bits of the bodies that have bounding boxes.
     pub(crate) bodies: u64,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct GlassBits {
 pub(crate) struct Pane<E> {
     /// The transmitted share, per channel.
     pub(crate) color: [E; 3],
-    /// The mean of the channels, clamped to 0..=1: the share of what is behind that stays clear.
+    /// The mean of the channels, clamped to 0..=1: the share of the background that stays clear.
     clearness: E,
     /// The index of refraction of the inside divided by that of the outside.
     ior: E,
@@ -114,7 +114,7 @@ impl<E: Real> Pane<E> {
         })
     }
 
-    /// Returns the share of what is behind that stays clear where nothing is reflected.
+    /// Returns the share of the background that stays clear if nothing is reflected.
     #[inline(always)]
     pub(crate) fn clearness(&self) -> E {
         self.clearness

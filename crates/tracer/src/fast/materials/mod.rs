@@ -1,4 +1,4 @@
-//! Materials beyond ambient, diffuse and mirror: highlights, patterns, glass; and the sky behind all.
+//! Materials beyond ambient, diffuse and mirror: highlights, patterns, glass; and the sky.
 //!
 //! In: materials of the scene. Out: tables that the steps of [`super::transport`] read. Read [`finish`] first.
 

@@ -65,7 +65,7 @@ impl Paths {
         self.guide.as_ref()
     }
 
-    /// Returns a place of the kernels' coordinates in the scene.
+    /// Converts a point from the kernels' coordinates to the scene.
     #[inline(always)]
     pub(crate) fn in_scene(&self, place: DVec3) -> DVec3 {
         place / self.scale + self.center

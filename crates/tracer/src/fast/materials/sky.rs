@@ -25,8 +25,8 @@ impl<E: Real> Sky<E> {
     }
 }
 
-/// Gives the first `count` rays of a queue that hit nothing the light of a picture, ray by ray. A packet has so many `lanes`. With
-/// `EYE` they all have a weight of 1.
+/// Gives the first `count` rays of a queue that hit nothing the light of a picture, ray by ray. A packet has `lanes`
+/// lanes. With `EYE` they all have a weight of 1.
 #[inline(never)]
 pub(crate) fn show_panorama<E: Real, const EYE: bool>(
     panorama: &Panorama,

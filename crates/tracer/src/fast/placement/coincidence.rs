@@ -4,8 +4,8 @@
 //! pixel, rounding decides which of them is visible. This module searches for such pairs in `f64`: faces of triangles
 //! and boxes in almost one plane, spheres that touch from within, and spheres that touch a face. Surfaces that coincide
 //! in `f64`, too, are meant to. They are not counted if their numbers are equal in `f32`, because then rays hit both at
-//! the same distance bit for bit. For a sphere and a face the colours do not matter: a surface that near a sphere is in
-//! the shadow of its rounding error.
+//! the same distance bit for bit. For a sphere and a face the colours do not matter, because rounding errors can put a
+//! surface so near a sphere into its shadow.
 //!
 //! The result does not depend on the order of the objects.
 
@@ -46,8 +46,8 @@ const FEW_PAIRS: usize = 1 << 20;
 const SHARED: usize = 1 << 16;
 const SHARES: usize = 256;
 
-/// Returns whether two surfaces cannot be ordered in single precision, where it is visible. `pixel` is the size of a
-/// pixel: an angle from the eye, or a length in parallel projection.
+/// Returns whether two surfaces cannot be ordered in single precision, and the difference is visible. `pixel` is the
+/// size of a pixel: an angle from the eye, or a length in parallel projection.
 pub(crate) fn surfaces_z_fight(geometry: &Geometry, scene: &Scene, pixel: f64) -> bool {
     let has_none = |kind: fn(&Solid) -> bool| all(&geometry.solids, |solid| !kind(solid));
     let has_balls = !has_none(is_ball);
@@ -136,8 +136,8 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Compares a pair of nodes, and adds those within to the pending ones. Returns whether a pair of solids is found, or may
-    /// be.
+    /// Compares a pair of nodes, and adds the pairs within to the pending ones. Returns whether a pair of solids is
+    /// found, or may be.
     fn step(&self, (a, b): (usize, usize), pending: &mut Vec<(usize, usize)>) -> bool {
         let Self { search, branches, contents, .. } = self;
         if contents[a].cannot_blur(&contents[b]) {
@@ -310,13 +310,13 @@ impl Search<'_> {
         self.material(one) != self.material(other) || self.is_varied(one) || self.is_varied(other)
     }
 
-    /// Returns whether the normal or the colour of a solid varies. Then no other looks as it does.
+    /// Returns whether the normal or the colour of a solid varies, so that no other solid looks the same.
     fn is_varied(&self, solid: &Solid) -> bool {
         self.faces.is_some_and(|faces| faces.is_varied(solid.order as usize))
     }
 
     /// Returns whether two spheres z-fight: they are within the slack of each other on a strip as wide as a pixel.
-    /// Spheres that touch from outside are seen apart from everywhere except from inside. Spheres that are meant to
+    /// Spheres that touch from outside look separate from everywhere except from inside. Spheres that are meant to
     /// coincide count if their numbers differ in single precision.
     fn spheres_z_fight(
         &self,

@@ -57,9 +57,9 @@ pub(crate) struct Geometry {
     pub(crate) shared: Option<SharedSurfaces>,
     /// The positions of objects that have all materials and all kinds of shapes, in a scene of meshes. Their faces are many.
     examples: Option<Vec<u32>>,
-    /// The faces that triangles are, if they have more than triangles.
+    /// The faces of triangles that have data beyond their triangle.
     pub(crate) faces: Option<Arc<Faces>>,
-    /// The holes of faces, if any can have some. Those faces are among the bodies.
+    /// The holes of faces, if any face can have holes. Faces with holes are among the bodies.
     pub(crate) holes: Option<Arc<bodies::Holes>>,
     /// A length of the scene times this is a length in these coordinates.
     pub(crate) scale: f64,
@@ -71,7 +71,7 @@ impl Geometry {
     /// Converts a scene whose triangles are no faces of meshes. `tree` sets whether objects are found by a tree, if it matters.
     ///
     /// # Errors
-    /// If the scene is so large that its size is not a finite number.
+    /// Fails if the scene is so large that its size is not a finite number.
     pub(crate) fn new(scene: &Scene, tree: Option<bool>) -> Result<Self, RenderError> {
         Self::with_faces(scene, None, tree)
     }
@@ -217,7 +217,7 @@ impl Geometry {
     }
 }
 
-/// Takes the triangles that can have holes out of solids.
+/// Removes the triangles that can have holes from some solids, and returns them.
 fn take_cutouts(solids: &mut Vec<Solid>, faces: &Faces) -> Vec<bodies::Solid> {
     let mut cutouts = Vec::new();
     solids.retain(|solid| match solid.shape {

@@ -1,7 +1,7 @@
 //! Pairs of objects that share a surface.
 //!
-//! Parts of surfaces are brought into an order in which those that lie in one stand side by side: first by their direction,
-//! then by where they lie. What stands together is compared pair by pair, as far as one lies over the other.
+//! Parts of surfaces are sorted so that those in the same surface are neighbours: first by direction, then by position.
+//! Neighbours are compared pair by pair if one lies over the other.
 
 use glam::DVec3;
 use rayfold_scene::{Object, Scene};
@@ -12,24 +12,25 @@ use crate::fast::shared::surface::{ASIDE, Flat, Plain, SAME, Surface};
 use crate::fast::shared::{Pair, SharedSurfaces};
 use crate::{Precision, RenderOptions};
 
-/// Parts that are compared at most: in a crowd of so many that all lie in one place, rounding decides about the rest.
+/// The maximum number of comparisons of parts. If more parts lie in one place, rounding decides about the rest.
 const MAX_COMPARED: usize = 1 << 25;
 
-/// Pairs that are kept at most.
+/// The maximum number of pairs that are kept.
 const MAX_PAIRS: usize = 1 << 22;
 
-/// How near directions and places stand together, at least.
+/// The minimum distance within which directions and positions count as neighbours.
 const TOGETHER: f64 = 1.0 / (1u64 << 32) as f64;
 
-/// How many times the rounding error of a place that of a direction may be: it grows as a part is small for its distance.
+/// The factor by which the rounding error of a direction may exceed that of a position. It grows as a part gets small
+/// compared with its distance.
 const SMALL: f64 = 1024.0;
 
 /// A part of an object's surface.
 struct Part {
     order: u32,
-    /// Along which direction it lies, and where.
+    /// The direction of a part, and its position along it.
     key: (f64, f64),
-    /// From where to where it reaches along [`ASIDE`], at most.
+    /// The largest range that it covers along [`ASIDE`].
     span: (f64, f64),
     surface: Surface,
 }
@@ -43,15 +44,15 @@ impl Part {
 }
 
 impl Geometry {
-    /// With the objects that share surfaces.
+    /// Adds the objects that share surfaces.
     pub(crate) fn with_shared_surfaces(mut self, scene: &Scene) -> Self {
         let pairs = find(&self, scene);
         self.shared = (!pairs.is_empty()).then(|| SharedSurfaces::of_pairs(&pairs, scene.objects.len()));
         self
     }
 
-    /// The same for single precision where that was asked for: where it is chosen, no surfaces are shared but those that it
-    /// meets at the same distance bit for bit.
+    /// Adds them for single precision, if that was requested. If single precision was chosen automatically, the only
+    /// shared surfaces are those that rays hit at the same distance bit for bit.
     pub(crate) fn with_shared_surfaces_if_single(self, scene: &Scene, options: &RenderOptions) -> Self {
         match options.precision {
             Precision::F32 => self.with_shared_surfaces(scene),
@@ -60,7 +61,7 @@ impl Geometry {
     }
 }
 
-/// The pairs of a scene, sorted by the second object and then by the first.
+/// Returns the pairs of a scene, sorted by the second object and then by the first.
 fn find(geometry: &Geometry, scene: &Scene) -> Vec<Pair> {
     let is_plain = geometry.bodies.is_empty() && !geometry.is_finished && !geometry.are_distinct();
     if is_plain && geometry.have_one_material(scene) {
@@ -130,7 +131,7 @@ impl Search {
     }
 }
 
-/// The parts of what has no axes of its own.
+/// Returns the parts of objects that have no axes of their own.
 fn each_part(shape: &Shape, mut each: impl FnMut(Surface)) {
     match shape {
         Shape::Sphere(ball) => each(Surface::Ball { center: ball.center, radius: ball.radius }),
@@ -160,16 +161,16 @@ fn each_part(shape: &Shape, mut each: impl FnMut(Surface)) {
     }
 }
 
-/// The part of the numbers of the script that rounding errors are relative to: those are rounded once or twice, and not in
-/// each step of a test.
+/// The weight of the script's numbers in bounds on rounding errors: they are rounded once or twice, and not in each
+/// step of a test.
 const WRITTEN: f64 = 1.0 / 16.0;
 
-/// How many times what is seen from the eye they may be: farther away the roundings of the script's numbers are large for what is
-/// seen, and surfaces are where the numbers say.
+/// The maximum ratio of the script's weighted numbers to the numbers as seen from the eye. Farther away the rounding
+/// errors of the script's numbers are visible, and surfaces are where the numbers say.
 const FARTHEST: f64 = (1u64 << 19) as f64;
 
-/// The largest numbers that take part in where an object lies, along each axis, as lengths of the kernels: seen from the eye, and
-/// with less weight those of its line, of its group and of the eye.
+/// Returns the largest numbers that determine the position of an object, along each axis, as lengths of the kernels: as
+/// seen from the eye, and with less weight those of its line, of its group and of the eye.
 fn sizes(object: &Object, geometry: &Geometry) -> DVec3 {
     let center = geometry.center;
     let seen = numbers(object, center);
@@ -177,7 +178,7 @@ fn sizes(object: &Object, geometry: &Geometry) -> DVec3 {
     (seen + written.min(DVec3::splat(FARTHEST * seen.max_element()))) * geometry.scale
 }
 
-/// The same for coordinates whose origin is `center`.
+/// Returns the same for coordinates with the origin `center`.
 fn numbers(object: &Object, center: DVec3) -> DVec3 {
     let Object::Instance(instance) = object else { return of_line(object, center) };
     let placement = instance.placement();
@@ -209,7 +210,7 @@ mod tests {
 
     use super::*;
 
-    /// The pairs of a scene of objects of unlike colours.
+    /// Returns the pairs of a scene of objects with different colours.
     fn pairs(objects: Vec<Object>) -> Vec<(u32, u32)> {
         let mut scene = Scene::new(Screen::new(4, 3).unwrap(), Camera::Orthographic);
         scene.objects = objects.into();

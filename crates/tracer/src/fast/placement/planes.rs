@@ -1,9 +1,9 @@
-//! Shared planes, so that triangles in one plane are hit at the same distance.
+//! Triangles in one plane share their plane's numbers, so that they are hit at the same distance.
 //!
-//! Each triangle has its own normal and height, and their rounding errors are its own too. In `f64`, where they are not
-//! rounded once more, two triangles in one plane would be hit an ulp apart, and the first in the script would not
-//! always win. So triangles whose planes are equal up to rounding get the numbers of the first of them. Planes are
-//! looked up by their numbers, quantised to cells.
+//! Each triangle has its own normal and height, each with its own rounding errors. In `f64` the kernels do not round
+//! these numbers again. Without this module, two triangles in one plane would be hit an ulp apart there, and the first
+//! in the script would not always win. So triangles whose planes are equal up to rounding get the numbers of the first
+//! of them. Planes are looked up by their numbers, quantised to cells.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, DefaultHasher};
@@ -23,7 +23,7 @@ const CELL: f64 = 1.0 / (1u64 << 36) as f64;
 /// The number of low bits of a height that a cell ignores.
 const CUT_OFF: u32 = 22;
 
-/// The largest number of planes that are stored per cell. More planes in a cell are left unchanged.
+/// The largest number of planes that are stored per cell. Further planes in a cell are left unchanged.
 const REMEMBERED: usize = 8;
 
 /// A direction that is perpendicular to no plane normal in practice, so that the sign of the product with it selects
@@ -51,7 +51,7 @@ impl Plane {
             && (self.height - other.height).abs() <= ONE_PLANE * self.size.min(other.size)
     }
 
-    /// Returns the cells in which an equal plane may be stored. The first is its own.
+    /// Returns the cells in which an equal plane may be stored. The first is the plane's own cell.
     fn cells(&self) -> impl Iterator<Item = [i64; 4]> {
         let normal =
             self.normal.to_array().map(|x| [0.0, -ONE_PLANE, ONE_PLANE].map(|d| cell_of_part(x + d)));

@@ -1,5 +1,5 @@
-//! For each tile, the list of objects that its camera rays can hit, from the screen rectangle of each object. Used when
-//! a scene has more objects than a mask has bits.
+//! Lists, for each tile, the objects that its camera rays can hit, by the screen rectangle of each object. They are
+//! used if a scene has more objects than a mask has bits.
 
 use glam::DVec3;
 
@@ -22,7 +22,7 @@ pub(crate) struct TileLists {
 }
 
 impl TileLists {
-    /// Makes the lists; `shapes` are in the order of `row`. Returns `None` if lists would be long, or if rays do not
+    /// Makes the lists. `shapes` are in the order of `row`. Returns `None` if lists would be long, or if rays do not
     /// all start at one point.
     pub(crate) fn new<'a>(
         view: &View,

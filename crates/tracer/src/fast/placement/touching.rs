@@ -1,12 +1,12 @@
-//! The region where two surfaces are within a slack of each other, and its width.
+//! Finds the region where two surfaces are within a slack of each other, and its width.
 //!
-//! This is geometry alone: visibility and intersection tests are not considered here.
+//! This module is geometry alone. It does not consider visibility or intersection tests.
 
 use glam::DVec3;
 
 use crate::fast::rays::placed::Face;
 
-/// The distance, relative to their coordinates, below which two surfaces are meant to coincide.
+/// The distance, relative to their coordinates, below which two surfaces are treated as coincident.
 pub(crate) const MEANT: f64 = 1e-13;
 
 /// Returns the width of the strip on the sphere of `radius` along which a smaller sphere of radius `r`, with its centre

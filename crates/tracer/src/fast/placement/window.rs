@@ -1,8 +1,8 @@
 //! The candidates of the camera rays of each tile.
 //!
-//! A tile's rays are between four planes through the eye, two for its columns of pixels and two for its rows. An object
-//! is a candidate if it reaches inside all four; a sphere must also reach the tile's cone. Everything is widened by a
-//! part of a pixel and by the rounding errors of the kernels, so that no candidate is ever missing.
+//! A tile's rays lie between four planes through the eye: two for its columns of pixels and two for its rows. An object
+//! is a candidate if it reaches inside all four. A sphere must also reach the tile's cone. Everything is widened by a
+//! part of a pixel and by the rounding errors of the kernels, so that no candidate is ever missed.
 
 use glam::DVec3;
 
@@ -54,7 +54,7 @@ struct Span {
 
 impl Window {
     /// Makes the window. `shapes` are in the order of the bits, at most 64. `roundoff` is that of the kernels. Rows of
-    /// tiles count from the top.
+    /// tiles are counted from the top.
     pub(crate) fn new(view: View, shapes: &[Shape], grid: &Grid, roundoff: f64) -> Self {
         let Grid { size: (width, height), side, margin, lens } = *grid;
         let slack = |shape: &Shape| BOUNDS * roundoff * shape.magnitude();
@@ -100,7 +100,7 @@ impl Window {
         Self { columns: columns.collect(), rows: rows.collect(), caps, view }
     }
 
-    /// Makes the window of the boxes of the bodies, if there are few.
+    /// Makes the window of the boxes of the bodies, if there are few bodies.
     pub(crate) fn of_bodies(view: View, boxes: Option<&[Shape]>, grid: &Grid, roundoff: f64) -> Option<Self> {
         boxes.map(|boxes| Self::new(view, boxes, grid, roundoff))
     }

@@ -1,4 +1,4 @@
-//! Buffers for the rays and hits of a tile, as structures of arrays. Each step reads what the step before wrote.
+//! Buffers for the rays and hits of a tile, as structures of arrays. Each step reads the output of the step before.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -47,11 +47,11 @@ pub(crate) fn columns<E: Real>() -> Columns<E> {
 pub(crate) struct RayBatch<E> {
     pub(crate) origin: Columns<E>,
     pub(crate) direction: Columns<E>,
-    /// The factor of their colour in the colour of the pixel.
+    /// The factor of the rays' colour in the colour of the pixel.
     pub(crate) weight: Columns<E>,
     pub(crate) pixel: Column<E>,
-    /// One more than the order of the object of glass that they are within, or 0 if it is not known. Filled only for rays
-    /// that wait in the queues of glass.
+    /// For each ray, one more than the order of the glass object that the ray is within, or 0 if it is not known.
+    /// Filled only for rays that wait in the queues of glass.
     pub(crate) inside: Column<E>,
     pub(crate) count: usize,
 }
@@ -62,7 +62,7 @@ impl<E: Real> RayBatch<E> {
         Self { origin: columns(), direction: columns(), weight: columns(), pixel, inside, count: 0 }
     }
 
-    /// Fills the last packet up to `lanes` lanes with copies of the last ray that belong to no pixel.
+    /// Fills the last packet up to `lanes` lanes with copies of the last ray. The copies belong to no pixel.
     #[inline(always)]
     pub(crate) fn fill_up(&mut self, lanes: usize) {
         let last = self.count - 1;
@@ -87,23 +87,24 @@ pub(crate) struct Hits<E> {
     pub(crate) order: Column<E>,
     pub(crate) start: Columns<E>,
     pub(crate) normal: Columns<E>,
-    /// The offset of the start from the surface, and a side: 1 for rays that come from within the object, 0 for the
+    /// The offset of the start from the surface, and the side: 1 for rays that come from within the object, 0 for
     /// others. Filled only for scenes with glass.
     pub(crate) sides: [Column<E>; 2],
     /// The diffuse coefficient times the ray's weight.
     pub(crate) diffuse: Columns<E>,
     pub(crate) color: Columns<E>,
-    /// The mirror coefficient times the ray's weight, and times what fog leaves of it. Filled only for scenes with
-    /// patterns or fog.
+    /// The mirror coefficient times the ray's weight, times the share that fog leaves of it. Filled only for scenes
+    /// with patterns or fog.
     pub(crate) mirror: [Vec<E>; 3],
-    /// The share that fog leaves of what a ray brings. Filled only for scenes with fog.
+    /// The share that fog leaves of a ray's light. Filled only for scenes with fog.
     pub(crate) clearness: Vec<E>,
     /// The normals of the faces of meshes. These four are filled only for scenes with faces that have normals, colours or
     /// an inside; in them `start` is where shadow rays start, and `normal` that of the light.
     pub(crate) face: [Vec<E>; 3],
     /// The starts of rays that go on.
     pub(crate) place: [Vec<E>; 3],
-    /// The way from the starts of shadow rays to the other side of the face, for lights behind it; 0 if it hides them.
+    /// The vector from the starts of shadow rays to the other side of the face, for lights behind the face. It is 0 if
+    /// the face hides them.
     pub(crate) under: [Vec<E>; 3],
     /// The normals at which rays go on.
     pub(crate) onward: [Vec<E>; 3],
@@ -147,7 +148,7 @@ impl<E: Real> Hits<E> {
         Vec3::select(is_behind, start.sub(under.scale(Lanes::<S, E>::splat(simd, E::narrow(-1.0)))), start)
     }
 
-    /// Returns the hits as lights see them: the points themselves, where shadow rays start elsewhere.
+    /// Returns the hits as lights see them. Their points are those of the surface, even if shadow rays start elsewhere.
     #[inline(always)]
     pub(crate) fn places<S: Simd>(&self, simd: S, at: usize) -> Vec3<S, E> {
         if self.place[0].is_empty() {
@@ -185,7 +186,8 @@ impl<E: Real> Hits<E> {
         self.packets.push((at, u64::MAX));
     }
 
-    /// Whether the ray in a lane of one of the `packets` meets anything: the distance of a miss is [`Real::FAR`], rounded.
+    /// Returns whether the ray in a lane of one of the `packets` hits anything. The distance of a miss is
+    /// [`Real::FAR`], rounded.
     #[inline(always)]
     pub(crate) fn is_hit(&self, lane: usize) -> bool {
         self.distance.0[lane].widen() < E::narrow(E::FAR).widen()

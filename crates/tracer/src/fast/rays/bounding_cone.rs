@@ -1,9 +1,9 @@
 //! Culling for a queue of rays: a cone around all of them, and the objects that it reaches.
 //!
-//! Rays that were reflected or refracted alike start near each other and have similar directions. A sphere that
-//! contains all their origins, and the smallest cosine between them and their mean direction, make a cone with a blunt
-//! tip. No ray hits an object whose bounding sphere the cone does not reach. This holds with rounding errors included,
-//! so no picture depends on which rays share a queue.
+//! Rays that were reflected or refracted alike start near each other and have similar directions. A sphere around their
+//! origins, and the smallest cosine between them and their mean direction, define a cone with a blunt tip. No ray hits
+//! an object whose bounding sphere the cone does not reach. This holds with rounding errors included, so no picture
+//! depends on which rays share a queue.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -32,7 +32,7 @@ struct Cone {
 }
 
 impl BoundingSpheres {
-    /// Makes the bounding spheres of boxes, of which there are no more than a mask has bits.
+    /// Makes the bounding spheres of boxes. There are at most as many boxes as a mask has bits.
     pub(crate) fn new(boxes: impl Iterator<Item = Bounds>) -> Self {
         Self(boxes.map(|(low, high)| (0.5 * (low + high), 0.5 * low.distance(high))).collect())
     }

@@ -51,7 +51,7 @@ impl<S: Simd, E: Real> Crossing<S, E> {
         enter.simd_le(leave.min(limit))
     }
 
-    /// Returns the lanes that come as near to a [padded] box as `wider`, anywhere ahead.
+    /// Returns the lanes that come within `wider` of a [padded] box, anywhere ahead.
     #[inline(always)]
     pub(crate) fn comes_near(
         &self,
@@ -73,7 +73,7 @@ impl<S: Simd, E: Real> Crossing<S, E> {
         self.between(simd, Vec3::splat(simd, low), Vec3::splat(simd, high))
     }
 
-    /// Returns [`Self::span`] where each ray has a box of its own.
+    /// Returns [`Self::span`] for rays with one box each.
     #[inline(always)]
     fn between(&self, simd: S, low: Vec3<S, E>, high: Vec3<S, E>) -> (Lanes<S, E>, Lanes<S, E>) {
         let (inverse, shift) = (self.inverse, self.shift);

@@ -1,7 +1,7 @@
-//! Rays: what a packet of them is, how it waits, and what it is compared with before any shape is.
+//! Rays: packets of them, their queues, and bounds that are tested before shapes.
 //!
-//! In: the camera's axes. Out: packets of rays, queues of them, and boxes and cones that miss them for certain. Read
-//! [`packet`] first.
+//! In: the camera's axes. Out: packets of rays, queues of rays, and boxes and cones that show which rays certainly
+//! miss. Read [`packet`] first.
 
 pub(crate) mod bounce;
 pub(crate) mod bounding_cone;

@@ -17,7 +17,7 @@ pub(crate) struct Ray<S: Simd, E: Real> {
 pub(crate) struct Slopes<S: Simd, E: Real> {
     /// 1 / direction, with a large number in place of infinity.
     pub(crate) inverse: Vec3<S, E>,
-    /// Whether any lane runs parallel to such a plane.
+    /// Whether any lane is parallel to such a plane.
     pub(crate) flat: bool,
 }
 

@@ -18,7 +18,7 @@ pub(crate) enum Rays<E> {
     Parallel(AlongAxis<E>),
 }
 
-/// Rays from the origin along `x·right + y·up + ahead`, with `x` and `y` from the column and row on the window.
+/// Rays from the origin along `x·right + y·up + ahead`. The column and row on the window give `x` and `y`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FromEye<E> {
     right: [E; 3],
@@ -118,7 +118,7 @@ impl<E: Real> Steps<E> {
         Self { anchor, at_anchor: E::narrow(at_anchor), step: rounded, rest }
     }
 
-    /// Returns the coordinates of samples, whose indices count from the anchor.
+    /// Returns the coordinates of samples, whose indices are counted from the anchor.
     #[inline(always)]
     fn at<S: Simd>(&self, simd: S, index: Lanes<S, E>) -> Lanes<S, E> {
         let rest = index.fused_mul_add(splat::<S, E>(simd, self.rest), splat::<S, E>(simd, self.at_anchor));

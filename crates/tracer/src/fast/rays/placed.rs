@@ -12,11 +12,11 @@ pub(crate) trait RenderSpaceShape {
     /// Returns the smallest box around it.
     fn bounds(&self) -> Bounds;
 
-    /// Returns its extent along `direction`: the largest `direction · point`.
+    /// Returns the shape's extent along `direction`: the largest `direction · point`.
     fn support(&self, direction: DVec3) -> f64;
 
-    /// Returns the span of `p · axis / -(p · back)` over its points, widened by about `slack`: the part of the view's
-    /// coordinate along `axis` that it covers. Returns `None` if it reaches behind the eye.
+    /// Returns the span of `p · axis / -(p · back)` over the shape's points, widened by about `slack`: the part of the
+    /// view's coordinate along `axis` that the shape covers. Returns `None` if the shape reaches behind the eye.
     fn across(&self, axis: DVec3, back: DVec3, slack: f64) -> Option<(f64, f64)>;
 
     /// Returns whether the shape is its own bounding box, so that no rounding moves a face.
@@ -24,7 +24,7 @@ pub(crate) trait RenderSpaceShape {
         false
     }
 
-    /// Returns its centre and radius, if it is a sphere.
+    /// Returns the centre and the radius if the shape is a sphere.
     fn ball(&self) -> Option<(DVec3, f64)> {
         None
     }
@@ -35,28 +35,29 @@ pub(crate) trait RenderSpaceShape {
     /// Returns one of its flat faces.
     fn face(&self, number: usize) -> Face;
 
-    /// Returns its normal, if all of it is in one plane.
+    /// Returns the normal if all of the shape is in one plane.
     fn plane(&self) -> Option<DVec3> {
         None
     }
 
-    /// Returns a lower bound of the distance between the origin and its surface.
+    /// Returns a lower bound of the distance between the origin and the shape's surface.
     fn nearest(&self) -> f64;
 
-    /// Returns a lower bound of the distance between the origin and the edge of its shadow on a sun's screen, whose
-    /// axes are `x` and `y`.
+    /// Returns a lower bound of the distance between the origin and the edge of the shape's shadow on a sun's screen,
+    /// whose axes are `x` and `y`.
     fn shadow_nearest(&self, x: DVec3, y: DVec3) -> f64;
 
-    /// Returns whether the errors of single precision are invisible in it.
+    /// Returns whether the errors of single precision are invisible in the shape.
     fn is_fine(&self, sight: &Sight) -> bool;
 
-    /// Returns an upper bound of the distance between the origin and its points.
+    /// Returns an upper bound of the distance between the origin and the shape's points.
     fn farthest(&self) -> f64 {
         let (min, max) = self.bounds();
         min.abs().max(max.abs()).length()
     }
 
-    /// Returns an upper bound of its points' coordinates. Its rounding errors are relative to this.
+    /// Returns an upper bound of the coordinates of the shape's points. The shape's rounding errors are relative to
+    /// this bound.
     fn magnitude(&self) -> f64 {
         let (min, max) = self.bounds();
         min.abs().max(max.abs()).max_element()
@@ -104,8 +105,8 @@ pub(crate) struct Sight {
 
 impl Sight {
     /// Returns whether the errors of a flat shape are invisible. From the eye they are relative to the distance of the
-    /// point, as those of the directions are, which are already known to be invisible. In parallel projection a distant
-    /// object is as large as a near one.
+    /// point, as are those of the directions, which are invisible. In parallel projection a distant object is as large
+    /// as a near one.
     pub(crate) fn is_fine_if_flat(&self, magnitude: f64) -> bool {
         !self.parallel || self.is_invisible(self.start * magnitude, 0.0)
     }

@@ -1,23 +1,24 @@
-//! A filtered predicate: whether a ray meets a triangle, where rounding leaves that open, and whether another triangle at
+//! A filtered predicate: whether a ray hits a triangle if rounding leaves that open, and whether another triangle at
 //! the same edge hides it.
 //!
-//! The kernels take a ray for one that meets a triangle if it passes the edges on their inner sides within a bound on
-//! the rounding errors, so that edges belong to it and are straight. Beyond the tip of a thin triangle there are such
-//! rays far from it, where no tile, list or tree expects it; and near its plane the distance is off by more than bounds
-//! are wide. Rays that are not clear of both come here: what is met passes the triangle within a few roundoffs, as bounds
-//! are wide, and where it is met is within the box that the tree has for it, by the tree's own test. So nothing that is
-//! found depends on how it was searched.
+//! The kernels count a ray as a hit of a triangle if it passes the inner sides of the edges within a bound on the
+//! rounding errors. So edges belong to the triangle and are straight. Two cases need more care. Beyond the tip of a
+//! thin triangle, rays far from it satisfy this test, and no tile, list or tree expects them there. Near the triangle's
+//! plane, the error of the distance is larger than the bounds allow. Rays in one of these cases are decided here. A hit
+//! then passes the triangle within a few roundoffs, which the bounds allow for, and its distance is in the tree's box
+//! of the triangle, by the tree's own test. So no hit depends on how it was searched.
 //!
-//! Where a ray passes the outline of a body, its front and its back are met at almost one distance, and rounding would say
-//! which is nearer: a dark dot before a bright sky. So what lies behind another triangle that shares the edge is not met
-//! there. Rays that are clear of the edge need no such care: two faces under the slopes s and t to a ray that passes beside
-//! their edge by δ are met δ·sin β/(s·t) apart, β the angle between them, and either distance errs by 4 roundoffs for its slope
-//! ([`GRAZING`]); so beyond the 9 roundoffs that are in doubt they are told apart if they meet at more than 51 degrees, and in
-//! practice at less.
+//! At the outline of a body a ray hits its front and its back at almost the same distance, and rounding would decide
+//! which is nearer. The result would be a dark dot before a bright sky. So a triangle that lies behind another one at
+//! their common edge is not hit there. Rays that are clear of the edge need no such care. Let two faces meet under the
+//! angle β, and let a ray pass their edge at the distance δ, with the slopes s and t to the faces. The hits are δ·sin
+//! β/(s·t) apart, and each distance has an error of 4 roundoffs for its slope ([`GRAZING`]). Beyond the 9 roundoffs
+//! that are in doubt, the hits are therefore distinct if the faces meet at more than 51 degrees, and in practice at
+//! less.
 //!
-//! Where a pixel is one ray from the eye, what is decided is that ray and not what rounding made of it: so outlines and the edges
-//! between needles are where they are in `f64`. An edge that two triangles share is exact: what passes beside it is the other's, or
-//! no one's.
+//! If a pixel is one ray from the eye, the exact ray is tested and not its rounded copy. So outlines, and the edges
+//! between needles, are where they are in `f64`. An edge that two triangles share is exact: a ray that passes beside it
+//! hits the other triangle or none.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -29,24 +30,24 @@ use crate::fast::arithmetic::rounding::GRAZING;
 use crate::fast::rays::bounds::{Crossing, padded};
 use crate::fast::rays::packet::Ray;
 
-/// How far beside a triangle a ray may pass and meet it, in roundoffs.
+/// The largest distance beside a triangle at which a ray counts as a hit, in roundoffs.
 ///
-/// Along an edge this is more than the kernels' own bound on their errors, so that it only cuts what lies beyond the
-/// tips; less than the bounds of tiles, lists and outlines.
+/// Along an edge this is more than the kernels' own bound on their errors, so that it removes only hits beyond the
+/// tips. It is less than the bounds of tiles, lists and outlines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Beside {
-    /// Of the distance from the eye.
+    /// Roundoffs of the distance from the eye.
     Eye,
-    /// Of the distance and of the coordinates where the ray starts.
+    /// Roundoffs of the distance and of the coordinates of the ray's start.
     Anywhere,
-    /// Of the triangle's largest distance from the eye: less than the offset of what starts at the triangle's edge, which
-    /// is not in its shadow.
+    /// Roundoffs of the triangle's largest distance from the eye. This is less than the offset of a ray that starts at
+    /// the triangle's edge, so the triangle does not shadow it.
     Light,
 }
 
 impl Beside {
-    /// Below this sine of the angle to the plane, a ray's distance from it is in doubt. From the eye the height above the
-    /// plane has no errors but its own rounding's.
+    /// Returns the sine of the angle to the plane below which a ray's distance from the plane is in doubt. For rays
+    /// from the eye, the height above the plane has no error but its own rounding.
     #[inline(always)]
     pub(crate) fn flat(self) -> f64 {
         match self {
@@ -67,24 +68,25 @@ impl Beside {
 
 /// The corners of triangles before they were rounded.
 pub(crate) trait Corners {
-    /// Those of the triangle at this position in the array of triangles.
+    /// Returns the corners of the triangle at this position in the array of triangles.
     fn of(&self, at: usize) -> [DVec3; 3];
 
-    /// Whether `is` holds of the third corner of any other triangle that has this edge.
+    /// Returns whether `is` holds for the third corner of any other triangle that has this edge.
     fn any_across(&self, at: usize, edge: Edge, is: &dyn Fn(DVec3) -> bool) -> bool;
 
-    /// The direction of the pixel's ray that was rounded to this one, if pixels are single rays from the eye.
+    /// Returns the exact direction of the pixel's ray that was rounded to this one, if pixels are single rays from the
+    /// eye.
     fn unrounded(&self, direction: DVec3) -> Option<DVec3>;
 
-    /// The ray of which this one is what `f32` made: one that goes on from where a pixel's ray meets a triangle, mirrored or towards
-    /// a sun. None if no such ray is known.
+    /// Returns the exact ray that was rounded to this one in `f32`. It starts where a pixel's ray hits a triangle, and
+    /// is mirrored or goes towards a sun. Returns `None` if no such ray is known.
     fn gone_on(&self, origin: DVec3, direction: DVec3, beside: Beside) -> Option<(DVec3, DVec3)>;
 }
 
-/// Where a shape stands among those of its kind, and where to look up the corners of one that is a triangle.
+/// The index of a shape among those of its kind, and the source of the corners if it is a triangle.
 pub(crate) type Place<'a> = (&'a dyn Corners, usize);
 
-/// Which of the doubtful lanes meet the triangle, and where: the distance, brought into the triangle's box. Lanes that
+/// Returns which of the doubtful lanes hit the triangle, and their distances, clamped to the triangle's box. Lanes that
 /// are `clear` of the edges are within them.
 // Out of line, so that the kernels keep their registers for what is not in doubt.
 #[cold]
@@ -123,7 +125,8 @@ pub(crate) fn settle<S: Simd, E: Real>(
     )
 }
 
-/// Whether a ray that passes an edge as near as rounding tells meets the triangle, and not another in front of it there.
+/// Returns whether a ray that passes an edge within the rounding error hits the triangle, and hits no other triangle in
+/// front of it there.
 fn is_met<E: Real>(
     place: Place,
     corners: [DVec3; 3],
@@ -156,7 +159,7 @@ fn is_met<E: Real>(
         && !is_hidden(place, corners, (origin, direction), |along| 2.0 * far(along))
 }
 
-/// Whether a triangle lies behind another at an edge that a ray passes within `reach`.
+/// Returns whether a triangle lies behind another one at an edge that a ray passes within `reach`.
 fn is_hidden(
     (all, at): Place,
     [a, b, c]: [DVec3; 3],

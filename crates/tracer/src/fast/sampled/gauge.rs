@@ -1,4 +1,4 @@
-//! How wide objects are as they are seen and as they are lit, in pixels.
+//! The widths of objects in pixels, as the eye and the lights see them.
 
 use glam::{DMat3, DVec2, DVec3};
 use rayfold_scene::model::unit;
@@ -9,10 +9,10 @@ use crate::fast::rays::view::{View, view};
 use crate::fast::shapes::instance::in_world;
 use crate::sampling::lights;
 
-/// Pixels in the scene, and where its light comes from.
+/// The size of pixels in the scene, and the lights.
 #[derive(Debug)]
 pub(super) struct Gauge {
-    /// None where rays are parallel.
+    /// `None` if rays are parallel.
     eye: Option<Eye>,
     lens: Option<Lens>,
     lights: Vec<Light>,
@@ -24,16 +24,16 @@ struct Eye {
     right: DVec3,
     up: DVec3,
     back: DVec3,
-    /// The size of a pixel at a distance of 1, the larger of its two.
+    /// The size of a pixel at a distance of 1: the larger of its width and height.
     pixel: f64,
 }
 
 /// The width of an object in pixels, at its narrowest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Width {
-    /// As it is seen from the eye.
+    /// The width as seen from the eye.
     pub(super) seen: f64,
-    /// The same, or as a light sees it if that is less.
+    /// The smallest width as seen from the eye or from a light.
     pub(super) least: f64,
 }
 
@@ -41,15 +41,15 @@ impl Width {
     pub(super) const UNKNOWN: Self = Self { seen: f64::INFINITY, least: f64::INFINITY };
 }
 
-/// Some points that an object lies between, and how thick it is where it is long.
+/// Points whose convex hull contains an object, and the object's thickness if it is long.
 pub(super) struct Hull {
     pub(super) points: Vec<DVec3>,
     pub(super) girth: f64,
-    /// Whether it vanishes when it is seen from its side.
+    /// Whether the object is invisible from its side.
     pub(super) is_flat: bool,
 }
 
-/// What is flat and narrower than this, in pixels, shows nothing that counts.
+/// The width in pixels below which a flat object has no visible effect.
 const VANISHING: f64 = 1e-3;
 
 impl Gauge {
@@ -68,12 +68,12 @@ impl Gauge {
         Self { eye, lens: Lens::of(scene), lights: scene.lights.to_vec() }
     }
 
-    /// The size of a pixel at a place.
+    /// Returns the size of a pixel at a place.
     pub(super) fn pixel(&self, at: DVec3) -> f64 {
         self.eye.map_or(1.0, |eye| eye.pixel * at.distance(eye.at))
     }
 
-    /// So many pixels at a place, and what the lens adds there.
+    /// Returns the length of `pixels` pixels at a place, plus the blur of the lens there.
     pub(super) fn length(&self, at: DVec3, pixels: f64) -> f64 {
         let blur = match (self.eye, self.lens) {
             (Some(eye), Some(lens)) => {
@@ -115,21 +115,22 @@ impl Gauge {
         Width { seen, least: lit.fold(seen, f64::min) }
     }
 
-    /// Where a point is seen, in pixels.
+    /// Returns the position in the image at which a point is seen, in pixels.
     fn on_screen(&self, p: DVec3) -> DVec2 {
         let Some(eye) = self.eye else { return p.truncate() };
         let way = p - eye.at;
         DVec2::new(way.dot(eye.right), way.dot(eye.up)) / (-way.dot(eye.back) * eye.pixel)
     }
 
-    /// By how many pixels an object moves from here to another moment, at most; 0 where that is not a number.
+    /// Returns the largest number of pixels by which an object moves between here and another moment. Values that are
+    /// not finite count as 0.
     pub(super) fn drift(&self, hull: &Hull, other: &Self, later: &Hull) -> f64 {
         let pairs = hull.points.iter().zip(&later.points);
         let drifts = pairs.map(|(p, q)| self.on_screen(*p).distance(other.on_screen(*q)));
         drifts.filter(|drift| drift.is_finite()).fold(0.0, f64::max)
     }
 
-    /// The width of a highlight on a curved object.
+    /// Returns the width of a highlight on a curved object.
     pub(super) fn gleam(&self, object: &Object, shine: &Shine) -> Option<f64> {
         let (radius, at) = curvature(object)?;
         // Where it is half as bright as at its brightest, seen from the middle of the curve.
@@ -138,7 +139,7 @@ impl Gauge {
     }
 }
 
-/// The extent of points square to the line between the two that are farthest apart.
+/// Returns the extent of points perpendicular to the line between the two that are farthest apart.
 fn across(points: impl Iterator<Item = DVec2> + Clone) -> f64 {
     // As exact as it need be: from some point to the farthest, and from that to the farthest.
     let farthest = |from: DVec2| {
@@ -153,7 +154,7 @@ fn across(points: impl Iterator<Item = DVec2> + Clone) -> f64 {
     high - low
 }
 
-/// The smallest radius of a curved object and its middle.
+/// Returns the smallest radius of a curved object and its centre.
 fn curvature(object: &Object) -> Option<(f64, DVec3)> {
     let Object::Instance(o) = object else { return object.outline()?.curvature() };
     match in_world(o) {
@@ -174,7 +175,7 @@ fn ring(center: DVec3, normal: DVec3, radius: f64) -> impl Iterator<Item = DVec3
     })
 }
 
-/// The corners of a box, and its edge of middle length if the third is much longer.
+/// Returns the corners of a box, and its edge of middle length if the longest one is much longer.
 fn of_box(ends: [DVec3; 2], place: impl Fn(DVec3) -> DVec3, scale: f64) -> Hull {
     let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
     let mut edges = (ends[1] - ends[0]).to_array();
@@ -183,7 +184,7 @@ fn of_box(ends: [DVec3; 2], place: impl Fn(DVec3) -> DVec3, scale: f64) -> Hull 
     Hull { points: (0..8).map(|k| place(corner(k))).collect(), girth, is_flat: false }
 }
 
-/// Some points that an object lies between; none if it has no end.
+/// Returns points whose convex hull contains an object, or `None` if the object is infinite.
 pub(super) fn hull(object: &Object) -> Option<Hull> {
     if let Object::Instance(o) = object {
         return match (in_world(o), o.object().outline()) {
@@ -225,13 +226,13 @@ pub(super) fn hull(object: &Object) -> Option<Hull> {
     })
 }
 
-/// The outermost points of a rod with round ends.
+/// Returns the outermost points of a rod with round ends.
 pub(super) fn tips(radius: f64, [a, b]: [DVec3; 2]) -> [DVec3; 2] {
     let reach = radius * along(a, b);
     [a - reach, b + reach]
 }
 
-/// The unit vector from one point to another; any if they are the same.
+/// Returns the unit vector from one point to another, or any unit vector if they are equal.
 fn along(a: DVec3, b: DVec3) -> DVec3 {
     if a == b { DVec3::Z } else { unit(b - a) }
 }
@@ -244,7 +245,7 @@ fn round(radii: [f64; 2], [a, b]: [DVec3; 2]) -> Hull {
     Hull { points, girth, is_flat: false }
 }
 
-/// The height of a triangle over its longest edge.
+/// Returns the height of a triangle over its longest edge.
 fn height(&[a, b, c]: &[DVec3; 3]) -> f64 {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let twice = (b - a).cross(c - a).length();
@@ -257,7 +258,7 @@ mod tests {
 
     use super::*;
 
-    /// The width of the first object of a scene.
+    /// Returns the width of the first object of a scene.
     fn width(lines: &str) -> Width {
         // A pixel is .01 at a distance of 1.
         let camera = "Screen 200 200\nCamera 0 0 0  0 0 -1  0 1 0  1  -.995 -.995 .995 .995\nSamples 16\n";

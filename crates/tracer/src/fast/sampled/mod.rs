@@ -1,8 +1,8 @@
-//! Pictures whose pixels are means: of points of their squares, of the lens, of the lights, and of moments.
+//! Pictures whose pixels are means over points of their squares, of the lens and of the lights, and over moments.
 //!
-//! Passes over the image give more samples to the pixels whose means are not yet known well ([`Film`]). In a pass, a tile's
-//! samples are sorted by moment, and drawn as many at a time as a tile's memory holds, by the steps that draw single rays;
-//! `light` is the one step that knows lights with an extent.
+//! Passes over the image give more samples to the pixels whose means are not yet accurate enough ([`Film`]). In a pass,
+//! a tile's samples are sorted by moment. They are drawn in batches that fit into a tile's memory, by the steps that
+//! draw single rays. Only the step `light` handles lights that have an extent.
 
 mod gauge;
 mod scouts;
@@ -40,20 +40,20 @@ use crate::sampling::film::{self, Band, Bits, Film, First, PassTargets};
 use crate::sampling::{Dimensions, Points};
 use crate::{RenderError, RenderOptions, Sampler};
 
-/// Gets a function that makes the picture so far.
+/// A callback that gets a function that makes the picture so far.
 pub(super) type Each<'a> =
     dyn FnMut(&dyn Fn() -> Result<DynamicImage, RenderError>) -> Result<(), RenderError> + 'a;
 
-/// Samples that a pass adds to a pixel at most: their points are kept.
+/// The largest number of samples that a pass adds to a pixel. Their points are kept.
 const PASS: u32 = 256;
 
-/// Columns and rows of a tile.
+/// The columns and rows of a tile.
 pub(super) const SIDE: (u32, u32) = (16, 16);
 
-/// The same of moving scenes: of larger tiles more rays are of one moment.
+/// The columns and rows of a tile in moving scenes. Larger tiles have more rays per moment.
 const MOVING_SIDE: (u32, u32) = (32, 32);
 
-/// The half of a pixel, and a little for rounding: how far rays go from its middle.
+/// The largest distance of a ray from the middle of its pixel: half a pixel, plus a margin for rounding.
 pub(super) const MARGIN: f64 = 0.5 + crate::fast::arithmetic::rounding::MARGIN;
 
 /// A scene at a moment, ready to be drawn.
@@ -65,7 +65,7 @@ struct Moment<E> {
     bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
-    /// The boxes that are watched in the first look.
+    /// The boxes that the first look watches.
     watch: Option<Watch<E>>,
 }
 
@@ -82,8 +82,8 @@ pub(super) struct Sampled<'a, E> {
 }
 
 impl<'a, E: Real> Sampled<'a, E> {
-    /// `moments` are the scene from the first opening of the shutter to the last closing, each with its geometry; just the scene
-    /// where nothing moves.
+    /// Makes the scene from its `moments`, from the first opening of the shutter to the last closing, each with its
+    /// geometry. A scene without motion has a single moment.
     pub(super) fn new(
         scene: &'a Scene,
         moments: &[Scene],
@@ -123,7 +123,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(Self { scene, options, dimensions, moments, side, scouts: Scouts::default() })
     }
 
-    /// Draws all passes; `each` may see the picture so far after each but the last.
+    /// Draws all passes. `each` may see the picture so far after every pass except the last.
     pub(super) fn draw_progressively(&self, each: &mut Each<'_>) -> Result<DynamicImage, RenderError> {
         let rows = 0..self.scene.screen.height();
         let size = (self.scene.screen.width(), self.scene.screen.height());
@@ -145,8 +145,8 @@ impl<'a, E: Real> Sampled<'a, E> {
         picture(&film)
     }
 
-    /// Draws rows of the image, which show what they show in the whole one if as many beside them as [`Self::margin`] says are
-    /// drawn with them.
+    /// Draws rows of the image. They equal those of the whole image if as many rows beside them are drawn as
+    /// [`Self::margin`] returns.
     pub(super) fn draw_rows(&self, rows: Range<u32>, margin: u32) -> Result<RgbImage, RenderError> {
         let drawn = self.drawn_with(&rows, margin);
         let film = self.expose(drawn.clone(), |_| Ok(()))?;
@@ -160,7 +160,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         self.develop_lit(&film, drawn.start, rows)
     }
 
-    /// The whole rows of tiles with rows of the image and so many beside them.
+    /// Returns the whole rows of tiles that contain these rows of the image and `margin` rows beside them.
     fn drawn_with(&self, rows: &Range<u32>, margin: u32) -> Range<u32> {
         let height = self.scene.screen.height();
         let drawn = rows.start.saturating_sub(margin)..rows.end.saturating_add(margin).min(height);
@@ -171,17 +171,17 @@ impl<'a, E: Real> Sampled<'a, E> {
         &self.options
     }
 
-    /// In the middle of its exposure.
+    /// Returns the scene in the middle of its exposure.
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// How many rows beside it have a say in what a row shows.
+    /// Returns the number of neighbouring rows that influence a row.
     pub(super) fn margin(&self) -> u32 {
         if self.scene.samples.error() > 0.0 { film::MARGIN } else { 0 }
     }
 
-    /// The same rows, which are whole rows of tiles, before they become levels.
+    /// Draws the samples of rows that are whole rows of tiles, before the rows become levels.
     pub(super) fn expose(
         &self,
         rows: Range<u32>,
@@ -222,7 +222,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(film)
     }
 
-    /// Nothing yet of some rows.
+    /// Returns an empty film of some rows.
     fn film(&self, rows: &Range<u32>) -> Result<Film, RenderError> {
         let scene = &self.scene;
         let size = (scene.screen.width(), rows.end - rows.start);
@@ -239,7 +239,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(film)
     }
 
-    /// The first samples of the pixels of some rows, which are whole rows of tiles: of all or of some.
+    /// Returns the first samples of all or some pixels of rows that are whole rows of tiles.
     fn first_look(&self, rows: Range<u32>, some: Option<&Bits>) -> Result<Option<First>, RenderError> {
         let mut film = self.film(&rows)?;
         if let Some(span) = film.plan() {
@@ -304,7 +304,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(light)
     }
 
-    /// Light and cover of rows of the image, from a film with so many rows above it.
+    /// Returns the light and the cover of rows of the image. The film begins `above` rows below the top of the image.
     fn develop_lit(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<Vec<Lit>, RenderError> {
         let width = self.scene.screen.width();
         let first = (rows.start - above) as usize;
@@ -327,7 +327,7 @@ impl<'a, E: Real> Sampled<'a, E> {
         Ok(lit)
     }
 
-    /// Levels of rows of the image, from a film with so many rows above it.
+    /// Returns the levels of rows of the image. The film begins `above` rows below the top of the image.
     fn develop(&self, film: &Film, above: u32, rows: Range<u32>) -> Result<RgbImage, RenderError> {
         let (width, tone) = (self.scene.screen.width(), self.scene.tone);
         let first = (rows.start - above) as usize;
@@ -382,11 +382,11 @@ struct Job<'a, E> {
     of: &'a Sampled<'a, E>,
     points: &'a Points,
     wanted: PassTargets<'a>,
-    /// Columns and rows of a tile.
+    /// The columns and rows of a tile.
     side: (usize, usize),
-    /// Of tiles, from the top of the film.
+    /// The row of tiles, from the top of the film.
     row: usize,
-    /// Rows of the image above the film.
+    /// The number of rows of the image above the film.
     above: u32,
 }
 
@@ -434,7 +434,7 @@ impl<E: Real> Job<'_, E> {
     }
 }
 
-/// Draws with the best kernel for the instructions.
+/// Draws with the best kernel for the instruction set.
 #[cfg(target_arch = "x86_64")]
 fn draw<E: Real>(job: &Job<E>, level: Level, band: &mut Band<'_>, workspace: &mut Workspace<E>) {
     #[cfg(all(feature = "avx512", not(all(test, feature = "narrow"))))]
@@ -459,7 +459,7 @@ mod tests {
 
     use super::*;
 
-    /// Wires, a triangle that the sun sees from its edge, and their images in mirrors.
+    /// Wires, a triangle that the sun sees edge-on, and their images in mirrors.
     const NARROW: &str = "Screen 120 90\nLook 0 2.4 8  0 .7 0  34\nBackground .5 .6 .8\nSamples 16 1\n\
         Box -9 -1 -9 9 0 9  .1 .1 .1 .5 .5 .45\nSphere .9 -1.2 .9 -.4  .04 .04 .04 .2 .2 .2 .6 .6 .6\n\
         Sphere .5 1.6 .5 1.2  .08 .02 .02 .8 .2 .15\nCylinder .004 2.4 0 0  2.4 1.5 .4  .3 .3 .3 .6 .6 .6\n\

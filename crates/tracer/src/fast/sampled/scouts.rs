@@ -1,11 +1,11 @@
-//! Pixels that may show something smaller than a pixel, found before the first sample of the picture.
+//! Finds, before the first sample of the picture, the pixels that may show an object narrower than a pixel.
 //!
-//! A wire that is a hundredth of a pixel wide is missed by most first samples, and whoever asks the samples of a pixel how many
-//! more it needs hears nothing of it. So a ray a pixel is drawn of two other scenes: in one, what is too narrow is missing,
-//! in the other [stand-ins](super::stand_ins) are in its place, so wide that no pixel misses them. Where the two pictures differ
-//! the narrow objects matter, be it by themselves, by their shadows, in mirrors, or behind glass. Those pixels get a number of
-//! samples that is chosen by the width of what is there, and not by what samples show, so that their means have no bias.
-//! Highlights that are too narrow are treated alike: missing in the one, and wider in the other.
+//! Most first samples miss a wire that is a hundredth of a pixel wide. So the samples of a pixel do not show how many
+//! more it needs. Therefore two other scenes are drawn first, with a ray per pixel. In one of them the narrow objects
+//! are missing. In the other, [stand-ins](super::stand_ins) replace them, so wide that no pixel misses them. The
+//! pictures differ in the pixels in which narrow objects matter: directly, by their shadows, in mirrors or behind
+//! glass. Those pixels get a number of samples that depends on the width of the objects and not on the samples, so that
+//! their means have no bias. Narrow highlights are treated alike: they are missing in one scene and wider in the other.
 
 use core::ops::Range;
 use std::borrow::Cow;
@@ -27,33 +27,34 @@ use crate::reference::triangle_normal;
 use crate::sampling::film::{Bits, Difference, Floors};
 use crate::{Precision, RenderError, Sampler};
 
-/// Moments of an exposure that are looked at.
+/// The number of moments of an exposure that are looked at.
 const MOMENTS: usize = 16;
 
-/// Objects at all of them together, at most: each moment is prepared by itself.
+/// The largest number of objects at all of these moments together. Each moment is prepared separately.
 const OBJECTS: usize = 1 << 18;
 
-/// What is wider, in pixels, is found by the samples of those that it covers.
+/// The width, in pixels, below which an object is narrow. The samples of a pixel find wider objects.
 const NARROW: f64 = 1.0;
 
-/// By how many pixels a stand-in is wider on each side: by the diagonal of a pixel, and a little.
+/// The number of pixels by which a stand-in is wider on each side: the diagonal of a pixel, plus a margin.
 const WIDER: f64 = 1.5;
 
-/// The same of what is seen by its shadow, in mirrors or through glass: pixels may be larger there.
+/// [`NARROW`] for objects that are seen by their shadow, in mirrors or through glass, where pixels may be larger.
 const NARROW_INDIRECTLY: f64 = 2.0;
 const WIDER_INDIRECTLY: f64 = 4.5;
 
-/// A highlight this wide, in pixels, stands in for a narrower one.
+/// The width, in pixels, of a highlight that replaces a narrower one.
 const WIDE_GLEAM: f64 = 3.0;
 
-/// How many samples a pixel gets in which something is narrow: so many times the inverse of its width.
+/// The number of samples of a pixel that shows a narrow object, as a multiple of the inverse of the object's width.
 const SEEN: f64 = 32.0;
 
-/// Numbers of samples between which that is chosen; the last is all that a pixel may have.
+/// The numbers of samples from which that of a pixel is chosen. The last one stands for the largest number that a pixel
+/// may have.
 const FLOORS: [u32; 3] = [64, 256, u32::MAX];
 const ALL: usize = FLOORS.len() - 1;
 
-/// More boxes are joined, so that few are watched.
+/// The largest number of boxes that are watched. If there are more, boxes are joined.
 const BOXES: usize = 16;
 
 /// Two scenes, ready to be drawn.
@@ -65,14 +66,14 @@ struct Pair<'a> {
     boxes: Option<Vec<Bounds>>,
 }
 
-/// What a difference between two scenes says.
+/// The meaning of a difference between two scenes.
 #[derive(Debug)]
 struct Marks {
-    /// Objects before the first stand-in.
+    /// The number of objects before the first stand-in.
     others: usize,
-    /// Which of the [`FLOORS`] belongs to each stand-in.
+    /// The index in [`FLOORS`] of each stand-in.
     floors: Vec<u8>,
-    /// Whether stand-ins count where they are not seen themselves.
+    /// Whether stand-ins count only where they are not seen directly.
     is_indirect: bool,
 }
 
@@ -81,7 +82,7 @@ struct Marks {
 pub(super) struct Scouts<'a>(Vec<Pair<'a>>);
 
 impl<'a> Scouts<'a> {
-    /// Of a scene at its moments.
+    /// Makes the scouts of a scene at its moments.
     pub(super) fn new(moments: &[Scene], options: &RenderOptions<'a>) -> Result<Self, RenderError> {
         let Some(first) = moments.first() else { return Ok(Self::default()) };
         if !(first.samples.error() > 0.0
@@ -115,7 +116,8 @@ impl<'a> Scouts<'a> {
         Ok(Self(all))
     }
 
-    /// Boxes around all in which any two scenes differ, at most [`BOXES`]; none where something has no end, or nothing differs.
+    /// Returns at most [`BOXES`] boxes around everything in which any two scenes differ. Returns `None` if something is
+    /// infinite, or if nothing differs.
     pub(super) fn boxes(&self) -> Option<Vec<Bounds>> {
         let all = self.0.iter().map(|pair| pair.boxes.as_deref()).collect::<Option<Vec<_>>>()?.concat();
         let boxes = all.chunks(all.len().div_ceil(BOXES).max(1));
@@ -123,8 +125,8 @@ impl<'a> Scouts<'a> {
         (!joined.is_empty()).then_some(joined)
     }
 
-    /// Finds the pixels of some rows that get a number of samples in any case, and that number; none if there are no such
-    /// pixels. If `some` are given, only they can be such pixels.
+    /// Finds the pixels of some rows that get a fixed number of samples, and that number. Returns `None` if there are
+    /// no such pixels. If `some` are given, only those are considered.
     pub(super) fn floors(
         &self,
         rows: Range<u32>,
@@ -144,7 +146,8 @@ impl<'a> Scouts<'a> {
     }
 }
 
-/// A scene to be looked at; none if the kernels cannot hold its stand-ins, which are at the end of all numbers then.
+/// Prepares a scene for a first look. Returns `None` if the kernels cannot hold its stand-ins, because their numbers
+/// are too large or too small.
 fn ready(scene: Scene, options: RenderOptions) -> Result<Option<Sampled<f64>>, RenderError> {
     let Ok(geometry) = Geometry::new(&scene, options.tree) else { return Ok(None) };
     if precision::resolve(&options, &geometry, &scene).is_none() {
@@ -169,16 +172,17 @@ impl Marks {
     }
 }
 
-/// Two scenes without narrow objects and with stand-ins for them.
+/// Two scenes: one without narrow objects, and one with stand-ins for them.
 struct Compared {
     without: Scene,
     with: Scene,
     marks: Marks,
-    /// Around all in which they differ from each other and from the picture's scene; none where that has no end.
+    /// Boxes around everything in which they differ from each other and from the picture's scene. `None` if something
+    /// of it is infinite.
     boxes: Option<Vec<Bounds>>,
 }
 
-/// What is compared of a scene, if anything is; `near` is what it is at the moments before and after.
+/// Returns the pairs of scenes to compare for a scene. `near` holds the scene at the moments before and after.
 fn pairs(scene: &Scene, near: &[&Scene]) -> Vec<Compared> {
     let gauge = Gauge::new(scene);
     let near: Vec<(&Scene, Gauge)> = near.iter().map(|scene| (*scene, Gauge::new(scene))).collect();
@@ -206,8 +210,8 @@ fn pairs(scene: &Scene, near: &[&Scene]) -> Vec<Compared> {
     pairs
 }
 
-/// What is narrower than so many pixels, and so many pixels wider. `drift` is by how many pixels an object moves until the next
-/// moment that is looked at.
+/// Makes the pair for objects that are narrower than `narrow` pixels, with stand-ins that are `wider` pixels wider.
+/// `drift` returns the number of pixels by which an object moves until the next moment that is looked at.
 fn pair(
     scene: &Scene,
     (gauge, widths, drift): (&Gauge, &[Width], &dyn Fn(usize) -> f64),
@@ -254,7 +258,8 @@ fn pair(
     Some(Compared { without: scene(without), with: scene(with), marks, boxes })
 }
 
-/// A box around an object, if it has an end: that of its hull, and a part more where that is rings of few points.
+/// Returns a box around an object, or `None` if it is infinite: that of its hull, with a margin if the hull has rings
+/// of few points.
 fn box_around(object: &Object) -> Option<Bounds> {
     let points = hull(object)?.points;
     let (low, high) = points.into_iter().map(|point| (point, point)).reduce(join)?;
@@ -263,7 +268,8 @@ fn box_around(object: &Object) -> Option<Bounds> {
     Some((low - more, high + more))
 }
 
-/// An object whose highlight is narrower than a pixel without it, and with a wider one.
+/// Returns an object whose highlight is narrower than a pixel in two versions: without the highlight, and with a wider
+/// one.
 fn gleams(object: &Object, gauge: &Gauge) -> Option<(Object, Object)> {
     let material = object.material();
     let finish = material.finish()?;
@@ -278,7 +284,7 @@ fn gleams(object: &Object, gauge: &Gauge) -> Option<(Object, Object)> {
     Some((painted(None)?, painted(Some(wider))?))
 }
 
-/// How wide each object is.
+/// Returns the width of each object.
 fn widths(objects: &[Object], gauge: &Gauge) -> Vec<Width> {
     let mut widths: Vec<Width> =
         objects.iter().map(|object| hull(object).map_or(Width::UNKNOWN, |hull| gauge.width(&hull))).collect();
@@ -286,7 +292,7 @@ fn widths(objects: &[Object], gauge: &Gauge) -> Vec<Width> {
     widths
 }
 
-/// Triangles that share edges are as wide as they are together.
+/// Sets the width of triangles that share edges to their common width.
 fn join_triangles(objects: &[Object], gauge: &Gauge, widths: &mut [Width]) {
     let is_narrow = |width: &Width| width.least < NARROW_INDIRECTLY;
     let vertices = |object: &Object| match object {

@@ -1,4 +1,4 @@
-//! Objects that stand in for narrower ones: so wide that the rays of every pixel in which those can be seen meet them.
+//! Stand-ins for narrow objects, so wide that the rays of every pixel in which the narrow objects can be seen hit them.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use rayfold_scene::{
 use super::gauge::{Gauge, tips};
 use crate::fast::shapes::instance::in_world;
 
-/// How often what is long is halved, at most, because pixels are not of one size along it.
+/// The largest number of times that a long object is halved, because the size of a pixel varies along it.
 const HALVINGS: u32 = 6;
 
-/// Makes stand-ins, so many pixels wider on all sides.
+/// Makes stand-ins that are some pixels wider on all sides.
 pub(super) struct Widener<'a> {
     gauge: &'a Gauge,
     pixels: f64,
@@ -24,14 +24,14 @@ pub(super) struct Widener<'a> {
 }
 
 impl<'a> Widener<'a> {
-    /// Of a colour that nothing else is likely to have.
+    /// Makes a widener. Its stand-ins have a colour that nothing else is likely to have.
     pub(super) fn new(gauge: &'a Gauge, pixels: f64) -> Self {
         let material =
             Material::new(DVec3::new(0.613, 0.127, 0.871), DVec3::ZERO, DVec3::ZERO).unwrap_or_default();
         Self { gauge, pixels, material, made: vec![] }
     }
 
-    /// Those of an object, wider by some pixels more.
+    /// Returns the stand-ins of an object, wider by `more` pixels.
     pub(super) fn stand_ins(&mut self, object: &Object, more: f64) -> Vec<Object> {
         self.pixels += more;
         self.widen(object);
@@ -43,7 +43,7 @@ impl<'a> Widener<'a> {
         self.gauge.length(at, self.pixels)
     }
 
-    /// What cannot be made of such numbers is left out: it is at the end of all numbers.
+    /// Adds a stand-in. One whose numbers are out of range is left out.
     fn make<T: Into<Object>, E>(&mut self, made: Result<T, E>) {
         self.made.extend(made.ok().map(Into::into));
     }
@@ -94,7 +94,7 @@ impl<'a> Widener<'a> {
         }
     }
 
-    /// A cone or cylinder; in parts where pixels are of other sizes along it.
+    /// Adds a cone or cylinder, in parts if the size of a pixel varies along it.
     fn rod(&mut self, [low, high]: [f64; 2], [a, b]: [DVec3; 2], halvings: u32) {
         let middle = 0.5 * (a + b);
         let (at_a, at_b) = (self.wider(a), self.wider(b));
@@ -110,7 +110,7 @@ impl<'a> Widener<'a> {
         self.make(Cone::new([low + at_a, high + at_b], ends, material));
     }
 
-    /// A box, in parts where pixels are of other sizes along it.
+    /// Adds a box, in parts if the size of a pixel varies along it.
     fn brick(&mut self, [low, high]: [DVec3; 2], placement: Option<&Placement>, halvings: u32) {
         let place = |p: DVec3| placement.map_or(p, |placement| placement.point(p));
         let scale = placement.map_or(1.0, Placement::scale);
@@ -142,7 +142,7 @@ impl<'a> Widener<'a> {
     }
 }
 
-/// A curved object with another material, in the world.
+/// Returns a curved object in the world with another material.
 pub(super) fn repainted(object: &Object, material: Material) -> Option<Object> {
     let Object::Instance(o) = object else {
         object.outline()?.curvature()?;

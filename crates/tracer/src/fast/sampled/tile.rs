@@ -1,4 +1,4 @@
-//! The samples of a tile's pixels in a pass: where their rays go, and what comes of them.
+//! The samples of a tile's pixels in a pass: their rays and their results.
 
 use core::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -25,16 +25,16 @@ use crate::sampling::film::{BitRows, CoverTile, FirstRows, Judged, PassTargets, 
 use crate::sampling::places::on_disc;
 use crate::sampling::{BATCH, Dimensions, Points};
 
-/// Where a pixel shows no object.
+/// The number of a pixel that shows no object.
 const NOTHING: u32 = u32::MAX;
 
-/// Samples that are drawn at once.
+/// The number of samples that are drawn at once.
 const ROOM: usize = BATCH;
 
-/// Columns and rows of the blocks in which a tile's pixels are taken, so that those of a packet lie side by side.
+/// The columns and rows of the blocks in which a tile's pixels are visited, so that those of a packet are neighbours.
 const BLOCK: usize = 4;
 
-/// What all tiles of a pass have in common.
+/// The data that all tiles of a pass share.
 pub(super) struct Pass<'a, E> {
     pub(super) moments: &'a [Moment<E>],
     pub(super) points: &'a Points,
@@ -43,24 +43,24 @@ pub(super) struct Pass<'a, E> {
     /// The largest number of diffuse reflections.
     pub(super) indirect: u32,
     pub(super) wanted: PassTargets<'a>,
-    /// Rows of the image.
+    /// The number of rows of the image.
     pub(super) height: u32,
 }
 
-/// A tile of the image, its first row at the top.
+/// A tile of the image. Its first row is at the top.
 pub(super) struct SampledTile {
-    /// Columns and rows of tiles of the image before it.
+    /// The numbers of columns and rows of tiles before it.
     pub(super) place: (usize, usize),
     pub(super) left: usize,
-    /// Rows of the film above it.
+    /// The number of rows of the film above it.
     pub(super) top: usize,
-    /// Rows of the image above the film.
+    /// The number of rows of the image above the film.
     pub(super) above: usize,
     pub(super) width: usize,
     pub(super) height: usize,
-    /// Columns and rows of tiles in the middle of the image.
+    /// The columns and rows of a tile that the edge of the image does not cut.
     pub(super) side: (usize, usize),
-    /// Columns of the image.
+    /// The number of columns of the image.
     pub(super) stride: usize,
 }
 
@@ -69,15 +69,15 @@ pub(super) struct SampledTile {
 struct Item {
     moment: u32,
     sample: u32,
-    /// Column and row in the tile.
+    /// The column and the row in the tile.
     pixel: (u32, u32),
 }
 
-/// Memory of a worker, used again for each of its tiles.
+/// The memory of a worker, which is used again for each of its tiles.
 pub(super) struct Workspace<'a, E> {
     scratch: Scratch<'a, E>,
     items: Vec<Item>,
-    /// The first samples of all pixels of a tile, and of which size that was.
+    /// The first samples of all pixels of a tile. `size` is the size of that tile.
     firsts: Vec<Item>,
     size: (usize, usize),
     /// Memory for sorting them.
@@ -88,14 +88,14 @@ pub(super) struct Workspace<'a, E> {
     columns: [f64; ROOM],
     rows: [f64; ROOM],
     coordinates: [[f64; ROOM]; 3],
-    /// What the rays from the camera meet.
+    /// The objects that the camera rays hit.
     objects: [u32; ROOM],
     /// Whether each of them, or a ray that goes on from it, came near a watched box.
     is_near: [bool; ROOM],
 }
 
 impl<'a, E: Real> Workspace<'a, E> {
-    /// Where there is much glass a tile is given up halfway once `cancel` is raised.
+    /// Makes the memory. A tile with much glass stops halfway once `cancel` is set.
     pub(super) fn new(cancel: Option<&'a AtomicBool>) -> Self {
         Self {
             scratch: Scratch::new(cancel),
@@ -119,13 +119,13 @@ impl<'a, E: Real> Workspace<'a, E> {
 pub(super) struct Drawn<'a, 'b> {
     /// The sums of its pixels.
     pub(super) pixels: &'a mut Vec<Pixel>,
-    /// The first samples of its row of tiles.
+    /// The first samples of the tile's row of tiles.
     pub(super) first: Option<&'a mut FirstRows<'b>>,
     /// The sums and the first samples of the cover, in scenes without background.
     pub(super) cover: Option<CoverTile<'a, 'b>>,
-    /// The state of the pixels of its row of tiles.
+    /// The state of the pixels of the tile's row of tiles.
     pub(super) judged: &'a mut Judged<'b>,
-    /// The pixels of its row of tiles whose rays come near a watched box.
+    /// The pixels of the tile's row of tiles whose rays come near a watched box.
     pub(super) near: Option<&'a mut BitRows<'b>>,
 }
 
@@ -233,7 +233,7 @@ pub(super) fn draw<S: Simd, E: Real, N: Kernel<E>>(
     }
 }
 
-/// Gives the pixels of a tile that shows nothing but the background the samples that they lack.
+/// Gives the pixels of a tile that shows only the background the samples that they lack.
 #[inline(never)]
 fn add_backdrop<E>(
     pass: &Pass<E>,
@@ -282,7 +282,7 @@ impl SampledTile {
         self.top..self.top + self.height
     }
 
-    /// Columns and rows of its pixels in it, block by block.
+    /// Calls `each` with the column and row in the tile of each of its pixels, block by block.
     #[inline(always)]
     fn each_pixel(&self, mut each: impl FnMut((u32, u32))) {
         self.each_block(|left, row, columns| {
@@ -302,13 +302,13 @@ impl SampledTile {
         });
     }
 
-    /// Whether all of its pixels are wanted.
+    /// Returns whether all of the tile's pixels are wanted.
     #[inline(always)]
     fn is_wanted_whole(&self, wanted: PassTargets) -> bool {
         self.rows().all(|row| wanted.pixels.has_all(self.columns(), row))
     }
 
-    /// The rows of each block: left column, row, and number of columns.
+    /// Calls `each` with the rows of each block: the left column, the row, and the number of columns.
     #[inline(always)]
     fn each_block(&self, mut each: impl FnMut(usize, usize, usize)) {
         for top in (0..self.height).step_by(BLOCK) {
@@ -326,13 +326,13 @@ impl SampledTile {
         row as usize * self.side.0 + column as usize
     }
 
-    /// A pixel's place in the rows of the tile.
+    /// Returns a pixel's place in the rows of the tile.
     #[inline(always)]
     fn in_rows(&self, (column, row): (u32, u32)) -> usize {
         row as usize * self.stride + self.left + column as usize
     }
 
-    /// Column and row of the image; both count from the upper left corner.
+    /// Returns the column and row of the image, both counted from the upper left corner.
     #[inline(always)]
     fn in_image(&self, (column, row): (u32, u32)) -> (u32, u32) {
         (self.left as u32 + column, (self.above + self.top) as u32 + row)
@@ -345,13 +345,13 @@ impl<E: Real> Moment<E> {
         if parts::BUILT.lenses { self.lens.as_ref() } else { None }
     }
 
-    /// Which bodies it can show, by bits.
+    /// Returns the bodies that the tile can show, as bits.
     #[inline(always)]
     fn bodies_in(&self, tile: &SampledTile) -> u64 {
         self.prepared.bodies_in(self.bodies.as_ref(), tile.place)
     }
 
-    /// Whether a tile surely shows nothing but a background of one colour.
+    /// Returns whether a tile certainly shows only a background of one colour.
     #[inline(always)]
     fn shows_nothing(&self, tile: &SampledTile) -> bool {
         self.window.candidates(tile.place.0, tile.place.1) == 0
@@ -359,7 +359,8 @@ impl<E: Real> Moment<E> {
     }
 }
 
-/// Gives each ray its moment, and sorts by that; those of one moment stay in order, so that neighbours lie side by side.
+/// Gives each ray its moment and sorts the rays by moment. The sort is stable, so that rays of neighbouring pixels stay
+/// together.
 #[inline(never)]
 fn set_moments<E: Real>(
     pass: &Pass<E>,
@@ -400,8 +401,8 @@ fn set_moments<E: Real>(
     core::mem::swap(items, sorted);
 }
 
-/// Draws at most [`ROOM`] rays of one moment; their colours are those of the hits then. Notes which of a first look
-/// came near what is watched.
+/// Draws at most [`ROOM`] rays of one moment. Their colours are then those of the hits. In a first look, records which
+/// rays came near a watched box.
 #[inline(always)]
 fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     simd: S,
@@ -494,7 +495,7 @@ fn levels<E: Real>(count: usize, workspace: &Workspace<E>) -> [[u32; ROOM]; CHAN
     levels
 }
 
-/// Notes the colours of a batch as those of the first samples of its pixels.
+/// Stores the colours of a batch as those of the first samples of its pixels.
 #[inline(never)]
 fn put_first<S: Simd, E: Real>(
     simd: S,
@@ -526,7 +527,7 @@ fn put_first<S: Simd, E: Real>(
     );
 }
 
-/// Notes or adds the cover of a batch.
+/// Stores or adds the cover of a batch.
 #[inline(never)]
 fn cover_batch<E: Real>(
     pass: &Pass<E>,
@@ -577,7 +578,7 @@ fn add_up<S: Simd, E: Real>(
     );
 }
 
-/// Adds the colours of a batch to its pixels, as they are.
+/// Adds the colours of a batch to its pixels without clamping.
 #[inline(never)]
 fn add_up_unclamped<E: Real>(
     tile: &SampledTile,
@@ -592,7 +593,7 @@ fn add_up_unclamped<E: Real>(
     }
 }
 
-/// Where the rays of a batch go: columns and rows of the image, points of the lens and of the lights.
+/// Sets the samples of a batch: columns and rows of the image, and points of the lens and of the lights.
 #[inline(never)]
 fn place<S: Simd, E: Real>(
     simd: S,
@@ -657,8 +658,8 @@ fn place<S: Simd, E: Real>(
     );
 }
 
-/// The rays of a batch: their columns and rows wait in the first two columns of the weights, their points of the lens in those
-/// of the origins.
+/// Sets the rays of a batch. Before, the first two columns of the weights hold their columns and rows, and those of the
+/// origins hold their points of the lens.
 #[inline(never)]
 fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut RayBatch<E>) {
     simd.vectorize(
@@ -685,7 +686,7 @@ fn aim<S: Simd, E: Real>(simd: S, moment: &Moment<E>, queue: &mut RayBatch<E>) {
     );
 }
 
-/// Notes what each ray of a batch has met.
+/// Records the object that each ray of a batch has hit.
 fn note_objects<E: Real>(hits: &Hits<E>, lanes: usize, objects: &mut [u32; ROOM]) {
     objects.fill(NOTHING);
     for &(at, _) in &hits.packets {

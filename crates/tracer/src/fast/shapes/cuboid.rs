@@ -24,7 +24,7 @@ pub(in crate::fast) struct RenderSpaceCuboid {
 }
 
 impl RenderSpaceCuboid {
-    /// Makes a box, moved so that `center` is the origin, and then scaled.
+    /// Makes a box that is moved so that `center` is the origin, and is then scaled.
     pub(in crate::fast) fn new(cuboid: &rayfold_scene::Cuboid, center: DVec3, scale: f64) -> Self {
         Self { min: (cuboid.min() - center) * scale, max: (cuboid.max() - center) * scale }
     }
@@ -96,7 +96,7 @@ pub(in crate::fast) struct Cuboid<E> {
     pub(in crate::fast) min: [E; 3],
     pub(in crate::fast) max: [E; 3],
     pub(in crate::fast) order: E,
-    /// The axis to which it is perpendicular, if it is a rectangle.
+    /// The axis to which the box is perpendicular, if it is a rectangle.
     flat: Option<u8>,
 }
 
@@ -125,7 +125,7 @@ impl<E: Real> Cuboid<E> {
         (near, far.x.min(far.y).min(far.z))
     }
 
-    /// Returns the points that it occludes from the sun.
+    /// Returns the points that the box occludes from the sun.
     #[inline(always)]
     fn occludes<S: Simd>(&self, simd: S, sun: &Sun<E>, point: Vec3<S, E>) -> Mask<S, E> {
         let zero = constant::<S, E>(simd, 0.0);
@@ -139,8 +139,8 @@ impl<E: Real> Cuboid<E> {
         within & enter.simd_le(leave * late) & leave.simd_gt(zero)
     }
 
-    /// Intersects the interval with the slab of one axis, for [`Cuboid::occludes`]. Not a loop over the axes, because a
-    /// vector of lanes has no index.
+    /// Intersects the interval with the slab of one axis, for [`Cuboid::occludes`]. There is no loop over the axes,
+    /// because a vector of lanes has no index.
     #[inline(always)]
     fn narrow_to_slab<S: Simd>(
         &self,

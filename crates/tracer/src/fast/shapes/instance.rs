@@ -1,8 +1,8 @@
 //! Objects of groups, placed into the world.
 //!
-//! A box, with sharp or round edges, that is rotated by right angles stays one along the axes. Rotated otherwise it has axes
-//! of its own, and is a [body](crate::fast::bodies). Every other shape keeps its kind. A triangle has an area if it has one in its group,
-//! regardless of rounding.
+//! A box, with sharp or round edges, that is rotated by right angles is still aligned with the axes. With any other
+//! rotation it has axes of its own, and is a [body](crate::fast::bodies). Every other shape keeps its kind. A triangle
+//! has an area if it has one in its group, regardless of rounding.
 
 use glam::DVec3;
 use rayfold_scene::{Instance, Object, Outline};
@@ -10,7 +10,7 @@ use rayfold_scene::{Instance, Object, Outline};
 use crate::parts::BUILT;
 use crate::reference::{triangle_normal, turns_axes_to_axes};
 
-/// Returns the group's box, with sharp or round edges, if it is rotated in the world by other than right angles.
+/// Returns the group's box, with sharp or round edges, if its rotation in the world is not by right angles.
 pub(in crate::fast) fn turned(instance: &Instance) -> Option<&Object> {
     let object = instance.object();
     let is_turned = BUILT.groups

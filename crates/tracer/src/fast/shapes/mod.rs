@@ -1,6 +1,6 @@
-//! The shapes: each kind has a file, and an arm in each `match` here.
+//! The shapes. Each kind has a file, and an arm in each `match` here.
 //!
-//! This is the only place that dispatches from a kind to its file. A kind without one of its arms does not compile.
+//! Only this module dispatches from a kind to its file. A kind that lacks one of its arms does not compile.
 
 pub(super) mod cuboid;
 pub(super) mod instance;
@@ -70,7 +70,7 @@ impl Shape {
         }
     }
 
-    /// Returns the numbers that distinguish it from others of its kind.
+    /// Returns the numbers that distinguish the shape from others of its kind.
     pub(super) fn numbers(&self) -> [f64; 9] {
         let mut numbers = [0.0; 9];
         let parts = match self {
@@ -124,8 +124,8 @@ impl Shape {
 /// A visible part of an object's size.
 const VISIBLE: f64 = 1e-3;
 
-/// Returns corners of a group as seen from the eye. The eye is taken into the group, so that what is tiny and beside the eye
-/// keeps its size wherever the group is.
+/// Returns corners of a group as seen from the eye. The eye is transformed into the group, so that tiny objects near
+/// the eye keep their size wherever the group is.
 fn from_eye<const N: usize>(corners: &[DVec3; N], placement: &Placement, eye: DVec3) -> [DVec3; N] {
     let local = Place::in_group(eye, placement);
     corners.map(|corner| placement.rotation() * local.towards(corner) * placement.scale())
@@ -154,8 +154,8 @@ impl Shape {
         }
     }
 
-    /// Returns whether rounding where the group is may have moved its numbers by a visible part of its size, for an eye in
-    /// these coordinates.
+    /// Returns whether rounding at the place of the group may have moved its numbers by a visible part of its size, for
+    /// an eye in these coordinates.
     fn is_lost(&self, eye: DVec3) -> bool {
         let (low, high) = self.bounds();
         let largest = eye.abs().max(low.abs()).max(high.abs()).max_element();
@@ -382,7 +382,7 @@ impl<E: Real> Shapes<E> {
         &self.triangles[at]
     }
 
-    /// Returns whether the eye is outside a convex shape. Then the part that is visible from the eye is not in the
+    /// Returns whether the eye is outside a convex shape. If so, the part that is visible from the eye is not in the
     /// shape's own shadow.
     #[inline(always)]
     pub(super) fn is_seen_from_outside(&self, kind: Kind, at: usize) -> bool {

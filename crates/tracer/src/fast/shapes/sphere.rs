@@ -27,7 +27,7 @@ pub(in crate::fast) struct RenderSpaceSphere {
 }
 
 impl RenderSpaceSphere {
-    /// Makes a sphere, moved so that `center` is the origin, and then scaled.
+    /// Makes a sphere that is moved so that `center` is the origin, and is then scaled.
     pub(in crate::fast) fn new(sphere: &rayfold_scene::Sphere, center: DVec3, scale: f64) -> Self {
         Self {
             center: (sphere.center() - center) * scale,
@@ -82,9 +82,9 @@ impl placed::RenderSpaceShape for RenderSpaceSphere {
         (libm::hypot(self.center.dot(x), self.center.dot(y)) - self.radius).abs()
     }
 
-    /// Returns whether errors are invisible. An outline has the errors of a point on it. A shadow on the sphere or a
-    /// reflection in it has the errors of the start of a ray. A normal has the errors of the point divided by the
-    /// radius.
+    /// Returns whether errors are invisible. The error of an outline is that of a point on it. The error of a shadow on
+    /// the sphere, or of a reflection in it, is that of the start of a ray. The error of a normal is that of the point
+    /// divided by the radius.
     fn is_fine(&self, sight: &Sight) -> bool {
         let &Self { center, radius, .. } = self;
         let (away, size) = (center.length(), center.length() + radius);
@@ -125,8 +125,8 @@ impl<E: Real> Sphere<E> {
         }
     }
 
-    /// Returns whether the eye is outside. Then rays from the eye hit it from outside, and the points that they hit are
-    /// not in its own shadow.
+    /// Returns whether the eye is outside. If so, rays from the eye hit it from outside, and the points that they hit
+    /// are not in its own shadow.
     #[inline(always)]
     pub(in crate::fast) fn is_outside_the_eye(&self) -> bool {
         self.power > E::narrow(0.0)
@@ -202,8 +202,8 @@ impl<E: Real> Tests<Sphere<E>, E> for Robust {
         }
     }
 
-    /// Returns the surface. The point is computed from the centre and the normal, so that its distance from the sphere
-    /// is the rounding error of these alone, without that of the ray's distance.
+    /// Returns the surface. The point is computed from the centre and the normal. So its distance from the sphere has
+    /// the rounding errors of these alone, without that of the ray's distance.
     #[inline(always)]
     fn surface<S: Simd, const EYE: bool>(
         simd: S,
@@ -259,7 +259,7 @@ impl<E: Real> Circle<E> {
         }
     }
 
-    /// Returns the points that it occludes; they are given in the sun's axes.
+    /// Returns the points that the sphere occludes. They are given in the sun's axes.
     ///
     /// `rest` is the square of half the chord. The far end of the chord is ahead if `z + √rest > 0`, which for
     /// `rest >= 0` is `z·|z| > -rest`.

@@ -32,8 +32,8 @@ pub(in crate::fast) struct RenderSpaceTriangle {
 const NEEDLE: f64 = 0.1;
 
 impl RenderSpaceTriangle {
-    /// Makes a triangle, moved so that `center` is the origin, and then scaled. Returns `None` if it has no area, or if
-    /// rounding leaves it none: then it is too thin to be visible.
+    /// Makes a triangle that is moved so that `center` is the origin, and is then scaled. Returns `None` if it has no
+    /// area, or if rounding leaves it none because it is too thin to be visible.
     pub(in crate::fast) fn new(corners: &[DVec3; 3], center: DVec3, scale: f64) -> Option<Self> {
         let place = |vertex: DVec3| (vertex - center) * scale;
         let vertices = [place(corners[0]), place(corners[1]), place(corners[2])];
@@ -224,7 +224,7 @@ impl<E: Real> Facet<E> {
         Self::of(&Line::all(&Ends::new(triangle.vertices)), triangle, order)
     }
 
-    /// Returns whether it stands in place of one without an area.
+    /// Returns whether the triangle replaces one without an area.
     pub(in crate::fast) fn is_nothing(&self) -> bool {
         self.edges[0].slack.0.widen() < 0.0
     }
@@ -282,8 +282,8 @@ impl<E: Real> Facet<E> {
         }
     }
 
-    /// Offers a `hit`. If it is not `clear` of the edges, or the ray is nearly in the plane, offers the settled result.
-    /// A ray within the rounding error of the plane misses.
+    /// Offers a `hit`. If the hit is not `clear` of the edges, or if the ray is nearly in the plane, offers the settled
+    /// result. A ray within the rounding error of the plane misses.
     #[inline(always)]
     fn offer_settled<S: Simd>(
         &self,

@@ -1,10 +1,10 @@
 //! The unrounded numbers of shapes and the unrounded rays of pixels, for tests that rounding leaves undecided.
 //!
-//! In `f32` a secondary ray starts off its surface, by much more than the error of a pixel's ray. So for the few such
-//! rays that pass an edge too closely to decide, the exact ray is computed again, from the pixel's ray and the surface
-//! where the secondary ray starts. This is done for rays in the first mirror and towards suns; and for rays towards
-//! suns from the points that the first mirror shows, if few planes are mirrors. The start of the ray determines its
-//! pixel.
+//! In `f32` a secondary ray starts off its surface, by much more than the error of a pixel's ray. So for the few
+//! secondary rays that pass an edge too closely to decide, the exact ray is computed again. It follows from the pixel's
+//! ray and from the surface at which the secondary ray starts. This is done for rays in the first mirror and towards
+//! suns. It is also done for rays towards suns from the points that the first mirror shows, if few planes are mirrors.
+//! The start of the ray determines its pixel.
 
 use std::cell::Cell;
 use std::fmt::Debug;
@@ -30,13 +30,13 @@ use crate::fast::shapes::triangle;
 pub(super) struct Exact<E> {
     solids: Arc<Vec<Solid>>,
     sorted: Sorted,
-    /// The tree of solids, if they are many.
+    /// The tree of solids, if there are many.
     tree: Option<Arc<dyn Neighbours>>,
     seen: Seen,
     number: PhantomData<E>,
 }
 
-/// An index of shapes by their boxes. It stands for the tree, so that shapes need not know more of it.
+/// An index of shapes by their boxes. This interface makes shapes independent of the tree.
 pub(in crate::fast) trait Neighbours: Debug + Send + Sync {
     /// Returns whether `is` holds for the shapes of any group whose box contains `bounds`. The shapes of a group are of
     /// one kind, and are given by their indices among those of that kind.
@@ -64,7 +64,7 @@ struct Met {
 type Exactly = (DVec3, DVec3);
 
 impl Met {
-    /// Returns a point off the surface, by more than the errors of `f64`.
+    /// Returns a point that is off the surface by more than the errors of `f64`.
     fn start(&self, (origin, direction): Exactly) -> DVec3 {
         let place = origin + self.distance * direction;
         place + self.normal * (64.0 * <f64 as Real>::ROUNDOFF * place.abs().element_sum())

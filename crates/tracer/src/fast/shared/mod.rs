@@ -1,13 +1,13 @@
-//! Surfaces that objects share, and which of them is seen: that of the object that comes first.
+//! Objects that share a part of their surfaces. There the object that comes first in the script is seen.
 //!
-//! Two objects may have a part of their surfaces in common: a label and its bottle, a picture and the wall it hangs on. A
-//! ray meets each at a distance of its own, some roundoffs apart, so that the nearest hit alone would be a matter of chance.
-//! Before the first pixel the pairs of such objects are found by their numbers, in `f64` (`pairs`). When a
-//! ray has met an object of a pair, those that come before it are asked again: the first that is met within the bound on
-//! the rounding errors of both is what the ray meets (`settle`). So what is seen depends on neither the
-//! order in which objects are looked for nor what is looked for besides.
+//! Two objects may share a part of their surfaces: a label and its bottle, a picture and its wall. A ray hits the two
+//! at distances that differ by some roundoffs, so that the nearest hit alone would be random. Before the first pixel
+//! the pairs of such objects are found by their numbers, in `f64` (`pairs`). If a ray has hit an object of a pair, the
+//! objects of its pairs that come before it are tested again. The first of them that is hit within the bound on the
+//! rounding errors of both counts (`settle`). So the visible object depends neither on the order of the search nor on
+//! other objects.
 //!
-//! Objects whose hits are the same bit for bit need no pair: faces that are square to an axis, and triangles whose planes
+//! Objects whose hits are the same bit for bit need no pair: faces perpendicular to an axis, and triangles whose planes
 //! have the same numbers.
 
 pub(super) mod surface;
@@ -15,18 +15,20 @@ pub(super) mod surface;
 pub(super) use self::surface::{Flat, Plain, Ring, Side, Surface, is_square};
 use crate::fast::arithmetic::real::Real;
 
-/// How far apart hits may be that count as equal, in roundoffs of the numbers of both objects and of the distance: as far as
-/// surfaces may lie apart that are meant to be one ([`surface::SAME`]), and as far again as the tests of bodies may err.
+/// The distance within which hits count as equal, in roundoffs of the numbers of both objects and of the distance. It
+/// is the distance of surfaces that are meant to coincide ([`surface::SAME`]), plus the same again for the errors of
+/// the tests of bodies.
 pub(super) const EQUAL: f64 = 128.0;
 
 /// The objects that share surfaces.
 #[derive(Clone, Debug)]
 pub(super) struct SharedSurfaces {
-    /// Where the list of each object begins, and the end of the last.
+    /// The start of the list of each object, and the end of the last list.
     starts: Vec<u32>,
-    /// For each object those that come before it and share a surface with it, in order.
+    /// For each object, the objects that come before it and share a surface with it, in order.
     earlier: Vec<Earlier>,
-    /// For each object the size of the largest numbers of itself and those that share a surface with it; 0 for all others.
+    /// For each object, the size of the largest numbers of itself and of those that share a surface with it; 0 if there
+    /// are none.
     sizes: Vec<f64>,
 }
 
@@ -34,7 +36,7 @@ pub(super) struct SharedSurfaces {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Earlier {
     pub(super) order: u32,
-    /// How large the numbers are that say where the surface lies, of both.
+    /// The size of the numbers of both that define the place of the surface.
     pub(super) size: f64,
 }
 
@@ -43,12 +45,13 @@ pub(super) struct Earlier {
 pub(super) struct Pair {
     pub(super) first: u32,
     pub(super) second: u32,
-    /// How large the numbers are that say where the surface lies.
+    /// The size of the numbers that define the place of the surface.
     pub(super) size: f64,
 }
 
 impl SharedSurfaces {
-    /// The objects of a scene of `count` that share surfaces, by their pairs, sorted by the second object and then by the first.
+    /// Makes the lists for a scene of `count` objects from the pairs, which are sorted by the second object and then by
+    /// the first.
     pub(super) fn of_pairs(pairs: &[Pair], count: usize) -> Self {
         let mut starts = vec![0u32; count + 1];
         let mut sizes = vec![0f64; count];
@@ -66,13 +69,13 @@ impl SharedSurfaces {
         Self { starts, earlier, sizes }
     }
 
-    /// Those that share a surface with an object and come before it.
+    /// Returns the objects that share a surface with an object and come before it.
     pub(super) fn earlier(&self, order: usize) -> &[Earlier] {
         &self.earlier[self.starts[order] as usize..self.starts[order + 1] as usize]
     }
 
-    /// How much farther off an object than its own numbers say new rays start, so that they are off all that shares its
-    /// surface.
+    /// Returns the distance by which new rays start farther off an object than its own numbers require, so that they
+    /// are also off all objects that share its surface.
     pub(super) fn offset<E: Real>(&self, order: E) -> E {
         E::narrow(EQUAL * E::ROUNDOFF * self.sizes[order.to_index()])
     }
@@ -121,7 +124,8 @@ mod tests {
         }
     }
 
-    /// Their planes have the same numbers, but rays do not meet them at the same distance: that depends on the centres.
+    /// Their planes have the same numbers, but rays hit them at different distances, because these depend on the
+    /// centres.
     #[test]
     fn of_discs_that_are_tilted_by_less_than_a_roundoff_the_first_is_met() {
         let eye = DVec3::new(-39.703_401_364_447_09, 0.766_533_590_484_827_9, -2.464_513_971_398_901);

@@ -1,8 +1,8 @@
-//! The parts of which surfaces consist, and whether two of them lie in one.
+//! The parts of surfaces, and the test of whether two of them coincide.
 
 use glam::DVec3;
 
-/// How far apart numbers may be that are meant to be the same, in roundoffs of the largest that took part.
+/// The distance between numbers that count as the same, in roundoffs of the largest number involved.
 pub(crate) const SAME: f64 = 64.0 * f64::EPSILON / 2.0;
 
 /// A part of the surface of an object.
@@ -27,13 +27,13 @@ pub(crate) struct Flat {
     pub(crate) plain: Plain,
 }
 
-/// By which formula rays meet a flat part: of the same numbers it makes the same distance.
+/// The formula for the distance to a flat part. The same formula with the same numbers gives the same distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Plain {
     Triangle,
-    /// From the numbers of a plane that is square to an axis.
+    /// From the numbers of a plane that is perpendicular to an axis.
     ByAxis,
-    /// From a place of its own.
+    /// From a point of the part itself.
     No,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Side {
     /// Of length 1.
     pub(crate) axis: DVec3,
     pub(crate) height: f64,
-    /// At the end, and at the other one.
+    /// The radii at the end and at the other end.
     pub(crate) radii: [f64; 2],
 }
 
@@ -58,20 +58,21 @@ pub(crate) struct Ring {
     pub(crate) thickness: f64,
 }
 
-/// A direction that is square to none that people write: it tells one side of a plane from the other.
+/// A direction that is perpendicular to no plane normal in practice. It distinguishes the two sides of a plane.
 pub(crate) const ASIDE: DVec3 = DVec3::new(0.577_215_664_9, 0.302_775_637_7, 0.141_592_653_6);
 
 /// Another such direction, along which places are sorted.
 const ACROSS: DVec3 = DVec3::new(-0.261_497_212_8, 0.662_743_419_3, 0.428_249_505_6);
 
-/// Whether a direction is one of an axis. The largest part of one that is tilted by less than a roundoff may be 1, too.
+/// Returns whether a direction is that of an axis. The test counts the coordinates other than 0, because a direction
+/// that is tilted by less than a roundoff may have a coordinate of 1, too.
 pub(crate) fn is_square(direction: DVec3) -> bool {
     direction.to_array().iter().filter(|&&part| part != 0.0).count() == 1
 }
 
 impl Surface {
-    /// Two numbers that are about the same for parts that lie in one surface: of what is flat one of its direction, and one of
-    /// its place.
+    /// Returns two numbers that are nearly the same for parts that lie in one surface: for flat parts, one for the
+    /// direction and one for the place.
     pub(crate) fn key(&self) -> (f64, f64) {
         match self {
             Self::Flat(flat) => {
@@ -88,7 +89,7 @@ impl Surface {
         }
     }
 
-    /// The middle and the radius of a ball around it.
+    /// Returns the centre and the radius of a ball around it.
     pub(crate) fn ball(&self) -> (DVec3, f64) {
         match self {
             Self::Flat(flat) => (flat.center, flat.radius),
@@ -101,7 +102,7 @@ impl Surface {
         }
     }
 
-    /// Whether rays meet both at the same distance, bit for bit.
+    /// Returns whether rays hit both at the same distance, bit for bit.
     pub(crate) fn is_met_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Flat(one), Self::Flat(other)) => one.is_met_with(other),
@@ -109,8 +110,8 @@ impl Surface {
         }
     }
 
-    /// How large the numbers are that say where two parts lie, if they lie in one surface and may have a part of it in
-    /// common; `sizes` are the largest numbers of both objects, along each axis.
+    /// Returns the size of the numbers that define where two parts lie, if both lie in one surface and may overlap.
+    /// `sizes` are the largest numbers of both objects along each axis.
     pub(crate) fn shared(&self, other: &Self, sizes: DVec3) -> Option<f64> {
         match (self, other) {
             (Self::Flat(one), Self::Flat(other)) => {
@@ -145,7 +146,7 @@ impl Surface {
 }
 
 impl Flat {
-    /// What is smaller lies in what is larger: it does not reach beyond its plane.
+    /// Returns the size if the smaller part lies in the larger one's plane.
     fn lies_in(&self, larger: &Self, sizes: DVec3) -> Option<f64> {
         if self.center.distance(larger.center) >= self.radius + larger.radius {
             return None;
@@ -172,7 +173,7 @@ impl Flat {
 }
 
 impl Side {
-    /// What is shorter lies in what is longer, as far as there is of both.
+    /// Returns the size if the shorter side coincides with the longer one along the length that both have.
     fn lies_in(&self, longer: &Self, sizes: DVec3) -> Option<f64> {
         let size = sizes.max_element();
         let at = |height: f64| self.end + height * self.axis;

@@ -1,4 +1,5 @@
-//! What can stand between a region and a light that has an extent: few objects, each by a ball and a box around it.
+//! The objects that can be between a region and a light with an extent: a few objects, each with a ball and a box
+//! around it.
 
 use glam::DVec3;
 
@@ -17,7 +18,7 @@ pub(crate) struct Hulls {
     high: [Vec<f64>; 3],
 }
 
-/// Where shadow rays start.
+/// The places at which shadow rays start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
     low: [f64; 3],
@@ -32,12 +33,12 @@ pub(crate) struct Cone {
     axis: DVec3,
     cosine: f64,
     sine: f64,
-    /// The least and the largest coordinate of its directions along each axis.
+    /// The smallest and the largest coordinate of the cone's directions along each axis.
     least: [f64; 3],
     largest: [f64; 3],
 }
 
-/// A part that covers the rounding errors in here.
+/// The factor that covers the rounding errors of this module.
 const WIDER: f64 = 1.0 + 1e-9;
 
 impl Region {
@@ -50,7 +51,7 @@ impl Region {
 }
 
 impl Cone {
-    /// `spread` is 1 - cos of its half angle.
+    /// Makes a cone. `spread` is 1 - cos of its half angle.
     pub(crate) fn new(axis: DVec3, spread: f64) -> Self {
         // Wider by the rounding of its rays' directions.
         let cosine = (1.0 - spread - 1e-6).max(-1.0);
@@ -72,7 +73,7 @@ impl Cone {
 }
 
 impl Hulls {
-    /// In the order of the bits.
+    /// Makes the hulls of shapes, in the order of the bits.
     pub(crate) fn new<'a, E: Real>(shapes: impl Iterator<Item = &'a Shape>) -> Self {
         let mut hulls = Self::default();
         for shape in shapes {
@@ -93,7 +94,7 @@ impl Hulls {
         hulls
     }
 
-    /// Those that rays from a region along a cone's directions can meet, by bits.
+    /// Returns, as bits, the objects that rays from a region in a cone's directions can hit.
     #[inline(always)]
     pub(crate) fn towards(&self, region: &Region, cone: &Cone) -> u64 {
         let mut bits = 0;
@@ -114,7 +115,7 @@ impl Hulls {
         bits
     }
 
-    /// Those that rays from a region to a ball can meet, by bits.
+    /// Returns, as bits, the objects that rays from a region to a ball can hit.
     #[inline(always)]
     pub(crate) fn between(&self, region: &Region, middle: DVec3, radius: f64) -> u64 {
         let mut bits = 0;

@@ -34,7 +34,7 @@ pub(crate) struct Obstacles {
     is_listed: bool,
     /// The bodies, as bits, if there are few.
     pub(crate) bodies: u64,
-    /// The objects of glass, as bits of the row of all objects and of the bodies, if shadow rays ask for them apart.
+    /// The objects of glass, as bits of the row of all objects and of the bodies, if shadow rays test glass separately.
     pub(crate) through: [u64; 2],
 }
 
@@ -85,7 +85,7 @@ impl Occluders {
         kinds
     }
 
-    /// Finds the bodies that can occlude, after [`Self::find`], in a scene that has some.
+    /// Finds the bodies that can occlude, after [`Self::find`], in a scene that has bodies.
     #[inline(never)]
     pub(crate) fn find_bodies<S: Simd, E: Real>(&mut self, simd: S, scene: &Prepared<E>, hits: &Hits<E>) {
         simd.vectorize(

@@ -1,6 +1,6 @@
-//! A path: what a packet meets, what lights it, and the rays that go on from there.
+//! A path: the first hits of a packet, the light there, and the rays that go on from there.
 //!
-//! In: a queue of rays and a prepared scene. Out: the colours that the rays bring. Read [`surfaces`] first.
+//! In: a queue of rays and a prepared scene. Out: the colours of the rays. Read [`surfaces`] first.
 
 pub(crate) mod hulls;
 pub(crate) mod light;

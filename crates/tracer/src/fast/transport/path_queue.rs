@@ -1,8 +1,8 @@
-//! Queues of the rays of paths, in scenes in which light goes round.
+//! Queues of the rays of paths, in scenes in which surfaces light each other.
 //!
-//! Rays wait by the number of hits before them, and by how they went on from the last. They are traced a batch at a time, from
-//! the longest paths of which there are enough for a batch. So no queue holds more than some batches, however many rays there
-//! are. What a ray adds to a pixel is summed as that of the other queues is.
+//! Rays wait by the number of hits before them and by the kind of their last bounce. They are traced a batch at a time,
+//! starting with the longest paths that can fill a batch. So no queue holds more than some batches, however many rays
+//! there are. A ray's contribution to a pixel is summed as in the other queues.
 
 use crate::fast::arithmetic::real::Real;
 use crate::fast::rays::bounce::{Column, PIXELS, ROOM, RayBatch};
@@ -12,12 +12,12 @@ use crate::sampling::paths::Way;
 /// The number of rays in a full batch.
 const FULL: usize = PIXELS;
 
-/// The numbers of times that a path has gone on.
+/// The numbers of bounces of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Turns {
-    /// By mirrors and glass.
+    /// Bounces by mirrors and glass.
     pub(crate) bounced: u8,
-    /// By surfaces that scatter light.
+    /// Bounces by surfaces that scatter light.
     pub(crate) scattered: u8,
 }
 
@@ -34,22 +34,22 @@ impl Turns {
 pub(crate) struct PathRay<E> {
     pub(crate) origin: [E; 3],
     pub(crate) direction: [E; 3],
-    /// The factor of its colour in the colour of the pixel.
+    /// The factor of the ray's colour in the colour of the pixel.
     pub(crate) weight: [E; 3],
     pub(crate) pixel: E,
-    /// In scenes without background, the share of the pixel that stays clear if the ray reaches nothing; -1 if it counts for
-    /// nothing then.
+    /// In scenes without background, the share of the pixel that stays clear if the ray hits nothing, or -1 if a miss
+    /// does not count.
     pub(crate) clear: E,
     pub(crate) turns: Turns,
 }
 
-/// The number of hits of which the rays to light are drawn at once.
+/// The number of hits whose rays towards light are drawn at once.
 pub(super) const BLOCK: usize = 16;
 const _: () = assert!(ROOM.is_multiple_of(BLOCK));
 
 /// The rays that are scattered at the hits of a batch.
 pub(super) struct Drawn {
-    /// Whether the hit of a ray scatters light, and its path may go on so.
+    /// Whether the hit of a ray scatters light and its path may continue in this way.
     pub(super) is_scattered: [bool; ROOM],
     /// The numbers of the directions.
     pub(super) numbers: [Box<Column<f64>>; 2],
@@ -57,9 +57,10 @@ pub(super) struct Drawn {
     pub(super) by_cosine: [Box<Column<f64>>; 3],
     /// The directions towards light.
     pub(super) aimed: [Box<Column<f64>>; 3],
-    /// The factors with which those by the cosine count, and those towards light. They are 0 for a ray that is none.
+    /// The factors with which the rays by the cosine count, and those towards light. The factor is 0 if there is no
+    /// ray.
     pub(super) factors: [Box<Column<f64>>; 2],
-    /// Room for how surfaces see light.
+    /// Working memory for how surfaces see light.
     pub(super) seen: Vec<Seen<BLOCK>>,
 }
 
@@ -80,7 +81,7 @@ impl Drawn {
 
 /// The rays of the paths of a tile.
 pub(crate) struct PathQueues<E> {
-    /// By hits before, and by [`Way`].
+    /// The waiting rays, by the number of hits before and by [`Way`].
     waiting: Vec<[Vec<PathRay<E>>; Way::COUNT]>,
     /// The turns of the rays of the current batch.
     pub(super) turns: [Turns; ROOM],
@@ -98,7 +99,7 @@ impl<E: Real> PathQueues<E> {
         self.turns.fill(Turns::default());
     }
 
-    /// Returns how often the path of a ray of the batch has gone on.
+    /// Returns the numbers of bounces of the path of a ray of the batch.
     #[inline(always)]
     pub(crate) fn turns(&self, ray: usize) -> Turns {
         self.turns[ray]
@@ -114,7 +115,7 @@ impl<E: Real> PathQueues<E> {
         self.waiting[before][way as usize].push(ray);
     }
 
-    /// Fills the batch with rays that wait. Returns false if there are none. `marks` gets their clear shares.
+    /// Fills the batch with waiting rays. Returns false if there are none. `marks` receives their clear shares.
     pub(super) fn take(&mut self, queue: &mut RayBatch<E>, marks: &mut Column<E>) -> bool {
         let waiting = self.waiting.as_flattened_mut();
         let full = waiting.iter().rposition(|rays| rays.len() >= FULL);

@@ -1,7 +1,8 @@
-//! The rays that go on from hits in scenes in which light goes round: this step replaces `reflect` and `spawn_rays` there.
+//! The rays that go on from hits in scenes in which surfaces light each other. This step replaces `reflect` and
+//! `spawn_rays` there.
 //!
-//! It goes lane by lane, with the functions of the reference tracer. The directions of scattered rays alone, and of those towards light,
-//! are drawn in packets, by the same functions.
+//! It works lane by lane, with the functions of the reference tracer. Only the directions of scattered rays and of
+//! those towards light are drawn in packets, by the same functions.
 
 use fearless_simd::{Simd, SimdBase};
 use glam::DVec3;
@@ -149,7 +150,7 @@ fn aim<S: Simd, E: Real>(
     }
 }
 
-/// Adds the rays that go on from the hits of a batch to the queues. `is_painted` says that the hits have their mirror
+/// Adds the rays that go on from the hits of a batch to the queues. `is_painted` is whether the hits have their mirror
 /// coefficients, as in patterns and fog.
 #[inline(never)]
 pub(crate) fn spawn_paths<S: Simd, E: Real>(
@@ -289,8 +290,8 @@ impl<E: Real> Origin<'_, E> {
         self.numbers.direction(self.slot, self.turns.hits())
     }
 
-    /// Adds rays of this weight, if they are followed: `rays` has their starts, their directions, and further factors, which have no
-    /// part in whether they are followed. A ray that is aimed at bright light has a small one.
+    /// Adds the rays of this weight that are followed. `rays` has their starts, their directions and further factors.
+    /// These factors do not affect whether a ray is followed: a ray that is aimed at bright light has a small one.
     #[inline(always)]
     fn send<const COUNT: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! The object that counts among those that share a surface, for rays that have met one of them.
+//! Selects the hit that counts among objects that share a surface, for rays that have hit one of them.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -14,7 +14,7 @@ use crate::fast::shared::{EQUAL, Earlier, SharedSurfaces};
 use crate::fast::transport::surfaces::surface;
 
 impl SharedSurfaces {
-    /// Makes of the nearest hits of a packet those that count.
+    /// Replaces the nearest hits of a packet by the hits that count.
     #[inline(never)]
     pub(crate) fn settle<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
         &self,
@@ -61,7 +61,7 @@ impl SharedSurfaces {
         );
     }
 
-    /// Makes of the nearest hits of a queue those that count.
+    /// Replaces the nearest hits of a queue by the hits that count.
     #[inline(never)]
     pub(crate) fn settle_all<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
         &self,
@@ -89,7 +89,7 @@ impl SharedSurfaces {
         );
     }
 
-    /// Lets the rays that go on from the hits of a queue start off all that shares the surface there.
+    /// Moves the starts of the rays that go on from the hits of a queue off all objects that share the surface there.
     pub(crate) fn lift<E: Real>(&self, hits: &mut Hits<E>, lanes: usize) {
         for packet in 0..hits.packets.len() {
             let (at, _) = hits.packets[packet];
@@ -106,7 +106,7 @@ impl SharedSurfaces {
         }
     }
 
-    /// The same for a surface where rays meet the object of this order.
+    /// Does the same for a surface at hits of the object with this order.
     pub(crate) fn lifted<S: Simd, E: Real>(
         &self,
         simd: S,
@@ -122,7 +122,7 @@ impl SharedSurfaces {
     }
 }
 
-/// Offers where rays meet one object.
+/// Offers the hits of rays with one object.
 #[inline(always)]
 fn meet_one<S: Simd, E: Real, F: Features<E>, const EYE: bool>(
     simd: S,

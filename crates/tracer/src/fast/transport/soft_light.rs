@@ -1,4 +1,4 @@
-//! Light from suns and lamps that have an extent: each ray of the camera has a point of each, for all its bounces.
+//! Light from suns and lamps that have an extent. Each camera ray has a point of each light, for all its bounces.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
@@ -26,11 +26,11 @@ use crate::sampling::{BATCH, Dimensions, Points};
 /// The extents of a scene's lights.
 #[derive(Debug)]
 pub(crate) struct Extents {
-    /// For each sun, which of the [`LightPoints`] are its own, if it has any.
+    /// For each sun with an extent, the index of its [`LightPoints`].
     suns: Vec<Option<(usize, SoftSun)>>,
     /// The same for each lamp.
     lamps: Vec<Option<(usize, Ball)>>,
-    /// Of few objects: what they are known to lie in.
+    /// The balls and boxes around objects, if they are few.
     hulls: Option<Hulls>,
     /// The same of few bodies.
     bodies: Option<Hulls>,
@@ -40,7 +40,7 @@ pub(crate) struct Extents {
 
 #[derive(Debug)]
 struct SoftSun {
-    /// The cone's axes, the last towards the middle.
+    /// The cone's axes. The last one points towards the middle.
     axes: [DVec3; 3],
     spread: f64,
     cone: Cone,
@@ -52,28 +52,28 @@ struct Ball {
     radius: f64,
 }
 
-/// Lights of which each ray has a point of its own, for the rays of a tile.
+/// Lights with an extent, and their points for the rays of a tile.
 #[derive(Clone, Copy)]
 pub(crate) struct SoftLight<'a, E> {
     pub(crate) extents: &'a Extents,
     pub(crate) points: &'a LightPoints<E>,
 }
 
-/// The objects of the row and the bodies that shadow rays to a light ask for, as bits: at first, and for glass.
+/// The objects of the row and the bodies that shadow rays to a light test, as bits: at first, and for glass.
 #[derive(Clone, Copy)]
 struct Asked {
     first: [u64; 2],
     through: [u64; 2],
 }
 
-/// The points of a tile's camera rays: for a sun the unit vector towards it, for a lamp a place.
+/// The points of a tile's camera rays: for a sun the unit vector towards it, for a lamp a position.
 #[derive(Default)]
 pub(crate) struct LightPoints<E> {
     of: Vec<Columns<E>>,
 }
 
 impl Extents {
-    /// None where all lights are points.
+    /// Returns `None` if all lights are points.
     pub(crate) fn new<E: Real>(
         scene: &Scene,
         geometry: &Geometry,
@@ -106,7 +106,7 @@ impl Extents {
         (!firsts.is_empty()).then_some(Self { suns, lamps, hulls, bodies, dimensions: firsts })
     }
 
-    /// The points of rays of these samples of pixels.
+    /// Computes the points for the rays of these samples of pixels.
     #[inline(always)]
     pub(crate) fn place<E: Real>(
         &self,
@@ -363,7 +363,7 @@ pub(crate) fn light_up_softly<S: Simd, E: Real, F: Features<E>, const EYE: bool>
     );
 }
 
-/// Which of the rays that `lit` names meet nothing nearer than `far`.
+/// Returns which of the rays in `lit` hit nothing nearer than `far`.
 #[inline(always)]
 fn unmet<S: Simd, E: Real, F: Features<E>>(
     simd: S,

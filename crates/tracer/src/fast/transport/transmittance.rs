@@ -32,17 +32,18 @@ pub(crate) struct IncidentLight<S: Simd, E: Real> {
     pub(crate) lit: Mask<S, E>,
 }
 
-/// The objects that shadow rays ask for glass.
+/// The objects that shadow rays test for glass.
 #[derive(Clone, Copy)]
 pub(crate) struct Panes {
     candidates: Candidates<'static>,
     bodies: u64,
-    /// Whether they are those of glass alone: the rays have been asked for all others before.
+    /// Whether only objects of glass are tested here, because the rays have been tested against all others before.
     are_apart: bool,
 }
 
 impl Panes {
-    /// Returns those among objects of the row and bodies, which are given as bits, if glass is asked for apart; else all objects.
+    /// Returns those among objects of the row and bodies, given as bits, that are tested for glass: only glass if it is
+    /// tested separately, otherwise all.
     #[inline(always)]
     pub(crate) fn new<E: Real>(scene: &Prepared<E>, [shapes, bodies]: [u64; 2]) -> Self {
         match scene.glass_apart() {
@@ -65,8 +66,8 @@ impl Panes {
 }
 
 impl<S: Simd, E: Real> IncidentLight<S, E> {
-    /// Follows the light of the `facing` lanes through glass. It has reached the `lit` ones past the objects that were asked for
-    /// first, and its colour is still that of the light.
+    /// Follows the light of the `facing` lanes through glass. It has reached the `lit` ones past the objects that were
+    /// tested first, and its colour is still that of the light.
     #[inline(always)]
     pub(crate) fn past_glass<F: Features<E>>(
         self,

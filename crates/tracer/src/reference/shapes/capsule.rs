@@ -1,8 +1,8 @@
 //! Capsules: the union of two balls and the cylinder between their centres.
 //!
-//! The body is convex, so a ray has one interval in it: from the first place where it enters one of the three to the
-//! last where it leaves one. Lengths are in units of the body, scaled by a power of two, and a distant origin is first
-//! moved near the body along the ray, as for frusta. So the errors across the ray are some roundoffs of the body's size.
+//! The body is convex, so a ray has one interval in it, from the first entry into one of the three to the last exit.
+//! Lengths are in units of the body, scaled by a power of two. A distant origin is first moved near the body along the
+//! ray, as for frusta. So the errors across the ray are some roundoffs of the body's size.
 
 use glam::DVec3;
 use rayfold_scene::Capsule;
@@ -22,14 +22,14 @@ fn size(capsule: &Capsule) -> f64 {
     below_inverse((b - a).abs().max_element().max(capsule.radius()))
 }
 
-/// Returns the unit vector from a to b; any for a ball.
+/// Returns the unit vector from a to b, or any unit vector for a ball.
 fn axis(capsule: &Capsule) -> DVec3 {
     let [a, b] = capsule.ends();
     if a == b { DVec3::Z } else { unit(b - a) }
 }
 
-/// Returns d² - R² for the distance d of a point from the segment, in units of 1 / scale, with twice the precision,
-/// because the point may be on the surface: positive outside, exactly 0 on the surface.
+/// Returns d² - R² for the distance d of a point from the segment, in units of 1 / scale: positive outside, exactly 0
+/// on the surface. It has twice the precision, because the point may be on the surface.
 fn outside(capsule: &Capsule, place: impl Into<Place>, scale: f64) -> f64 {
     let [a, b] = capsule.ends();
     let place = place.into();
@@ -48,7 +48,8 @@ fn outside(capsule: &Capsule, place: impl Into<Place>, scale: f64) -> f64 {
     (far - near).beside(far.value() + near.value())
 }
 
-/// Returns the interval of a line in a ball, from the centre to the line's start and its unit direction.
+/// Returns the interval of a line in a ball. The arguments are the vector from the centre to the line's start, and the
+/// line's unit direction.
 fn in_ball(from_center: DVec3, direction: DVec3, radius: f64) -> Option<(f64, f64)> {
     let middle = -from_center.dot(direction);
     let closest = (from_center + middle * direction).length();

@@ -71,10 +71,10 @@ fn flat_axis(cuboid: &Cuboid) -> Option<usize> {
 }
 
 /// Returns the distances at which the ray enters and leaves the box, each with its axis, by Kay and Kajiya's slabs. The
-/// planes of a slab belong to it, and a ray parallel to them is inside for its whole length.
+/// planes of a slab belong to it. A ray parallel to them is inside for its whole length.
 ///
-/// The distance of leaving is increased by the rounding error of the divisions (Ize, "Robust BVH ray traversal", JCGT
-/// 2(2), 2013), so that edges and corners belong to the box.
+/// The exit distance is increased by the rounding error of the divisions (Ize, "Robust BVH ray traversal", JCGT 2(2),
+/// 2013), so that edges and corners belong to the box.
 fn slabs(cuboid: &Cuboid, ray: Ray) -> Option<((f64, usize), (f64, usize))> {
     let (min, max) = (cuboid.min(), cuboid.max());
     let mut enter = (f64::NEG_INFINITY, 0);

@@ -31,7 +31,8 @@ impl DoubleDouble {
         Self { high, low: (a - (high - of_b)) - (b + of_b) }
     }
 
-    /// Returns the nearest `f64`, or zero if the value is only rounding error relative to numbers of this `magnitude`.
+    /// Returns the nearest `f64`, or zero if the value is only a rounding error relative to numbers of this
+    /// `magnitude`.
     pub(super) fn beside(self, magnitude: f64) -> f64 {
         let value = self.high + self.low;
         if value.abs() <= NOISE * magnitude { 0.0 } else { value }

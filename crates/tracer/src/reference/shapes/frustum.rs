@@ -1,9 +1,9 @@
 //! Frusta: cylinders and cones, rotationally symmetric about an axis, with straight sides, closed by caps.
 //!
 //! Let z be the height above the end a, ρ the vector from the axis, and r(z) = Ra + k·z the radius there. The side is
-//! the surface where f = |ρ|² - r² is 0. The body is convex, so a ray has one interval in it. Lengths are in units of
-//! the body, scaled by a power of two, and a distant origin is first moved near the body along the ray. So each
-//! decision about a ray has errors of some roundoffs of the body's size.
+//! the surface f = |ρ|² - r² = 0. The body is convex, so a ray has one interval in it. Lengths are in units of the
+//! body, scaled by a power of two. A distant origin is first moved near the body along the ray. So each decision about
+//! a ray has errors of some roundoffs of the body's size.
 
 use glam::DVec3;
 use rayfold_scene::model::unit;
@@ -40,7 +40,7 @@ const FAR: f64 = 8.0;
 /// to the body.
 const EDGE: f64 = 8.0;
 
-/// The cosine above which a normal is that of a cap, which is the axis. A normal of a side is farther from the axis.
+/// The cosine of the angle to the axis above which a normal is that of a cap. A normal of the side has a larger angle.
 pub(super) const CAP: f64 = 1.0 - 1e-12;
 
 impl Frustum {
@@ -50,8 +50,8 @@ impl Frustum {
         unit(b - a).dot(normal).abs() > CAP
     }
 
-    /// Returns the axis along which the body's own axis runs, and the coordinate of the cap that is nearer to a point.
-    /// Returns `None` if it runs along no axis.
+    /// Returns the axis of the coordinates that is parallel to the body's axis, and the coordinate of the cap that is
+    /// nearer to a point. Returns `None` if the body is parallel to no axis.
     pub(super) fn cap(&self, place: DVec3) -> Option<(usize, f64)> {
         let [a, b] = self.ends;
         let mut differing = (0..3).filter(|&axis| a[axis] != b[axis]);
@@ -118,7 +118,7 @@ impl Frustum {
         (a + height * axis + radius * away, unit(away - slope * axis))
     }
 
-    /// Returns the sides of the infinite cone and of its ends on which a point is.
+    /// Returns the sides on which a point is, for the infinite cone and for the ends.
     pub(super) fn sides(&self, place: Place) -> Sides {
         let size = self.size();
         let Exact { outside, heights } = self.exact(place, size);
@@ -214,7 +214,7 @@ impl Frustum {
     }
 }
 
-/// The value of f at a point, and its heights above the ends, in units of 1 / scale. Exactly 0 on the surface.
+/// The value of f at a point, and its heights above the ends, in units of 1 / scale. It is exactly 0 on the surface.
 struct Exact {
     outside: f64,
     heights: [f64; 2],
@@ -222,7 +222,7 @@ struct Exact {
 
 /// Returns the interval in which A·t² + 2·B·t + C is not positive, on the half of a double cone whose radius is not
 /// negative. The radius changes by `growth` per length of the ray. The interval may be on the other half alone, which
-/// the caps cut off.
+/// the caps remove.
 fn inside([a, b, c]: [f64; 3], discriminant: f64, growth: f64) -> Option<(f64, f64)> {
     const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
     if a == 0.0 {

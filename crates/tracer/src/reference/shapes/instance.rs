@@ -1,7 +1,7 @@
-//! Objects of groups: a ray is taken into the coordinates of the group.
+//! Objects of groups. A ray is transformed into the coordinates of the group.
 //!
-//! Where the object can be moved into the world without any rounding it is ([`in_world`]), so that a group shows what its
-//! copy written out shows, bit for bit.
+//! An object that can be moved into the world without any rounding is moved there ([`in_world`]). So a group gives the
+//! same picture as its objects written out, bit for bit.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -23,7 +23,8 @@ impl Shape for Instance {
         Some(distance * self.placement().scale())
     }
 
-    /// To what the shape says the way into the world adds the roundings of a product with a matrix, of the scale and of a sum.
+    /// The transformation into the world adds to the shape's rounding errors those of a product with a matrix, of the
+    /// scale and of a sum.
     fn surface(&self, ray: Ray, distance: f64) -> Surface {
         let placement = self.placement();
         let surface = super::surface(self.object(), local(self, ray), distance / placement.scale());
@@ -44,7 +45,7 @@ impl Shape for Instance {
 }
 
 /// Returns the object in coordinates whose origin is the eye. Returns `None` if that is impossible, or if rounding
-/// would change which side of it the eye is on.
+/// would move the eye to another side of it.
 pub(in crate::reference) fn seen_from(object: &Object, eye: DVec3) -> Option<Object> {
     match object {
         Object::Instance(instance) => of_group(instance, eye),
@@ -59,8 +60,9 @@ pub(in crate::reference) fn seen_from(object: &Object, eye: DVec3) -> Option<Obj
     }
 }
 
-/// Implements [`seen_from`] for an object of a group. If rounding would put the eye on another side of the surface, the object gets the group's
-/// own numbers relative to the eye, and its lengths grow or shrink by their last bits until the eye is on the right side.
+/// Implements [`seen_from`] for an object of a group. If rounding would put the eye on another side of the surface, the
+/// object gets the group's own numbers relative to the eye. Its lengths are then increased or decreased by units of
+/// their last bit until the eye is on the right side.
 fn of_group(instance: &Instance, eye: DVec3) -> Option<Object> {
     let placement = instance.placement();
     let object = instance.object();
@@ -88,7 +90,7 @@ fn of_group(instance: &Instance, eye: DVec3) -> Option<Object> {
     Some(found.map_or(drawn, |object| Instance::new(&vec![object].into(), 0, &Arc::new(own)).into()))
 }
 
-/// Makes all lengths larger by so many last bits.
+/// Increases all lengths by `steps` units of their last bit.
 struct Grown(i64);
 
 impl Motion for Grown {
@@ -108,7 +110,7 @@ impl Motion for Grown {
     }
 }
 
-/// The ray in the coordinates of the group; its direction stays of unit length.
+/// The ray in the coordinates of the group. Its direction remains a unit vector.
 fn local(instance: &Instance, ray: Ray) -> Ray {
     let placement = instance.placement();
     Ray {
@@ -117,7 +119,8 @@ fn local(instance: &Instance, ray: Ray) -> Ray {
     }
 }
 
-/// An object of a group as one of the world, if that needs no rounding: turned by right angles alone, or not at all.
+/// Returns an object of a group as one of the world, if that needs no rounding: rotated only by right angles, or not at
+/// all.
 pub(crate) fn in_world(object: &Object) -> Cow<'_, Object> {
     let Object::Instance(instance) = object else { return Cow::Borrowed(object) };
     moved(instance).map_or(Cow::Borrowed(object), Cow::Owned)
@@ -131,7 +134,7 @@ fn moved(instance: &Instance) -> Option<Object> {
     instance.object().moved(&Exactly(placement), instance.material().clone()).ok()
 }
 
-/// A placement that turns axes to axes, without any rounding: NaN where a result would need one.
+/// A placement that maps axes to axes without any rounding. A result that would need rounding is NaN.
 struct Exactly<'a>(&'a Placement);
 
 impl Motion for Exactly<'_> {
@@ -217,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Numbers for which the rounded eye is on the other side than the exact one; found by fractions.
+    /// Numbers for which the rounded eye is on another side than the exact one. They were found with fractions.
     #[test]
     fn an_eye_in_the_last_bit_of_a_surface_of_a_group_is_on_the_right_side() {
         let tube =

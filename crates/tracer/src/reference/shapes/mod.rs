@@ -43,7 +43,7 @@ pub struct Surface {
     pub offset: f64,
     /// Whether it is a face, a cap or a flat object.
     pub flat: bool,
-    /// Whether the ray came from within the object. It is false for an object that has no inside.
+    /// Whether the ray came from within the object. Always false for an object that has no inside.
     pub within: bool,
 }
 
@@ -59,7 +59,7 @@ trait Shape {
     /// Returns the surface that the ray hits at `distance`.
     fn surface(&self, ray: Ray, distance: f64) -> Surface;
 
-    /// Returns on which side of each of its surfaces a point lies, as signs; 0 in a surface.
+    /// Returns the side of each of its surfaces on which a point lies, as signs; 0 in a surface.
     fn sides(&self, place: Place) -> Sides;
 
     /// Returns whether it has an inside, which glass fills.
@@ -72,8 +72,8 @@ trait Shape {
         false
     }
 
-    /// Returns, for the flat part with this normal at `place`, the axis that it is perpendicular to, and its coordinate
-    /// on that axis in the script. Returns `None` for a part that is perpendicular to no axis.
+    /// Returns the axis to which the flat part with this normal at `place` is perpendicular, and its coordinate on that
+    /// axis in the script. Returns `None` for a part that is perpendicular to no axis.
     fn face(&self, _place: DVec3, _normal: DVec3) -> Option<(usize, f64)> {
         None
     }
@@ -120,7 +120,7 @@ pub(super) fn distance(object: &Object, ray: Ray) -> Option<f64> {
 /// Returns the surface of an object that the ray hits at `distance`.
 ///
 /// # Panics
-/// If the ray does not hit the object.
+/// The ray does not hit the object.
 pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
     let scale = scale(object, ray);
     if scale == 1.0 {
@@ -133,7 +133,7 @@ pub(super) fn surface(object: &Object, ray: Ray, distance: f64) -> Surface {
     Surface { point: surface.point / scale, offset: surface.offset / scale, ..surface }
 }
 
-/// Returns the largest of the numbers in the intersection of a ray with an object.
+/// Returns the largest number in the intersection of a ray with an object.
 pub(super) fn extent(object: &Object, ray: Ray) -> f64 {
     shape(object).extent(ray.origin)
 }
@@ -148,19 +148,19 @@ fn scale(object: &Object, ray: Ray) -> f64 {
     if ordinary { 1.0 } else { below_inverse(extent) }
 }
 
-/// Returns object and ray in units of 1 / scale, or `None` for an object that is too small to be visible in the ray's
-/// units.
+/// Returns the object and the ray in units of 1 / scale, or `None` if the object is too small to be visible in the
+/// ray's units.
 fn scaled(object: &Object, ray: Ray, scale: f64) -> Option<(Object, Ray)> {
     let object = object.placed(scale, |position| position * scale).ok()?;
     Some((object, Ray { origin: ray.origin * scale, ..ray }))
 }
 
-/// Returns whether an object, which is no instance, has an inside.
+/// Returns whether an object that is not an instance has an inside.
 pub(crate) fn has_inside(object: &Object) -> bool {
     shape(object).has_inside()
 }
 
-/// Returns whether an object, which is no instance, is flat where it has this unit normal: a face or a cap.
+/// Returns whether an object that is not an instance is flat where it has this unit normal: a face or a cap.
 pub(crate) fn is_flat_at(object: &Object, normal: DVec3) -> bool {
     shape(object).is_flat_at(normal)
 }

@@ -40,8 +40,8 @@ impl Shape for Plane {
 }
 
 /// Returns the distance along the ray to a plane. It is not finite for a ray parallel to the plane, and exactly 0 for
-/// one that starts in it. All flat shapes in one plane perpendicular to an axis, faces of boxes too, are hit at the
-/// same distance bit for bit.
+/// one that starts in it. All flat shapes in one plane perpendicular to an axis, including faces of boxes, are hit at
+/// the same distance bit for bit.
 pub(super) fn along(ray: Ray, point: DVec3, normal: DVec3) -> f64 {
     let largest = normal.abs().max_element();
     let square_to_an_axis = normal.to_array().iter().filter(|x| **x != 0.0).count() == 1;
@@ -73,8 +73,8 @@ fn height(place: impl Into<Place>, point: DVec3, normal: DVec3) -> f64 {
 
 /// Returns the surface of a plane at the hit of a ray.
 ///
-/// The hit and its move back onto the plane have rounding errors relative to the largest of their numbers: 3 in the
-/// hit, 1 in the difference, and those of the height, which is no larger.
+/// The hit, and its move onto the plane, have rounding errors relative to the largest of their numbers: 3 in the hit, 1
+/// in the difference, and those of the height, which is no larger.
 pub(super) fn surface(ray: Ray, distance: f64, point: DVec3, normal: DVec3) -> Surface {
     let outward = unit(normal);
     let near = ray.origin + distance * ray.direction;

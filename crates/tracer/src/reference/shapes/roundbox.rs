@@ -1,9 +1,9 @@
 //! Boxes with round edges: all points within a radius of a smaller box, the core.
 //!
-//! Along a ray the square of the distance from the core is a convex function of the ray's parameter. It consists of at
-//! most seven parabolas, which meet, with equal slopes, where the ray enters and leaves the slabs of the core. The ray
-//! enters the body in the last parabola whose beginning is outside and goes down. So faces, edges and corners need no
-//! tests of their own, and there is no seam between them. A ray leaves where its reverse enters.
+//! Along a ray, the square of the distance from the core is a convex function of the ray's parameter. It consists of at
+//! most seven parabolas, which meet with equal slopes where the ray enters and leaves the slabs of the core. The ray
+//! enters the body in the last parabola that begins outside and descends. So faces, edges and corners need no tests of
+//! their own, and there is no seam between them. The exit of a ray is the entry of the reversed ray.
 //!
 //! Lengths are in units of the body, scaled by a power of two, and a distant origin is first moved near the body along
 //! the ray, as for frusta. So the errors across the ray are some roundoffs of the body's size.
@@ -45,8 +45,8 @@ fn size(roundbox: &Roundbox) -> f64 {
     below_inverse((roundbox.max() - roundbox.min()).max_element())
 }
 
-/// Returns d² - r² for the distance d of a point from the core, in units of 1 / scale, with twice the precision, because
-/// the point may be on the surface: positive outside, exactly 0 on the surface.
+/// Returns d² - r² for the distance d of a point from the core, in units of 1 / scale: positive outside, exactly 0 on
+/// the surface. It has twice the precision, because the point may be on the surface.
 fn outside(roundbox: &Roundbox, place: impl Into<Place>, scale: f64) -> f64 {
     let place = place.into();
     let radius = DoubleDouble::from(roundbox.radius() * scale);
@@ -65,8 +65,8 @@ fn outside(roundbox: &Roundbox, place: impl Into<Place>, scale: f64) -> f64 {
 }
 
 impl Core {
-    /// Returns how far the line is from the core along each axis, at `at` and just behind: as a place and a direction, both
-    /// 0 along axes on which it is within the core's slab.
+    /// Returns the vector from the core to the line, at `at` and just behind it, as a place and a direction. Both are 0
+    /// along axes on which the line is within the core's slab.
     fn beside(&self, direction: DVec3, at: f64) -> (DVec3, DVec3) {
         let (mut from, mut along) = (DVec3::ZERO, DVec3::ZERO);
         for axis in 0..3 {
@@ -269,7 +269,8 @@ mod tests {
         beside.max(DVec3::ZERO).length() + beside.max_element().min(0.0) - radius
     }
 
-    /// Marches along a ray by the distance from the surface. Returns where it comes within `near`, and the least distance.
+    /// Marches along a ray by the distance from the surface. Returns the place at which it comes within `near`, and the
+    /// least distance.
     fn march(ray: Ray, half: DVec3, radius: f64, near: f64) -> (Option<f64>, f64) {
         let side = signed(ray.origin, half, radius).signum();
         let (mut at, mut least) = (0.0, f64::INFINITY);

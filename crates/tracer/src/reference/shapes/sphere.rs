@@ -51,7 +51,8 @@ impl Shape for Sphere {
 }
 
 /// Returns `|point - center|² - radius²` of a sphere in units of 1 / scale, a power of two: positive outside, negative
-/// inside. It is accurate to a part in 10^30 of the squares, so that the side of a point near the surface is certain.
+/// inside. Its error is at most a part in 10^30 of the squares, so that the side of a point near the surface is
+/// certain.
 ///
 /// Uses sums and products with their errors (Dekker, "A floating-point technique for extending the available
 /// precision", 1971).

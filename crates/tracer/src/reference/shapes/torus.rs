@@ -1,12 +1,12 @@
 //! Tori, in coordinates of their own.
 //!
-//! With ρ the distance from the axis and z the height above the circle's plane, the surface is where the signed
-//! distance s = √((ρ - R)² + z²) - r is 0. Squaring twice gives q, a quartic along the ray, with the sign of s. Between
-//! two roots of its derivative, a cubic, q has at most one root. So the roots of the cubic bracket the hits, and the
-//! roots of the cubic's derivative bracket those of the cubic. The quartic q itself is never computed: if s has
-//! different signs at the ends of an interval, the hit is in it.
+//! Let ρ be the distance from the axis, and z the height above the circle's plane. The surface is the set where the
+//! signed distance s = √((ρ - R)² + z²) - r is 0. Squaring twice gives q, a quartic along the ray, with the sign of s.
+//! Between two roots of its derivative, a cubic, q has at most one root. So the roots of the cubic bracket the hits,
+//! and the roots of the cubic's derivative bracket those of the cubic. The quartic q itself is never computed. If s has
+//! different signs at the ends of an interval, there is a hit in it.
 //!
-//! The error of s is a few roundoffs of the torus's size, and the error of a root of the cubic enters by its square.
+//! The error of s is a few roundoffs of the torus's size. The error of a root of the cubic enters s only by its square.
 //! Rays that touch the torus within such an error may miss it. Lengths are in units of the torus, scaled by a power of
 //! two.
 
@@ -62,7 +62,7 @@ impl Shape for Torus {
     }
 }
 
-/// Returns whether a point is outside (greater), inside (less) or on the surface. It is computed with twice the
+/// Returns whether a point is outside (greater), inside (less) or on the surface (equal). It is computed with twice the
 /// precision.
 fn side(torus: &Torus, place: impl Into<Place>) -> Ordering {
     let scale = below_inverse(torus.radius() + torus.thickness());

@@ -96,8 +96,8 @@ pub(crate) fn triangle_normal(vertices: &[DVec3; 3]) -> DVec3 {
 
 /// Returns [`triangle_normal`], and the approximate ratio of the triangle's width to its length.
 ///
-/// The normal is accurate to a few roundoffs, also for a needle: the rounding errors of its edges, which are large
-/// relative to its width, are added back.
+/// The normal is accurate to a few roundoffs, even for a needle. The rounding errors of the needle's edges, which are
+/// large relative to its width, are added back.
 pub(crate) fn normal_and_width(vertices: &[DVec3; 3]) -> (DVec3, f64) {
     let largest = vertices.iter().fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element();
     let scale = below_inverse(largest);

@@ -5,7 +5,7 @@ use core::ops::Range;
 /// Pixels in a word.
 pub(super) const WORD: usize = 64;
 
-/// Zeros, which take no memory before they are written to; `None` where there is none for them.
+/// Returns zeros, which take no memory before they are written to, or `None` if there is not enough memory.
 pub(super) fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
     Vec::<T>::new().try_reserve_exact(count).ok()?;
     Some(vec![T::default(); count])
@@ -15,20 +15,20 @@ pub(super) fn zeroed<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Bits {
     pub(super) words: Vec<u64>,
-    /// Words of a row.
+    /// The number of words per row.
     pub(super) stride: usize,
     pub(super) columns: usize,
 }
 
 impl Bits {
-    /// No pixel of so many columns and rows; `None` where there is no memory for it.
+    /// Returns an empty set for an image of this size, or `None` if there is not enough memory.
     pub(super) fn none((columns, rows): (usize, usize)) -> Option<Self> {
         let stride = columns.div_ceil(WORD);
         let words = zeroed(stride.checked_mul(rows)?)?;
         Some(Self { words, stride, columns })
     }
 
-    /// No pixel of as many columns and rows.
+    /// Returns an empty set for an image of the same size.
     pub(super) fn empty(&self) -> Option<Self> {
         Some(Self { words: zeroed(self.words.len())?, ..*self })
     }
@@ -37,7 +37,7 @@ impl Bits {
         self.words.len() / self.stride
     }
 
-    /// The pixels of a word of a row that lie in the image.
+    /// Returns the pixels of a word of a row that lie in the image.
     #[inline(always)]
     pub(super) fn inside(&self, word: usize) -> u64 {
         u64::MAX >> (WORD - (self.columns - word * WORD).min(WORD))
@@ -58,7 +58,7 @@ impl Bits {
         self.words.iter().all(|&word| word == 0)
     }
 
-    /// Returns the number of its pixels in some rows.
+    /// Returns the number of the set's pixels in some rows.
     pub(crate) fn count(&self, rows: Range<usize>) -> u64 {
         let words = &self.words[rows.start * self.stride..rows.end * self.stride];
         words.iter().map(|word| u64::from(word.count_ones())).sum()
@@ -70,17 +70,17 @@ impl Bits {
         }
     }
 
-    /// Puts a pixel in.
+    /// Adds a pixel.
     pub(super) fn put(&mut self, column: usize, row: usize) {
         self.words[row * self.stride + column / WORD] |= 1 << (column % WORD);
     }
 
-    /// Takes all out that are not among others.
+    /// Removes all pixels that are not in `others`.
     pub(super) fn keep(&mut self, others: &Self) {
         self.words.iter_mut().zip(&others.words).for_each(|(word, others)| *word &= others);
     }
 
-    /// Adds the pixels on all sides of those that are in.
+    /// Adds all neighbours of the pixels in the set.
     pub(super) fn widen(&mut self) {
         let rows = self.rows();
         let mut wide = self.clone();
@@ -94,7 +94,7 @@ impl Bits {
         *self = wide;
     }
 
-    /// Whether it holds all of some columns of a row.
+    /// Returns whether the set has all of some columns of a row.
     #[inline(always)]
     pub(crate) fn has_all(&self, columns: Range<usize>, row: usize) -> bool {
         columns.clone().step_by(32).all(|column| {
@@ -103,7 +103,7 @@ impl Bits {
         })
     }
 
-    /// In bands of so many rows.
+    /// Returns the set in bands of `rows` rows.
     pub(super) fn bands(&mut self, rows: usize) -> impl Iterator<Item = BitRows<'_>> {
         let stride = self.stride;
         self.words.chunks_mut(rows * stride).map(move |words| BitRows { words, stride })
@@ -114,13 +114,13 @@ impl Bits {
         &self.words[row * self.stride..(row + 1) * self.stride]
     }
 
-    /// Whether it holds the pixel of a column and row.
+    /// Returns whether the set has the pixel of a column and a row.
     #[inline(always)]
     pub(crate) fn has(&self, column: usize, row: usize) -> bool {
         self.words[row * self.stride + column / WORD] >> (column % WORD) & 1 != 0
     }
 
-    /// Which of up to 32 pixels of a row from a column on it holds, as bits.
+    /// Returns, as bits, which of up to 32 pixels of a row are in the set, from `column` on.
     #[inline(always)]
     pub(crate) fn run(&self, column: usize, row: usize) -> u32 {
         let (word, shift) = (column / WORD, column % WORD);
@@ -129,7 +129,7 @@ impl Bits {
         (row[word] >> shift | after) as u32
     }
 
-    /// Whether it holds one of a rectangle.
+    /// Returns whether the set has any pixel of a rectangle.
     #[inline(always)]
     pub(crate) fn has_any(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
         let (first, last) = (columns.start / WORD, (columns.end - 1) / WORD);
@@ -157,7 +157,7 @@ pub(crate) struct BitRows<'a> {
 }
 
 impl BitRows<'_> {
-    /// Puts a pixel in, or takes it out.
+    /// Adds or removes a pixel.
     #[inline(always)]
     pub(crate) fn set(&mut self, column: usize, row: usize, is_in: bool) {
         let (word, bit) = (&mut self.words[row * self.stride + column / WORD], column % WORD);
@@ -165,7 +165,7 @@ impl BitRows<'_> {
     }
 }
 
-/// The bits of a row and of those left and right of them.
+/// Returns the bits of a row and their neighbours to the left and right.
 #[inline(always)]
 pub(super) fn widened(row: &[u64], word: usize) -> u64 {
     let at = row[word];
@@ -174,7 +174,7 @@ pub(super) fn widened(row: &[u64], word: usize) -> u64 {
     at | at << 1 | at >> 1 | before | after
 }
 
-/// The bits between two that lie on opposite sides of them, in three rows.
+/// Returns the bits that have two set neighbours on opposite sides, in three rows.
 #[inline(always)]
 pub(super) fn between([above, at, below]: [&Vec<u64>; 3], word: usize) -> u64 {
     let left = |row: &[u64]| row[word] << 1 | if word > 0 { row[word - 1] >> (WORD - 1) } else { 0 };
@@ -186,7 +186,7 @@ pub(super) fn between([above, at, below]: [&Vec<u64>; 3], word: usize) -> u64 {
 mod tests {
     use super::*;
 
-    /// The columns of the bits of a word of a row.
+    /// Returns the columns of the bits of a word of a row.
     fn columns(word: usize, mut bits: u64) -> impl Iterator<Item = usize> {
         core::iter::from_fn(move || {
             let column = word * WORD + bits.trailing_zeros() as usize;

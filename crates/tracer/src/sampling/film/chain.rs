@@ -1,84 +1,86 @@
-//! The numbers of samples that a pixel can have, one after the other, and by how much the samples of one may vary that has
-//! enough.
+//! The numbers of samples that a pixel can have (the chain), and the largest variance of the samples of a pixel that
+//! has enough.
 
 use rayfold_scene::{Samples, Tone};
 
 use super::curve::SlopeBounds;
 use super::pixel::Pixel;
 
-/// Samples a pixel that are looked at before any decision, and where variances begin to say something.
+/// The number of samples per pixel before any decision, and the number from which on variances are significant.
 const FIRST: u32 = 1;
 const SECOND: u32 = 4;
 
-/// The error of a mean of n samples is taken for their deviation times n to this power: steeper than the -1/2 of independent
-/// samples, and less steep than what edges and penumbrae have (docs/reports/sampling.md).
+/// The error of a mean of n samples is estimated as their deviation times n to this power. It is steeper than the -1/2
+/// of independent samples, and less steep than that of edges and penumbrae (docs/reports/sampling.md).
 pub(super) const SLOPE: f64 = -0.65;
 
-/// Slope and share for scenes in which light goes round, where all pixels vary. Light that comes in by chance has a slope of -0.5,
-/// and other light one of -0.7 (docs/decisions/tracer-paths.md).
+/// The slope and the share for scenes in which surfaces light each other, where all pixels vary. Light that comes in by
+/// chance has a slope of -0.5, and other light one of -0.7 (docs/decisions/tracer-paths.md).
 const SLOPE_OF_PATHS: f64 = -0.6;
 const SPARED_OF_PATHS: f64 = 1.4;
 
-/// In such scenes the neighbours of a pixel go on if its error is more than so many times that of a settled one.
+/// In such scenes the neighbours of a pixel get more samples if its error is more than this many times that of a
+/// settled pixel.
 const LOUD: f64 = 2.0;
 
-/// So many times the error that is asked for a pixel may have: most others have less. The more of the pixels around it vary
-/// ([`super::density`]), the fewer others there are that have less.
+/// The error that a pixel may have, as a multiple of the requested error. Most other pixels have less. The more of the
+/// pixels around it vary ([`super::density`]), the fewer others have less.
 pub(super) const SPARED: [f64; 3] = [3.0, 1.6, 0.9];
 
-/// An edge in a pixel may reach into an even neighbour, and be missed by as many samples of that one. The error
-/// of the neighbour is then about the pixel's deviation divided by the number of samples to this power: the more samples, the
-/// smaller is the part that they miss, and the chance that they do.
+/// An edge in a pixel may reach into an even neighbour, and all samples of that neighbour may miss it. The error of the
+/// neighbour is then about the pixel's deviation divided by the number of samples to this power. With more samples, the
+/// part that they miss is smaller, and a miss is less likely.
 pub(super) const MISSED: f64 = 1.5;
 
-/// An even neighbour goes on if that error is more than so many times the one that is asked for.
+/// An even neighbour gets more samples if that error is more than this many times the requested error.
 pub(super) const CALM: f64 = 0.4;
 
-/// No samples that are clamped deviate by more levels.
+/// The largest deviation, in levels, of samples that are clamped.
 const MAX_DEVIATION: f64 = 256.0;
 
-/// A pixel is even if its samples deviate by less than so many times the error that is asked for.
+/// A pixel is even if its samples deviate by less than this many times the requested error.
 pub(super) const EVEN: f64 = 0.5;
 
-/// A pixel varies if its error after [`SECOND`] samples is estimated at more than so many times the one that is asked for.
+/// A pixel varies if its estimated error after [`SECOND`] samples is more than this many times the requested error.
 pub(super) const VARYING: f64 = 1.5;
 
-/// Moments of the first samples.
+/// The number of moments of the first samples.
 const FEW_MOMENTS: u32 = 16;
 
 #[derive(Debug)]
 pub(super) struct SampleSchedule {
     samples: Samples,
-    /// No pass adds more samples to a pixel.
+    /// The largest number of samples that a pass adds to a pixel.
     pub(super) step: u32,
     /// Whether the first samples are of few moments.
     pub(super) has_few_moments: bool,
     tone: Tone,
-    /// Whether samples are not clamped, as where light goes round.
+    /// Whether samples are not clamped, as in scenes in which surfaces light each other.
     is_unclamped: bool,
-    /// The largest variance of the samples of a settled pixel, by how much varies around it and by the logarithm of their
-    /// number to the base 2.
+    /// The largest variance of the samples of a settled pixel. It depends on the density around the pixel and on the
+    /// logarithm of the number of samples to the base 2.
     limits: [[f64; u32::BITS as usize]; SPARED.len()],
-    /// The largest variance of the samples of a pixel beside which even ones of each number from the second on do not go on.
+    /// For each number of samples from the second of the chain on: the largest variance of a pixel's samples beside
+    /// which even pixels with this number get no more.
     calm: Vec<f64>,
     /// The largest variance of the samples of an even pixel.
     even: f64,
     /// The largest variance of the [`SECOND`] samples of a pixel that does not vary.
     still: f64,
-    /// With the sRGB curve, whose powers take long.
+    /// The bounds of slopes for the sRGB curve, whose powers are slow to compute.
     slopes: Option<Box<SlopeBounds>>,
 }
 
 /// The conclusion from the samples of a pixel.
 pub(crate) struct Verdict {
-    /// Whether it needs more of them.
+    /// Whether the pixel needs more samples.
     pub(crate) is_unsettled: bool,
-    /// Even neighbours with so many of the numbers of the chain, from the second on, go on. Where light goes round, 1 says that all
-    /// neighbours go on.
+    /// The count of numbers of the chain, from the second on, from which even neighbours go on because of this pixel.
+    /// If samples are not clamped, 1 means that all neighbours get more samples.
     pub(crate) reach: usize,
     /// Whether they differ.
     pub(crate) is_uneven: bool,
-    /// Whether it counts as varying where that is counted.
+    /// Whether the pixel counts as varying when densities are computed.
     pub(crate) is_varying: bool,
 }
 
@@ -116,12 +118,12 @@ impl SampleSchedule {
         }
     }
 
-    /// Whether samples are not clamped.
+    /// Returns whether samples are not clamped.
     pub(super) fn is_unclamped(&self) -> bool {
         self.is_unclamped
     }
 
-    /// Whether there is an error to be reached: without, the first number is the only one.
+    /// Returns whether an error is requested. Otherwise all pixels get the first number of samples only.
     pub(super) fn has_error(&self) -> bool {
         self.samples.error() > 0.0
     }
@@ -147,7 +149,7 @@ impl SampleSchedule {
         }
     }
 
-    /// Where a pixel that has so many samples, and gets something in a pass, stands after it.
+    /// Returns the number of samples after a pass of a pixel that has `count` samples and gets some in the pass.
     #[inline(always)]
     pub(super) fn goal(&self, count: u32) -> u32 {
         let most = self.most();
@@ -161,7 +163,7 @@ impl SampleSchedule {
         next.min(most).min(count.saturating_add(self.step))
     }
 
-    /// How many of so many moments a sample is one of.
+    /// Returns the number of moments, out of `all`, from which a sample takes one.
     #[inline(always)]
     pub(super) fn moments(&self, sample: u32, all: u32) -> u32 {
         if self.has_few_moments {
@@ -171,7 +173,8 @@ impl SampleSchedule {
         }
     }
 
-    /// Judges a pixel by its samples, where so much varies around it. Between two numbers of the chain nothing is unsettled.
+    /// Judges a pixel by its samples and by the density around it. Between two numbers of the chain a pixel is never
+    /// unsettled.
     #[inline(never)]
     pub(super) fn verdict(&self, pixel: &Pixel, density: usize) -> Verdict {
         let count = pixel.count();
@@ -193,13 +196,13 @@ impl SampleSchedule {
         }
     }
 
-    /// Returns how many numbers of the chain, from the second on, a pixel can reach ([`Verdict::reach`]).
+    /// Returns the largest possible [`Verdict::reach`].
     pub(super) fn reaches(&self) -> usize {
         self.calm.len() + usize::from(self.is_unclamped)
     }
 
-    /// The variance of the samples of a pixel, or another number that is above and below the same of all with which a verdict
-    /// compares it.
+    /// Returns the variance of the samples of a pixel, or another number that compares alike with all limits of a
+    /// verdict.
     #[inline(always)]
     fn variance(&self, pixel: &Pixel, limit: f64) -> f64 {
         if self.is_unclamped {

@@ -1,22 +1,22 @@
-//! By how much the sRGB curve stretches small differences of light.
+//! The factor by which the sRGB curve stretches small differences of light.
 
 use crate::reference::encoded;
 
-/// The sRGB curve is a line up to here, and a power beyond it; by so much the power differs from 1.
+/// The sRGB curve is linear up to [`LINEAR`], and a power beyond it. [`BENT`] is 1 minus the exponent of that power.
 pub(super) const LINEAR: f64 = 0.003_130_8;
 pub(super) const BENT: f64 = 1.0 - 1.0 / 2.4;
 
-/// Light from which on slopes are bounded. It is above [`LINEAR`].
+/// The least light for which slopes have bounds. It is above [`LINEAR`].
 const LEAST: f64 = 1.0 / 256.0;
 
-/// Differences below this have no bounds: the slopes of such chords are rounded too much.
+/// The least difference for which slopes have bounds: the slopes of shorter chords have too large rounding errors.
 const APART: f64 = 1e-6;
 
-/// The bits of the mantissa by which slopes are looked up, and the shift that leaves them.
+/// The number of bits of the mantissa by which slopes are looked up, and the shift that leaves them.
 const BITS: u32 = 6;
 const SHIFT: u32 = f64::MANTISSA_DIGITS - 1 - BITS;
 
-/// The entries from [`LEAST`] to 1, and the one beyond.
+/// The number of entries from [`LEAST`] to 1, and one beyond.
 const ENTRIES: usize = (8 << BITS) + 2;
 
 /// Returns the slope of the curve's chord that is `apart` long, with its middle at `light`.
@@ -32,7 +32,7 @@ fn ends(light: f64, apart: f64) -> (f64, f64) {
 /// Bounds of [`slope`], which takes two powers.
 #[derive(Debug)]
 pub(super) struct SlopeBounds {
-    /// The curve's slope at the first numbers of intervals that have the same first bits.
+    /// The curve's slope at the start of each interval of numbers with the same first bits.
     slopes: [f64; ENTRIES],
 }
 
@@ -42,8 +42,8 @@ impl SlopeBounds {
         Self { slopes: core::array::from_fn(|at| 1.055 / 2.4 * libm::pow(light(at), -BENT)) }
     }
 
-    /// Returns numbers of which the slope is between, but for rounding errors of less than a millionth. `None` near black, and
-    /// for tiny differences.
+    /// Returns a lower and an upper bound of the slope, apart from rounding errors of less than a millionth. Returns
+    /// `None` near black and for tiny differences.
     #[inline(always)]
     pub(super) fn of(&self, light: f64, apart: f64) -> Option<(f64, f64)> {
         let (low, high) = ends(light, apart);

@@ -1,39 +1,40 @@
-//! How much of what is around a pixel varies.
+//! The density around a pixel: the share of the pixels there that vary.
 //!
-//! The error that is asked for is that of the whole image. Where few pixels vary, on edges, each of them may have several times
-//! that error; where all do, on a patterned floor, none may. And where many of a pixel's neighbours vary, a pixel whose
-//! first samples are alike has been lucky rather than even.
+//! The requested error is that of the whole image. If few pixels vary, as at edges, each of them may have several times
+//! that error. If all vary, as on a patterned floor, none may. If many of a pixel's neighbours vary but its own first
+//! samples are alike, this is more likely chance than evenness.
 
 use super::bits::{Bits, WORD};
 use super::chain::SPARED;
 use super::floors::Floors;
 
-/// Columns that are looked at together: a quarter of a word of bits.
+/// The number of columns that are counted together: a quarter of a word of bits.
 pub(super) const COLUMNS: usize = 16;
 
-/// So many of them in a word, and the bits of one.
+/// The number of these parts in a word, and the bits of one part.
 const PARTS: usize = WORD / COLUMNS;
 const ALL: u64 = (1 << COLUMNS) - 1;
 
-/// Rows above and below a pixel that count as around it.
+/// The number of rows above and below a pixel that count as around it.
 pub(super) const ROWS: usize = 8;
 
-/// From which share of the pixels on it is dense, and densest: so many of so many.
+/// The shares of varying pixels from which on a place is dense and very dense, as fractions.
 const SHARES: [(u32, u32); STEPS] = [(1, 3), (2, 3)];
 
-/// The samples that a pixel gets at least where it is so dense.
+/// The least number of samples of a pixel in each of these places.
 const FLOORS: [u32; STEPS] = [4, 8];
 
 const STEPS: usize = SPARED.len() - 1;
 
-/// Where it is dense, and where densest: the pixels of each set are in those before it.
+/// The dense pixels, and the very dense ones. Each set contains the next.
 #[derive(Debug)]
 pub(super) struct Density {
     sets: [Bits; STEPS],
 }
 
 impl Density {
-    /// From the pixels that vary, and sets of those that may; `None` where there is no memory for it.
+    /// Computes the sets from the pixels that vary, and from sets of those that may. Returns `None` if there is not
+    /// enough memory.
     pub(super) fn of(mut varying: Bits, floors: &Floors) -> Option<Self> {
         floors.above(0).for_each(|bits| varying.add(bits));
         let mut sets = [varying.empty()?, varying.empty()?];
@@ -64,7 +65,7 @@ impl Density {
         Some(Self { sets })
     }
 
-    /// From 0, where little varies around a pixel, to [`STEPS`].
+    /// Returns the density at a pixel: from 0, if little varies around it, to [`STEPS`].
     #[inline(always)]
     pub(super) fn at(&self, column: usize, row: usize) -> usize {
         self.sets.iter().filter(|set| set.has(column, row)).count()
@@ -75,7 +76,7 @@ impl Density {
         &self.sets[0]
     }
 
-    /// The sets whose pixels go on from so many samples.
+    /// Returns the sets whose pixels need more than `count` samples.
     pub(super) fn above(&self, count: u32) -> impl Iterator<Item = &Bits> {
         self.sets.iter().zip(FLOORS).filter(move |(_, floor)| *floor > count).map(|(bits, _)| bits)
     }

@@ -1,4 +1,4 @@
-//! What the first sample of each pixel saw: the one by which most pixels are done with.
+//! The first sample of each pixel. Most pixels get no other.
 
 use core::ops::Range;
 use std::sync::LazyLock;
@@ -11,36 +11,36 @@ use crate::parallel::CHANNELS;
 use crate::reference::encoded;
 use rayfold_scene::Tone;
 
-/// Row by row from the top.
+/// The samples, row by row from the top.
 #[derive(Debug)]
 pub(crate) struct First {
     /// [`quantised`].
     pub(super) colors: [Vec<u16>; CHANNELS],
-    /// Equal numbers for equal objects; among more than 65,535 a few share one.
+    /// Numbers of objects, equal for equal objects. Among more than 65,535 objects, some share a number.
     pub(super) objects: Vec<u16>,
 }
 
-/// The same of some rows of the image.
+/// The first samples of some rows of the image.
 pub(crate) struct FirstRows<'a> {
     colors: [&'a mut [u16]; CHANNELS],
     objects: &'a mut [u16],
 }
 
 impl First {
-    /// `None` where there is no memory for it.
+    /// Returns `None` if there is not enough memory.
     pub(super) fn new(pixels: usize) -> Option<Self> {
         let plane = || zeroed(pixels);
         Some(Self { colors: [plane()?, plane()?, plane()?], objects: plane()? })
     }
 
-    /// The colours of pixels that lie side by side.
+    /// Returns the colours of consecutive pixels of a row.
     #[inline(always)]
     pub(super) fn run(&self, places: Range<usize>) -> impl Iterator<Item = [u16; CHANNELS]> {
         let [red, green, blue] = self.colors.each_ref().map(|plane| &plane[places.clone()]);
         red.iter().zip(green).zip(blue).map(|((&red, &green), &blue)| [red, green, blue])
     }
 
-    /// In bands of so many pixels.
+    /// Returns the samples in bands of `pixels` pixels.
     pub(super) fn bands(&mut self, pixels: usize) -> impl Iterator<Item = FirstRows<'_>> {
         let [red, green, blue] = &mut self.colors;
         let colors = red.chunks_mut(pixels).zip(green.chunks_mut(pixels)).zip(blue.chunks_mut(pixels));
@@ -49,8 +49,8 @@ impl First {
             .map(|(((red, green), blue), objects)| FirstRows { colors: [red, green, blue], objects })
     }
 
-    /// Which pixels of some rows see another object than one beside them, or a channel that differs from it by more than
-    /// `limit`, in parts of [`ONE`] as they are shown: a bit each, set in words.
+    /// Sets a bit in `words` for each pixel of some rows that contrasts with a neighbour: it shows another object, or
+    /// one of its channels differs by more than `limit`, as displayed, in parts of [`ONE`].
     pub(super) fn contrasts(
         &self,
         width: usize,
@@ -98,7 +98,7 @@ impl First {
         });
     }
 
-    /// Writes the nearest of 256 levels of pixels that lie side by side, without any curve.
+    /// Writes the nearest of 256 levels of consecutive pixels of a row, without any curve.
     #[inline(always)]
     pub(super) fn put_levels(&self, places: Range<usize>, bytes: &mut [u8]) {
         let [red, green, blue] = self.colors.each_ref().map(|plane| &plane[places.clone()]);
@@ -109,13 +109,13 @@ impl First {
     }
 }
 
-/// The nearest of 256 levels of a [`quantised`] channel: of 65,536 levels, of which 257 are a step.
+/// Returns the nearest of 256 levels of a [`quantised`] channel. That has 65,536 levels, of which 257 make one step.
 #[inline(always)]
 pub(super) const fn level(channel: u16) -> u8 {
     ((channel as u32 * 255 + 32_895) >> 16) as u8
 }
 
-/// At most 64 flags as bits, the first the lowest: whether they are not zero.
+/// Returns at most 64 flags as bits, the first flag as the lowest bit. A bit is set if its flag is not zero.
 #[inline(always)]
 fn packed(flags: &[u16]) -> u64 {
     let mut set = [0; WORD];
@@ -142,7 +142,7 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Marks the pixels from two places on that differ from each other, as many as there is memory for.
+    /// Marks the pixels, from two places on, that differ from each other, for as many pixels as `apart` has room for.
     #[inline(always)]
     fn mark(&self, flags: &mut [u16], apart: &mut [u16], places: (usize, usize)) {
         let runs = [places.0, places.1].map(|place| place..place + apart.len());
@@ -172,7 +172,7 @@ impl FirstRows<'_> {
         self.objects[place] = object as u16;
     }
 
-    /// Puts the first samples of pixels that lie side by side.
+    /// Stores the first samples of consecutive pixels of a row.
     #[inline(always)]
     pub(crate) fn put_run(&mut self, place: usize, colors: [&[u32]; CHANNELS], objects: &[u32]) {
         let put = |plane: &mut [u16], of: &[u32]| {

@@ -1,36 +1,36 @@
-//! Pixels that get some number of samples whatever their first ones show.
+//! Pixels with a least number of samples that does not depend on their first samples.
 
 use super::bits::{Bits, WORD};
 use super::first::First;
 use crate::parallel::CHANNELS;
 
-/// Two first samples whose channels differ by no more than this, a sixteenth of a level, show the same.
+/// The largest difference, a sixteenth of a level, between channels of first samples that count as equal.
 const SAME: u16 = 16;
 
-/// Sets of pixels, each with the number of samples that its pixels get at least.
+/// Sets of pixels, each with the least number of samples of its pixels.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Floors {
     pub(super) sets: Vec<(u32, Bits)>,
 }
 
-/// What one of two pictures has and the other has not.
+/// A difference between two pictures at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Difference {
-    /// An object is seen, by its number, or not.
+    /// The object of this number is seen in one picture only.
     Object(u16),
     /// The same object is seen in another colour.
     Color,
 }
 
 impl Floors {
-    /// Empty sets for pictures of so many columns and rows; `None` where there is no memory for them.
+    /// Makes empty sets for pictures of this size. Returns `None` if there is not enough memory.
     pub(crate) fn new(size: (u32, u32), floors: &[u32]) -> Option<Self> {
         let size = (size.0 as usize, size.1 as usize);
         let sets = floors.iter().map(|&floor| Some((floor, Bits::none(size)?)));
         Some(Self { sets: sets.collect::<Option<_>>()? })
     }
 
-    /// Puts the pixels in which two pictures differ into the sets that `choose` names: all of them, or of some.
+    /// Adds the pixels in which two pictures differ, or only those among `some`, to the sets that `choose` selects.
     pub(crate) fn add(
         &mut self,
         (a, b): (&First, &First),
@@ -66,7 +66,7 @@ impl Floors {
         self.sets.extend(others.sets);
     }
 
-    /// The sets whose pixels go on from so many samples.
+    /// Returns the sets whose pixels need more than `count` samples.
     pub(super) fn above(&self, count: u32) -> impl Iterator<Item = &Bits> {
         self.sets.iter().filter(move |(floor, _)| *floor > count).map(|(_, bits)| bits)
     }

@@ -1,10 +1,12 @@
-//! The samples of an image, summed up pixel by pixel, and which pixels get more.
+//! The samples of an image, summed pixel by pixel, and the choice of pixels that get more.
 //!
-//! Passes are synchronous: what a pixel gets next follows from the counts and sums of the pass before, its own and its
-//! neighbours'. So a picture does not depend on tiles or threads, and a still part of an animation only on what is near it.
+//! Passes are synchronous. The next samples of a pixel depend on the counts and sums after the pass before, of the
+//! pixel and of its neighbours. So a picture does not depend on tiles or threads, and a part of an animation that does
+//! not move depends only on what is near it.
 //!
-//! Most pixels are done with after one sample. They are kept small ([`First`]), found by comparing rows, and all that is
-//! decided about pixels is decided for 64 at once ([`Bits`]); only those that go on get sums.
+//! Most pixels get one sample only. These samples are stored compactly ([`First`]), and pixels that need more are found
+//! by comparing rows. All decisions about pixels are made for 64 at once ([`Bits`]). Only pixels that get more samples
+//! have sums.
 
 mod bits;
 mod chain;
@@ -31,51 +33,54 @@ use self::plan::Plan;
 pub(crate) use self::plan::{Judged, PassTargets, Work};
 use crate::parallel::CHANNELS;
 
-/// Of a picture with an error to be reached, as many rows above and below a band have a say in what it shows: those beside
-/// it in the first look, one more for each time that it is decided who goes on, those in which it is counted what varies, and
-/// those that are near something.
+/// The number of rows above and below a band that influence it, in a picture with a requested error: the neighbours in
+/// the first look, one more row for each decision about which pixels get more, the rows in which densities are counted,
+/// and those that are near narrow objects.
 pub(crate) const MARGIN: u32 = 1 + plan::MAX_ROUNDS + density::ROWS as u32 + BESIDE as u32;
 
-/// So many pixels beside those whose first rays come near narrow objects count as near them as well, where something moves: as
-/// many as have first samples at all moments.
+/// In moving scenes, pixels within this distance of those whose first rays come near narrow objects count as near them
+/// as well. Together, the pixels within this distance have first samples at all moments.
 pub(crate) const BESIDE: usize = 3;
 
-/// The samples that each pixel gets where they are not clamped: in fewer, what is rare and bright is seen by none.
+/// The least number of samples of each pixel if samples are not clamped. With fewer, no sample would see rare bright
+/// light.
 const FEWEST: u32 = 16;
 
-/// An image of samples, or a band of one, its first row at the top.
+/// The samples of an image or of a band of one. The first row is at the top.
 #[derive(Debug)]
 pub(crate) struct Film {
     size: (usize, usize),
-    /// Columns and rows of a tile.
+    /// The columns and rows of a tile.
     side: (usize, usize),
-    /// None where all pixels get equally many samples.
+    /// `None` if all pixels get the same number of samples.
     first: Option<First>,
-    /// Tile by tile, row by row in each; a tile whose pixels have got but one sample has none, if there is a [`First`].
+    /// The sums, tile by tile, and row by row in each tile. If there is a [`First`], a tile whose pixels have one
+    /// sample each has no sums.
     tiles: Vec<Vec<Pixel>>,
     /// The cover, in scenes without background.
     cover: Option<Layer>,
     plan: Plan,
-    /// The pixels that the first look has found near something, if it is to note them.
+    /// The pixels that the first look has found near narrow objects, if it records them.
     near: Option<Bits>,
 }
 
 /// A row of tiles.
 pub(crate) struct Band<'a> {
-    /// Row by row in each; none yet of a tile that has got no sums.
+    /// The sums of each tile, row by row. Empty for a tile that has no sums yet.
     pub(crate) tiles: &'a mut [Vec<Pixel>],
     /// Row by row.
     pub(crate) first: Option<FirstRows<'a>>,
     /// The cover, in scenes without background.
     pub(crate) cover: Option<CoverRows<'a>>,
-    /// The state of its pixels, noted when samples are added.
+    /// The state of the band's pixels, which is recorded when samples are added.
     pub(crate) judged: Judged<'a>,
-    /// The pixels of the band that are near something.
+    /// The pixels of the band that are near narrow objects.
     pub(crate) near: Option<BitRows<'a>>,
 }
 
 impl Film {
-    /// Nothing yet; `None` where there is no memory for it. No pass adds more than `step` samples to a pixel.
+    /// Makes an empty film. No pass adds more than `step` samples to a pixel. Returns `None` if there is not enough
+    /// memory.
     pub(crate) fn new(
         size: (u32, u32),
         side: (u32, u32),
@@ -111,13 +116,13 @@ impl Film {
         Some(Self { size, side, first, tiles, cover, plan, near: None })
     }
 
-    /// Gives pixels some number of samples in any case.
+    /// Sets a least number of samples for some pixels.
     pub(crate) fn raise(&mut self, floors: Floors) {
         self.plan.floors.add_all(floors);
     }
 
-    /// Gives all pixels some number of samples in any case, of all moments from the first on; `None` where there is no memory for
-    /// it.
+    /// Sets a least number of samples for all pixels, and takes them at all moments from the first sample on. Returns
+    /// `None` if there is not enough memory.
     pub(crate) fn raise_all(&mut self, count: u32) -> Option<()> {
         self.plan.take_all_moments();
         self.plan.raise(count)
@@ -128,25 +133,26 @@ impl Film {
         self.first
     }
 
-    /// Plans the next pass; `None` once all pixels have what they need. Gives the least and the largest number of samples
-    /// between which it is.
+    /// Plans the next pass. Returns the least number of samples of its pixels before it and the largest after it, or
+    /// `None` once no pixel needs more.
     pub(crate) fn plan(&mut self) -> Option<(u32, u32)> {
         let cover = self.cover.as_ref().and_then(|cover| cover.first.as_ref());
         self.plan.goes_on().or_else(|| self.plan.next(self.first.as_ref(), cover))
     }
 
-    /// Leaves all but some pixels out of the pass that [`Self::plan`] planned.
+    /// Restricts the pass that [`Self::plan`] planned to some pixels.
     pub(crate) fn want_only(&mut self, some: &Bits) {
         self.plan.want_only(some);
     }
 
-    /// Lets the first look note which pixels are near something; `None` where there is no memory for it.
+    /// Makes the first look record which pixels are near narrow objects. Returns `None` if there is not enough memory.
     pub(crate) fn watch(&mut self) -> Option<()> {
         self.near = Some(Bits::none(self.size)?);
         Some(())
     }
 
-    /// Takes the pixels that the first look noted, and so many beside them on all sides; none if they were taken before.
+    /// Takes the pixels that the first look recorded, and all within `beside` pixels of them. Returns `None` if they
+    /// were taken before.
     pub(crate) fn near(&mut self, beside: usize) -> Option<Bits> {
         let mut near = self.near.take()?;
         (0..beside).for_each(|_| near.widen());
@@ -158,7 +164,7 @@ impl Film {
         self.plan.work()
     }
 
-    /// The rows of tiles, from the top, and what they shall get in the pass that [`Self::plan`] planned.
+    /// Returns the rows of tiles, from the top, and the targets of the pass that [`Self::plan`] planned.
     pub(crate) fn split(&mut self) -> (Vec<Band<'_>>, PassTargets<'_>) {
         let (wanted, judged) = self.plan.split(self.side.1);
         let columns = self.size.0.div_ceil(self.side.0);
@@ -184,23 +190,23 @@ impl Film {
         (bands, wanted)
     }
 
-    /// Whether it has a cover.
+    /// Returns whether the film has a cover.
     pub(crate) fn has_cover(&self) -> bool {
         self.cover.is_some()
     }
 
-    /// Columns and rows of a tile.
+    /// The columns and rows of a tile.
     pub(crate) fn side(&self) -> (usize, usize) {
         self.side
     }
 
-    /// The colours of a row so far, from the left.
+    /// Calls `each` with the current colours of a row, from the left.
     #[inline(always)]
     pub(crate) fn each_of_row(&self, row: usize, each: impl FnMut(Color)) {
         self.each_in_row((self.first.as_ref(), &self.tiles), row, Pixel::mean, each);
     }
 
-    /// Gives the colours of a row as they are shown, from the left, before the sRGB curve where there is one.
+    /// Calls `each` with the colours of a row as displayed, from the left, before the sRGB curve if there is one.
     #[inline(always)]
     pub(crate) fn each_shown_of_row(&self, row: usize, each: impl FnMut(Color)) {
         if self.first.is_some() && self.plan.shows_raised() {
@@ -210,7 +216,7 @@ impl Film {
         }
     }
 
-    /// Writes the levels of a row so far, without any curve.
+    /// Writes the current levels of a row, without any curve.
     #[inline(always)]
     pub(crate) fn put_levels(&self, row: usize, bytes: &mut [u8]) {
         let (columns, (across, down)) = (self.size.0, self.side);
@@ -231,7 +237,8 @@ impl Film {
         });
     }
 
-    /// The covers of a row so far, from the left, in each channel of a colour; none where all is covered.
+    /// Calls `each` with the current covers of a row, from the left, in each channel of a colour. Makes no call if all
+    /// is covered.
     pub(crate) fn each_cover_of_row(&self, row: usize, each: impl FnMut(Color)) {
         if let Some(Layer { first, tiles }) = &self.cover {
             self.each_in_row((first.as_ref(), tiles), row, Pixel::mean, each);
@@ -265,7 +272,7 @@ impl Film {
         }
     }
 
-    /// The means of the pixels as they are shown, and how many samples each has.
+    /// Returns the means of the pixels as displayed, and the number of samples of each.
     #[cfg(any(test, feature = "accuracy"))]
     pub(crate) fn means(&self) -> impl Iterator<Item = (DVec3, u32)> {
         let ((width, height), (across, down)) = (self.size, self.side);
@@ -287,7 +294,7 @@ impl Film {
 
 /// A colour of a pixel.
 pub(crate) enum Color {
-    /// Of its only sample, [`quantised`].
+    /// The colour of the only sample, [`quantised`].
     Sample([u16; CHANNELS]),
     /// Of several.
     Mean(DVec3),
@@ -302,7 +309,7 @@ impl Color {
         }
     }
 
-    /// The nearest of 256 levels, without any curve.
+    /// Returns the nearest of 256 levels, without any curve.
     #[inline(always)]
     pub(crate) fn levels(&self) -> [u8; CHANNELS] {
         match self {
@@ -329,7 +336,7 @@ mod tests {
         film.means().map(|(_, count)| count).collect()
     }
 
-    /// Gives all pixels what they shall have.
+    /// Gives all pixels the samples that they need.
     fn expose(film: &mut Film, mut color: impl FnMut(usize, u32) -> f64) -> Vec<(u32, u32)> {
         let mut passes = vec![];
         let (columns, side) = (film.size.0, film.side());
@@ -406,7 +413,7 @@ mod tests {
         sample.wrapping_mul(0x9e37_79b9) >> 7
     }
 
-    /// A line of which few pixels see anything at first is found along its length.
+    /// A line that few first samples hit is found along its length.
     #[test]
     fn a_sliver_is_found_along_its_length() {
         let samples = Samples::new(64, 1.0).unwrap();
@@ -420,7 +427,8 @@ mod tests {
         assert!(counts[..64].iter().all(|&count| count < 32));
     }
 
-    /// What no first sample shows is found where it is known to be, and its pixels have no say in how often.
+    /// Pixels that are known to show a narrow object get their samples, even if no first sample shows it. Their own
+    /// samples do not change the number.
     #[test]
     fn pixels_that_are_raised_get_what_they_are_raised_to() {
         for (floor, given) in [(16, 16), (100, 64), (1, 1)] {
@@ -458,7 +466,7 @@ mod tests {
         assert_eq!((of(0), of(1)), ([false, false, true, false], [false, false, false, true]));
     }
 
-    /// The words are held against the rule, said pixel by pixel.
+    /// The code for words of bits is compared with the rule, written pixel by pixel.
     #[test]
     fn who_goes_on_is_as_the_rule_says() {
         for seed in 0..200 {

@@ -7,30 +7,30 @@ use super::curve::{BENT, LINEAR, SlopeBounds, slope};
 use crate::parallel::CHANNELS;
 use crate::reference::encoded;
 
-/// A channel's sums count in parts of this, so that no order of adding makes a difference.
+/// Sums of channels count in parts of this, as integers, so that they do not depend on the order of the samples.
 pub(super) const ONE: f64 = 65535.0;
 
-/// What a pixel has got so far.
+/// The samples of a pixel so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
-    /// These have a sign where samples are not clamped.
+    /// Signed if samples are not clamped.
     sum: [u64; CHANNELS],
-    /// Without clamping, the bits of an `f64`: squares of bright samples are beyond whole numbers, and a
-    /// pixel's samples always come in the same order.
+    /// The bits of an `f64` if samples are not clamped: the squares of bright samples are too large for integers. The
+    /// samples of a pixel always come in the same order.
     squares: [u64; CHANNELS],
     count: u32,
 }
 
-/// More than the rounding errors of a variance and of its bounds, as parts of them.
+/// An upper bound of the relative rounding errors of a variance and of its bounds.
 const ROUNDED: f64 = 1e-5;
 
-/// The brightest sample that is not clamped, in parts of [`ONE`].
+/// The brightest sample in pictures without clamping, in parts of [`ONE`].
 const BRIGHTEST: f64 = (1u64 << 46) as f64;
 
-/// 2^52: what is added to it is rounded to a whole number, which its lowest bits are.
+/// 2^52. Adding it to a number rounds that number to an integer, which is then in the lowest bits.
 const WHOLE: f64 = 4_503_599_627_370_496.0;
 
-/// A channel of a colour as a part of [`ONE`]; what is not a number is black.
+/// Returns a channel of a colour in parts of [`ONE`]. A NaN becomes black.
 #[inline(always)]
 pub(crate) fn quantised(channel: f64) -> u32 {
     let channel = if channel > 0.0 { channel } else { 0.0 };
@@ -63,7 +63,7 @@ impl Pixel {
         self.count += count;
     }
 
-    /// Adds `count` samples of the same colour, which is not clamped.
+    /// Adds `count` samples of the same colour without clamping.
     pub(crate) fn add_unclamped(&mut self, color: DVec3, count: u32) {
         let of_each = color.to_array();
         for ((sum, squares), channel) in self.sum.iter_mut().zip(&mut self.squares).zip(of_each) {
@@ -81,15 +81,15 @@ impl Pixel {
         self.count
     }
 
-    /// Of all samples, in 0..1.
+    /// Returns the mean of all samples, in 0..1.
     pub(crate) fn mean(&self) -> DVec3 {
         let mean =
             DVec3::from_array(self.sum.map(|sum| sum as i64 as f64)) / (ONE * f64::from(self.count.max(1)));
         mean.clamp(DVec3::ZERO, DVec3::ONE)
     }
 
-    /// The mean as it goes through the sRGB curve. Of means that err, the curve shows one that is too dark: it is raised by the
-    /// second-order term of that.
+    /// Returns the mean before the sRGB curve. The curve would display means with errors too dark on average, so the
+    /// mean is raised by the second-order term of that error.
     pub(crate) fn mean_before_curve(&self) -> DVec3 {
         let (count, mean) = (f64::from(self.count), self.mean());
         // The variance of a mean of n is that of its samples times about n^(-5/4).
@@ -104,7 +104,7 @@ impl Pixel {
         DVec3::from_array(raised)
     }
 
-    /// The variance of the samples of a channel, in squares of parts.
+    /// Returns the variance of the samples of a channel, in squares of parts.
     #[inline(always)]
     fn spread(&self, channel: usize) -> f64 {
         let mean = self.sum[channel] as f64 * (1.0 / f64::from(self.count));
@@ -112,8 +112,8 @@ impl Pixel {
         spread / (f64::from(self.count) - 1.0)
     }
 
-    /// The variance of samples that are not clamped, in squares of levels: the mean over the channels. Where the mean is
-    /// far beyond black or white, the samples make no difference.
+    /// Returns the variance of samples that are not clamped, in squares of levels: the mean over the channels. If the
+    /// mean is far beyond black or white, the variance has no effect.
     pub(super) fn unclamped_variance(&self, tone: Tone) -> f64 {
         let count = f64::from(self.count);
         let mut sum = 0.0;
@@ -135,7 +135,7 @@ impl Pixel {
         255.0 * 255.0 * sum / CHANNELS as f64
     }
 
-    /// Returns numbers between which the variance is with the sRGB curve, or `None` if it has to be computed.
+    /// Returns a lower and an upper bound of the variance under the sRGB curve, or `None` if it must be computed.
     pub(super) fn variance_bounds(&self, bounds: &SlopeBounds) -> Option<(f64, f64)> {
         let of_count = 1.0 / f64::from(self.count);
         let (mut least, mut most) = (0.0, 0.0);
@@ -152,7 +152,7 @@ impl Pixel {
         Some((scale * (1.0 - ROUNDED) * least, scale * (1.0 + ROUNDED) * most))
     }
 
-    /// The variance of its samples in squares of levels: the mean over the channels.
+    /// Returns the variance of the samples in squares of levels: the mean over the channels.
     pub(super) fn variance(&self, tone: Tone) -> f64 {
         let of_count = 1.0 / f64::from(self.count);
         let mut sum = 0.0;

@@ -1,22 +1,23 @@
-//! Which pixels get how many samples in the next pass.
+//! Plans the pixels of the next pass, and the number of samples of each.
 //!
-//! The numbers of samples that a pixel can have are a chain. A pixel goes on to the next of them
+//! The possible numbers of samples of a pixel form a chain. A pixel goes on to the next number
 //!
 //! - if its error is estimated to be too large,
-//! - if that of a neighbour with at least as many samples is, and its own samples differ,
-//! - if a neighbour with at least as many samples varies so much that as many of its own may have missed a part of it,
+//! - if the error of a neighbour with at least as many samples is too large, and its own samples differ,
+//! - if a neighbour with at least as many samples varies so much that all of the pixel's own samples may have missed a
+//!   part of it,
 //! - if it lies between two neighbours with at least as many samples, on opposite sides, whose errors are too large,
 //! - if a neighbour is more than [`AHEAD`] numbers ahead on the chain.
 //!
-//! Beside a neighbour around which much varies ([`Density`]) it goes on if the neighbour's error is too large, whatever its own
-//! samples show, and if the neighbour is more than one number ahead. Where light goes round it goes on if the neighbour's error is
-//! far too large, or if the neighbour is more than one number ahead.
+//! In a dense neighbourhood ([`Density`]) a pixel also goes on if a neighbour's error is too large, whatever its own
+//! samples show, and if a neighbour is more than one number ahead. If samples are not clamped, it goes on if a
+//! neighbour's error is far too large, or if a neighbour is more than one number ahead.
 //!
-//! Slivers thinner than a pixel, of which some pixels see nothing at first, are found along their length in this way, and the
-//! bias of asking a pixel about itself shrinks to that of asking many.
+//! In this way slivers thinner than a pixel are found along their length, although the first samples of some of their
+//! pixels miss them. The bias of deciding by a pixel's own samples shrinks, because many pixels decide together.
 //!
-//! What is smaller than a pixel may be missed by all first samples of all pixels that it is in. Where it can be is known
-//! beforehand ([`Floors`]): those pixels go on to a number that does not depend on what their samples show.
+//! An object smaller than a pixel may be missed by the first samples of all pixels that show it. Such pixels are known
+//! beforehand ([`Floors`]). They go on to a number that does not depend on their samples.
 
 use rayfold_scene::Tone;
 use rayon::prelude::*;
@@ -29,52 +30,53 @@ use super::floors::Floors;
 use super::pixel::{ONE, Pixel};
 use crate::parts;
 
-/// So many times the error that is asked for, two neighbours with a sample each may differ by.
+/// The largest difference between two neighbours with one sample each, as a multiple of the requested error.
 pub(super) const CONTRAST: f64 = 1.5;
 
-/// A neighbour that is more than so many numbers of the chain ahead makes a pixel go on: it has 16 times as many samples.
+/// A pixel goes on if a neighbour is more than this many numbers of the chain ahead: it has 16 times as many samples.
 const AHEAD: usize = 3;
 
-/// How often it is decided who goes on, at most, so that no pixel depends on one that is farther away, and a band can be drawn
-/// by itself. The example scenes take up to 34 of them (docs/decisions/frames-in-bands.md).
+/// The largest number of decisions about which pixels go on. It limits the distance over which pixels depend on each
+/// other, so that a band can be drawn by itself. The example scenes take up to 34 decisions
+/// (docs/decisions/frames-in-bands.md).
 pub(super) const MAX_ROUNDS: u32 = 128;
 
-/// Rows that are looked at together.
+/// The number of rows that are processed together.
 const BAND: usize = 16;
 
-/// What a pass gives to whom.
+/// The pixels of a pass, and the number of samples of each.
 #[derive(Clone, Copy)]
 pub(crate) struct PassTargets<'a> {
     chain: &'a SampleSchedule,
     density: Option<&'a Density>,
     /// Who gets something.
     pub(crate) pixels: &'a Bits,
-    /// Whether it is the first sample of pixels that may get no other.
+    /// Whether the pass gives the first sample to pixels that may get no other.
     pub(crate) is_first_look: bool,
 }
 
 impl PassTargets<'_> {
-    /// How many samples a pixel that has so many, and gets something in this pass, shall have after it.
+    /// Returns the number of samples after the pass of a pixel that has `count` samples and gets some in the pass.
     #[inline(always)]
     pub(crate) fn goal(&self, count: u32) -> u32 {
         self.chain.goal(count)
     }
 
-    /// Whether samples are not clamped. Then the first look at pixels is no sample.
+    /// Returns whether samples are not clamped. Then the first look takes no samples of the picture.
     #[inline(always)]
     pub(crate) fn is_unclamped(&self) -> bool {
         parts::BUILT.paths && self.chain.is_unclamped()
     }
 
-    /// How many of so many moments, a power of two, a sample is one of: the first samples are of few, so that those of a tile
-    /// that are of one moment are many.
+    /// Returns the number of moments, out of `all`, from which a sample takes one. `all` is a power of two. The first
+    /// samples use few moments, so that many samples of a tile share a moment.
     #[inline(always)]
     pub(crate) fn moments(&self, sample: u32, all: u32) -> u32 {
         self.chain.moments(sample, all)
     }
 
-    /// Judges the pixel of a column and row once it has got what it is given. Between two numbers of the chain this has no
-    /// consequence.
+    /// Judges the pixel of a column and row after its samples of the pass. Between two numbers of the chain this has no
+    /// effect.
     #[inline(always)]
     pub(crate) fn verdict(&self, pixel: &Pixel, (column, row): (usize, usize)) -> Verdict {
         self.chain.verdict(pixel, self.density.map_or(0, |density| density.at(column, row)))
@@ -86,11 +88,11 @@ impl PassTargets<'_> {
 pub(crate) struct Work {
     /// The samples of this pass.
     pub(crate) now: u64,
-    /// The samples of this pass and of later ones if all pixels that go on now take the largest number.
+    /// The samples of this pass and of later ones, if all pixels that go on now take the largest number.
     pub(crate) ahead: u64,
 }
 
-/// The state of the pixels of some rows once they have got their samples.
+/// The state of the pixels of some rows after their samples of the pass.
 pub(crate) struct Judged<'a> {
     unsettled: BitRows<'a>,
     spreading: Vec<BitRows<'a>>,
@@ -100,7 +102,7 @@ pub(crate) struct Judged<'a> {
 }
 
 impl Judged<'_> {
-    /// Notes what the samples of a pixel say, and those of its cover.
+    /// Records the verdicts of a pixel and of its cover.
     #[inline(always)]
     pub(crate) fn set(&mut self, column: usize, row: usize, verdict: &Verdict, of_cover: Option<&Verdict>) {
         let any = |of: fn(&Verdict) -> bool| of(verdict) || of_cover.is_some_and(of);
@@ -119,28 +121,29 @@ impl Judged<'_> {
 #[derive(Debug)]
 pub(super) struct Plan {
     chain: SampleSchedule,
-    /// Whose error is too large.
+    /// Pixels whose error is too large.
     unsettled: Bits,
-    /// Who varies so much that even neighbours may have missed a part of it, by the numbers of samples of those, from the second
-    /// of the chain on.
+    /// Pixels that vary so much that even neighbours may have missed a part of it: one set for each number of samples
+    /// of those neighbours, from the second of the chain on.
     spreading: Vec<Bits>,
     /// Whose samples differ.
     uneven: Bits,
-    /// Who counts as varying; empty once that was counted.
+    /// Pixels that count as varying. Empty once densities are computed.
     varying: Bits,
-    /// Who gets some number of samples in any case.
+    /// Pixels with a least number of samples.
     pub(super) floors: Floors,
-    /// How much varies around each pixel, once those that differ from a neighbour have the second number of the chain.
+    /// The density around each pixel. It is computed once the pixels that differ from a neighbour have the second
+    /// number of the chain.
     density: Option<Density>,
-    /// Those that have at least the second number of the chain, the third, and so on.
+    /// Pixels that have at least the second number of the chain, the third, and so on.
     at_least: Vec<Bits>,
-    /// Those that go on to the second number of the chain, the third, and so on, until all have come there.
+    /// Pixels that go on to the second number of the chain, the third, and so on, until all have reached it.
     going: Vec<Bits>,
-    /// Passes of this going on that are done.
+    /// The number of passes done since the last decision.
     done: u32,
-    /// How often it was decided who goes on.
+    /// The number of decisions so far.
     rounds: u32,
-    /// Those that get something in this pass.
+    /// Pixels that get samples in this pass.
     wanted: Bits,
     stage: Stage,
 }
@@ -148,13 +151,13 @@ pub(super) struct Plan {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Begins,
-    /// To the first number of the chain, which is that of all pixels if there is no error to be reached.
+    /// Pixels go to the first number of the chain. It is the only one if no error is requested.
     First,
     Later,
 }
 
 impl Plan {
-    /// `None` where there is no memory for it.
+    /// Returns `None` if there is not enough memory.
     pub(super) fn new(size: (usize, usize), chain: SampleSchedule) -> Option<Self> {
         let none = || Bits::none(size);
         Some(Self {
@@ -174,7 +177,7 @@ impl Plan {
         })
     }
 
-    /// Gives all pixels so many samples in any case; `None` where there is no memory for it.
+    /// Sets a least number of samples for all pixels. Returns `None` if there is not enough memory.
     pub(super) fn raise(&mut self, count: u32) -> Option<()> {
         let mut all = self.wanted.empty()?;
         all.fill();
@@ -182,23 +185,23 @@ impl Plan {
         Some(())
     }
 
-    /// Takes also the first samples at all moments.
+    /// Takes the first samples at all moments, too.
     pub(super) fn take_all_moments(&mut self) {
         self.chain.has_few_moments = false;
     }
 
-    /// Whether means are raised before they are shown.
+    /// Returns whether means are raised before they are displayed.
     pub(super) fn shows_raised(&self) -> bool {
         self.chain.tone() == Tone::Srgb && !self.chain.is_unclamped()
     }
 
-    /// Whether a pixel has the second number of the chain.
+    /// Returns whether a pixel has at least the second number of the chain.
     #[inline(always)]
     pub(super) fn has_many(&self, column: usize, row: usize) -> bool {
         self.at_least.first().is_some_and(|many| many.has(column, row))
     }
 
-    /// Calls `each` with the columns of the pixels of a row that have the second number of the chain.
+    /// Calls `each` with the columns of the pixels of a row that have at least the second number of the chain.
     #[inline(always)]
     pub(super) fn each_with_many(&self, row: usize, mut each: impl FnMut(usize)) {
         let words = self.at_least.first().map_or(&[][..], |many| many.row(row));
@@ -211,7 +214,7 @@ impl Plan {
         }
     }
 
-    /// Before each pass: what it gives to whom, and in bands of so many rows who needs more after it.
+    /// Returns the targets of the pass, and, in bands of `rows` rows, the states that it sets.
     pub(super) fn split(&mut self, rows: usize) -> (PassTargets<'_>, impl Iterator<Item = Judged<'_>>) {
         let is_first_look = self.stage == Stage::First && self.chain.has_error();
         let density = self.density.as_ref();
@@ -226,19 +229,20 @@ impl Plan {
         (wanted, self.unsettled.bands(rows).map_while(judged))
     }
 
-    /// Leaves all but some pixels out of a pass.
+    /// Restricts a pass to some pixels.
     pub(super) fn want_only(&mut self, some: &Bits) {
         self.wanted.keep(some);
     }
 
-    /// The numbers of samples from and to which pixels of a place of the chain go in this pass, if they do.
+    /// Returns the numbers of samples before and after this pass for pixels that go on from one number of the chain to
+    /// the next, or `None` if they get none in it.
     fn part(&self, (from, to): (u32, u32)) -> Option<(u32, u32)> {
         let from = u64::from(from) + u64::from(self.done) * u64::from(self.chain.step);
         let from = u32::try_from(from).ok().filter(|from| *from < to)?;
         Some((from, from.saturating_add(self.chain.step).min(to)))
     }
 
-    /// Goes on to the next pass of what was planned; `None` if all have what was planned for them.
+    /// Continues with the next pass of the last decision. Returns `None` if all of its passes are done.
     pub(super) fn goes_on(&mut self) -> Option<(u32, u32)> {
         match self.stage {
             Stage::Begins => None,
@@ -274,7 +278,7 @@ impl Plan {
         work
     }
 
-    /// Gathers those that get something in this pass.
+    /// Collects the pixels that get samples in this pass.
     fn want(&mut self) -> Option<(u32, u32)> {
         self.wanted.clear();
         let (mut first, mut end) = (u32::MAX, 0);
@@ -288,8 +292,8 @@ impl Plan {
         (end > 0).then_some((first, end))
     }
 
-    /// Plans what comes after all have what was planned for them; `None` once they need no more. `cover` has the first
-    /// samples of the cover, where there is one.
+    /// Decides how to continue once all passes of the last decision are done. Returns `None` once no pixel needs more.
+    /// `cover` has the first samples of the cover, if there is one.
     pub(super) fn next(&mut self, first: Option<&First>, cover: Option<&First>) -> Option<(u32, u32)> {
         self.done = 0;
         if self.stage == Stage::Begins {
@@ -319,7 +323,7 @@ impl Plan {
         self.want()
     }
 
-    /// Finds out who differs from a neighbour, beside those who are known to.
+    /// Marks pixels whose first sample differs from that of a neighbour, in addition to those marked before.
     fn judge_first(&mut self, first: &First) {
         let tone = self.chain.tone();
         let limit = (CONTRAST * self.chain.error() / 255.0 * ONE).min(ONE) as u16;
@@ -330,7 +334,7 @@ impl Plan {
         });
     }
 
-    /// Counts those that have gone on as gone on.
+    /// Records that the pixels that went on have reached their numbers.
     fn count(&mut self) -> Option<()> {
         for (at, going) in self.going.iter().enumerate().filter(|(_, going)| !going.is_empty()) {
             if at == self.at_least.len() {
@@ -341,7 +345,7 @@ impl Plan {
         Some(())
     }
 
-    /// Finds out who goes on; `None` where there is no memory for it.
+    /// Decides which pixels go on. Returns `None` if there is not enough memory.
     fn plan(&mut self) -> Option<()> {
         for at in 0..=self.at_least.len() {
             if at == self.going.len() {
