@@ -1,15 +1,17 @@
-//! The studio as a WebAssembly module: what `crates/studio` does without a server ([`rayfold_studio::browser`]), by functions of numbers
-//! for the scripts of a page (`crates/studio/web/src/static/module.ts`).
+//! The studio as a WebAssembly module. It does the work of `crates/studio` without a server
+//! ([`rayfold_studio::browser`]). Its functions of numbers are called by the scripts of a page
+//! (`crates/studio/web/src/static/module.ts`).
 //!
-//! A worker of the page has a module of its own, and uses it as a desk, as a drawer or as a reel. A call takes its bytes from
-//! one buffer and leaves its result in another: the page writes to the place that [`input`] returns, [`call`]s, and reads as
-//! many bytes as that returns from the place that [`output`] returns. The first byte of a result is 0; or it is 1, and a
-//! message of what went wrong follows.
+//! Each worker of the page has a module of its own, which works as a desk, as a drawer or as a reel. A call takes its
+//! bytes from one buffer and leaves its result in another. The page writes to the address that [`input`] returns, and
+//! [`call`]s. Then it reads the result from the address that [`output`] returns, with the length that [`call`] returns.
+//! The first byte of a result is 0 for success. It is 1 for an error, and then the error message follows.
 //!
-//! A panic ends a module: no call returns from it, and none may follow. Then [`fault`] returns the length of its message.
+//! A panic ends a module: the call does not return, and no other call may follow. Then [`fault`] returns the length of
+//! its message.
 //!
-//! The module needs nothing of the page. There is no unsafe code here: exporting a name is what the lint
-//! `unsafe_code` denies elsewhere, because two functions of one name would be undefined behaviour.
+//! The module imports nothing from the page. There is no unsafe code here. Exporting a name needs an exception from the
+//! lint `unsafe_code`, because two functions of one name would be undefined behaviour.
 
 use std::fmt::Display;
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
@@ -20,7 +22,7 @@ static INPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 static OUTPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 static STATE: Mutex<State> = Mutex::new(State { desk: None, drawer: None, reel: None });
 
-/// What the worker of this module does.
+/// The work of this module's worker.
 struct State {
     desk: Option<Desk>,
     drawer: Option<Drawer>,
@@ -49,14 +51,14 @@ pub extern "C" fn output() -> *const u8 {
     locked(&OUTPUT).as_ptr()
 }
 
-/// Returns the length of the message of the panic that ended a call. 0 if the call ended otherwise.
+/// Returns the length of the message of the panic that ended a call, or 0 if there was no panic.
 #[allow(unsafe_code, reason = "the name is exported")]
 #[unsafe(no_mangle)]
 pub extern "C" fn fault() -> usize {
     locked(&OUTPUT).len()
 }
 
-/// Lets a panic leave its message as the result.
+/// Makes a panic leave its message as the result.
 fn keep_faults() {
     static KEPT: Once = Once::new();
     KEPT.call_once(|| {
@@ -64,7 +66,7 @@ fn keep_faults() {
     });
 }
 
-/// Does what `what` names, at this time in milliseconds. Returns the length of the result.
+/// Runs the call with the number `what`, at this time in milliseconds. Returns the length of the result.
 #[allow(unsafe_code, reason = "the name is exported")]
 #[unsafe(no_mangle)]
 pub extern "C" fn call(what: u32, number: u32, time: f64) -> usize {
@@ -84,11 +86,11 @@ pub extern "C" fn call(what: u32, number: u32, time: f64) -> usize {
 #[cfg(target_arch = "wasm32")]
 use rayfold_studio::browser::{provide_font, set_time};
 
-/// Elsewhere the system knows the time.
+/// On other targets the system has a clock.
 #[cfg(not(target_arch = "wasm32"))]
 fn set_time(_: u64) {}
 
-/// Elsewhere the font is a part of the program.
+/// On other targets the font is a part of the program.
 #[cfg(not(target_arch = "wasm32"))]
 fn provide_font(_: Vec<u8>) {}
 
@@ -147,8 +149,8 @@ fn run(state: &mut State, what: u32, number: u32, bytes: Vec<u8>) -> Result<Vec<
     Ok(Vec::new())
 }
 
-/// Returns what the page is to do as one run of bytes: for each its kind, its number, the length of its content, and its
-/// content. Numbers are 32-bit and little-endian.
+/// Returns the page's instructions as one run of bytes: for each its kind, its number, the length of its content, and
+/// its content. Numbers are 32-bit and little-endian.
 fn written(effects: Vec<Effect>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for effect in effects {

@@ -1,6 +1,6 @@
-//! Builds the archive of a release for the machine that it runs on.
+//! Builds the archive of a release for this machine.
 //!
-//! It holds the programs, the completion scripts, the manual pages, the README, the changelog and the licences.
+//! It contains the programs, the completion scripts, the manual pages, the README, the changelog and the licences.
 //!
 //! Invariant: the same sources, lock file, Rust release and linker give the same bytes, wherever the folders are.
 //! `--verify` builds a second time, from a copy elsewhere, and compares.
@@ -18,7 +18,7 @@ use crate::toolchain::{self, say};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The programs. `rayfold dev`, which is there on Unix alone, runs the last two.
+/// The programs. The last two are run by `rayfold dev`, which exists only on Unix.
 const PROGRAMS: &[&str] =
     if cfg!(unix) { &["rayfold", "rayfold-render", "rayfold-assemble"] } else { &["rayfold"] };
 const TEXTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
@@ -96,8 +96,8 @@ fn write_pages(program: &Path, folder: &Path) -> anyhow::Result<()> {
     toolchain::run(Command::new(program).args(["--quiet", "man"]).arg(folder.join("man/man1")))
 }
 
-/// Returns the files of the archive, below the folder `name`: programs from `built`, what they wrote from `pages`, and
-/// texts from `root`.
+/// Returns the files of the archive, below the folder `name`: programs from `built`, their generated files from
+/// `pages`, and texts from `root`.
 fn entries(name: &str, built: &Path, pages: &Path, root: &Path) -> anyhow::Result<Vec<Entry>> {
     let read = |path: &Path| fs::read(path).with_context(|| format!("cannot read {}", path.display()));
     let mut entries = Vec::new();

@@ -1,14 +1,14 @@
-//! The requirements of a binary on the system's C library, read from the binary itself.
+//! Reads from a binary what it requires of the system's C library.
 //!
-//! A program that was linked against a newer glibc than Lambda's does not start there, and nothing reports it before
-//! it is deployed. The dynamic section lists the libraries that the loader must find, and the version table the
-//! versions of their symbols.
+//! A program that was linked against a newer glibc than Lambda's does not start there, and this shows only after
+//! deployment. The dynamic section lists the libraries that the loader must find. The version table lists the versions
+//! of their symbols.
 
 use object::elf::FileHeader64;
 use object::read::elf::{Dyn, FileHeader, SectionHeader};
 use object::{Endianness, elf};
 
-/// The C library of Amazon Linux 2023, which `provided.al2023` is.
+/// The glibc version of Amazon Linux 2023, the system of `provided.al2023`.
 pub(crate) const AMAZON_LINUX_2023: Version = Version(2, 34);
 
 /// The libraries that come with every glibc, by the start of their names. The loader's name differs by architecture.

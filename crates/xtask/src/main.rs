@@ -1,7 +1,7 @@
 //! `cargo xtask`: chores that need more than Cargo, without a shell.
 //!
-//! Packages the function binaries for Lambda, the programs of a release and the Python package without knowing what they
-//! do, and draws the pictures of the language page from the scripts in it.
+//! Packages the function binaries for Lambda, the programs of a release and the Python package. Draws the pictures of
+//! the language page from its scripts.
 
 use clap::{Parser, Subcommand};
 

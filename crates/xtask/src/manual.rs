@@ -1,8 +1,8 @@
 //! The scripts of `docs/language.md`, each of which has a picture.
 //!
 //! A code block that starts with ```` ```scene NAME ```` is the script of the picture `NAME`. A block that sets the
-//! size of the image is a whole script. Before any other, the stage (the block `stage`: camera, light and floor) is
-//! inserted, and a `Trace` after it. This module does not know how a script is drawn.
+//! size of the image is a whole script. Any other block is completed: the stage (the block `stage`: camera, light and
+//! floor) is inserted before it, and a `Trace` after it. This module does not depend on how a script is drawn.
 //!
 //! ````text
 //! ```scene sphere

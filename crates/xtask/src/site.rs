@@ -1,8 +1,8 @@
 //! Builds the studio as a static site: target/site, a folder for any host of files.
 //!
-//! It holds the page and its workers (by Node, from `crates/studio/web`), the two variants of the module that they run
-//! (`crates/web`), a start page with the examples, and each example as a zip file. Beside each file that is text or a module
-//! is one that Brotli has compressed, for hosts that send those. Nothing asks a server for more than these files.
+//! The site has the page and its workers (built by Node from `crates/studio/web`), the two variants of the WebAssembly
+//! module (`crates/web`), a start page with the examples, and each example as a zip file. Each text file and each
+//! module also has a copy compressed with Brotli, for hosts that serve those. The page requests no other files.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -19,19 +19,20 @@ use crate::toolchain::{self, say};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// The variants of the module, and the instructions of each: `src/static/variant.ts` chooses.
+/// The variants of the module, and the instructions of each. `src/static/variant.ts` chooses one.
 const MODULES: [(&str, &str); 2] = [("relaxed.wasm", "+simd128,+relaxed-simd"), ("rayfold.wasm", "+simd128")];
 
-/// The font of letters that name none, which the module lacks.
+/// The default font of letters, which the module lacks.
 const FONT: &str = "font.ttf";
 
 /// The largest module, compressed.
 const LARGEST: u64 = 3 << 19;
 
-/// The page of the studio, as the start page names it.
+/// The page of the studio, as the start page links to it.
 const STUDIO: &str = "studio.html";
 
-/// Builds the site. A draft is for tests: both modules are the one that every browser runs, and nothing is compressed.
+/// Builds the site. A draft is for tests: both modules are the variant that every browser runs, and nothing is
+/// compressed.
 pub(crate) fn run(draft: bool) -> anyhow::Result<()> {
     let root = root()?;
     let web = root.join("crates/studio/web");
@@ -101,7 +102,7 @@ fn module(root: &Path, features: &str, draft: bool) -> anyhow::Result<PathBuf> {
     Ok(root.join("target").join(TARGET).join("web/rayfold_web.wasm"))
 }
 
-/// Returns the name of each example and its files: scripts, settings, and what the scripts name.
+/// Returns the name of each example and its files: scripts, settings, and the files that the scripts name.
 fn examples_of(scenes: &Path) -> anyhow::Result<Vec<(String, Vec<PathBuf>)>> {
     let mut examples = Vec::new();
     for entry in fs::read_dir(scenes)? {
@@ -140,7 +141,7 @@ fn card(root: &Path, examples: &Path, name: &str) -> anyhow::Result<String> {
     Ok(format!("<li><a href=\"{STUDIO}#example={name}\">{shown}<span>{name}</span></a></li>\n        "))
 }
 
-/// Returns the first picture of a GIF, for people who want none that move.
+/// Returns the first picture of a GIF, for people who prefer pictures without motion.
 fn first_frame(gif: &Path) -> anyhow::Result<image::RgbaImage> {
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
@@ -150,9 +151,9 @@ fn first_frame(gif: &Path) -> anyhow::Result<image::RgbaImage> {
     image::RgbaImage::from_raw(width, height, frame.buffer.to_vec()).context("its frame is cut off")
 }
 
-/// Returns the names of the files that the browser keeps from the start, as the items of a list in JavaScript, and a version
-/// that changes with their content and with the modules, of which a browser keeps one. Pictures of examples are kept when
-/// they are shown.
+/// Returns the names of the files that the browser stores from the start, as the items of a list in JavaScript, and a
+/// version. The version changes with the content of these files and of the modules, of which a browser stores one.
+/// Pictures of examples are stored when they are shown.
 fn kept(site: &Path) -> anyhow::Result<(String, String)> {
     let mut names = vec!["index.html".to_owned(), "./".to_owned()];
     for (folder, prefix) in [(site.to_owned(), ""), (site.join("examples"), "examples/")] {

@@ -1,4 +1,4 @@
-//! The checkout that is built: where it is, a copy of it elsewhere, and flags that keep its folder out of programs.
+//! The checkout that is built: its place, a copy of it elsewhere, and flags that keep its folder out of programs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(crate) fn remapped(root: &Path) -> anyhow::Result<Vec<String>> {
         .to_vec())
 }
 
-/// Copies the files that Git tracks in `root`, and the new ones that it does not ignore, into `copy`.
+/// Copies into `copy` the files that Git tracks in `root`, and the untracked files that it does not ignore.
 pub(crate) fn copy_sources(root: &Path, copy: &Path) -> anyhow::Result<()> {
     let listing = Command::new("git")
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])

@@ -1,7 +1,8 @@
-//! Tools that come by pip: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild; and
+//! Tools that pip installs: zig, which can link against a glibc older than the machine's, driven by cargo-zigbuild; and
 //! maturin, which builds wheels.
 //!
-//! All are pinned, because other versions may give other bytes, and kept in folders of their own in the user's cache.
+//! All of them have pinned versions, because other versions may give other bytes. They are installed in folders of
+//! their own in the user's cache.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub(crate) struct Toolchain {
 }
 
 impl Toolchain {
-    /// Returns the tools of the cache. Installs them first if they are missing.
+    /// Returns the tools of the cache. Installs missing tools first.
     pub(crate) fn get() -> anyhow::Result<Self> {
         let packages = [format!("ziglang=={ZIG}"), format!("cargo-zigbuild=={CARGO_ZIGBUILD}")];
         let program =
@@ -45,7 +46,8 @@ pub(crate) fn maturin() -> anyhow::Result<PathBuf> {
     installed(&format!("maturin-{MATURIN}"), &[format!("maturin=={MATURIN}")], "maturin")
 }
 
-/// Returns a program of a folder in the cache. Installs the packages, of which the last one has the program, if it is missing.
+/// Returns a program of a folder in the cache. Installs the packages if the program is missing. The last package has
+/// the program.
 fn installed(name: &str, packages: &[String], program: &str) -> anyhow::Result<PathBuf> {
     let folder = cache()?.join(name);
     let path = folder.join("bin").join(program);

@@ -1,7 +1,7 @@
-//! Builds the wheel of the Python package for the machine that it runs on: one for all Pythons from 3.10.
+//! Builds the wheel of the Python package for this machine. It works with every Python from 3.10 on.
 //!
-//! The wheel is built with maturin, in the profile of a release. The interpreter that runs maturin need not be one that the
-//! wheel is for.
+//! The wheel is built with maturin, in the profile of a release. The interpreter that runs maturin need not be one that
+//! the wheel supports.
 
 use std::process::Command;
 
