@@ -377,7 +377,6 @@ fn torus(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
     Ok(Torus::new(0.5, 0.1 + 0.1 * rng.f64(), at, direction(rng), material)?.into())
 }
 
-/// Returns a floor and two walls.
 fn capsule(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
     let half = 0.55 * direction(rng);
     Ok(Capsule::new(0.4, [at - half, at + half], material)?.into())
@@ -388,6 +387,7 @@ fn roundbox(rng: &mut Rng, at: DVec3, material: Material) -> Result<Object> {
     Ok(Roundbox::new([at - half, at + half], 0.05 + 0.3 * rng.f64(), material)?.into())
 }
 
+/// Returns a floor and two walls.
 fn planes(rng: &mut Rng) -> Result<Vec<Object>> {
     let walls = [
         (DVec3::NEG_Y, DVec3::Y),
