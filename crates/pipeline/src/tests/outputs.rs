@@ -85,7 +85,7 @@ async fn a_file_more_is_all_that_is_made_when_the_settings_ask_for_it() {
     assert_eq!(world.files(), ["animations/film.gif"]);
 }
 
-/// The mark records that there may be such a file, whatever the manifest says.
+/// The mark records that there may be a file of an earlier output. It does so even if the manifest is gone.
 #[tokio::test]
 async fn a_file_of_before_goes_also_when_the_manifest_is_gone() {
     let world = two_frames(r#""gif", "webp""#).await;
