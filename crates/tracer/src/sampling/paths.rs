@@ -22,7 +22,7 @@ impl Way {
     /// The number of ways.
     pub(crate) const COUNT: usize = 3;
 
-    /// The factor below which a ray is followed only with a chance. It is a power of two.
+    /// Returns the factor below which a ray is followed only with a chance. It is a power of two.
     const fn enough(self) -> f64 {
         match self {
             Self::Mirrored | Self::Refracted => 1.0 / 32.0,
