@@ -139,7 +139,7 @@ pub(crate) struct Parts {
     pub(crate) uvs: Vec<Vec2>,
     /// Empty, or one for each triangle.
     pub(crate) uv_of: Vec<[u32; 3]>,
-    /// By the use of a picture: empty, or one for each position.
+    /// The texture coordinates by the use of a picture: empty, or one for each position.
     pub(crate) own_uvs: [Vec<Vec2>; 2],
     /// Empty, or one for each position.
     pub(crate) colors: Vec<Vec3>,

@@ -9,12 +9,12 @@ use crate::picture::Picture;
 /// The continuation of a picture beyond its edges, along one of its axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// It repeats.
+    /// The picture repeats.
     #[default]
     Repeat,
-    /// It repeats, every other time mirrored.
+    /// The picture repeats, every other time mirrored.
     Mirror,
-    /// Its first and last pixels go on.
+    /// The first and last pixels of the picture continue.
     Clamp,
 }
 

@@ -121,7 +121,7 @@ pub(crate) fn read(bytes: &[u8], refer: &mut Referred<'_>) -> Result<Parts, Faul
     read_in(bytes, most.min(bytes.len() / CHUNK), refer)
 }
 
-/// Reads an OBJ file in so many chunks, or fewer.
+/// Reads an OBJ file in at most `chunks` chunks.
 fn read_in(bytes: &[u8], chunks: usize, refer: &mut Referred<'_>) -> Result<Parts, Fault> {
     let texts = cut(bytes, chunks);
     let counts: Vec<Counts> = match &texts[..] {
@@ -377,7 +377,7 @@ mod tests {
     use super::*;
     use crate::files::MemoryFiles;
 
-    /// Returns what is read in so many chunks, or the fault.
+    /// Returns the result of reading in `chunks` chunks, or the fault.
     fn outcome(text: &str, chunks: usize) -> String {
         let files = MemoryFiles::from([("m.mtl", b"newmtl red\nKd 1 0 0\n".to_vec())]);
         let mut referred = Referred::new(&files);
