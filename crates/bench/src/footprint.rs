@@ -61,9 +61,9 @@ pub struct Args {
 /// The cost of one invocation.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// The peak memory of its process, in MiB.
+    /// The peak memory of the process, in MiB.
     memory: f64,
-    /// Its processor time in seconds.
+    /// The processor time of the process in seconds.
     processor: f64,
     requests: Requests,
 }

@@ -32,9 +32,9 @@ const FARTHEST: f64 = 1e7;
 /// The way in which the position of the solids is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Written {
-    /// By the numbers of the lines, axis-aligned.
+    /// The lines contain the position, and the solids are aligned with the axes.
     Straight,
-    /// By the numbers of the lines, rotated.
+    /// The lines contain the position, and the solids are rotated.
     Turned,
     OneGroup,
     TwoGroups,

@@ -15,7 +15,7 @@ pub(super) struct Program {
     pub(super) name: &'static str,
     /// The version that the program prints; `None` if it is not on this machine.
     pub(super) version: Option<String>,
-    /// Its options, for the report.
+    /// The program's options, for the report.
     pub(super) how: &'static str,
     command: Box<Build>,
 }

@@ -16,7 +16,7 @@ use crate::hard_cases::{fog_scaled, scaled};
 /// A relation between scenes.
 pub(super) struct Relation {
     pub(super) name: &'static str,
-    /// Its description in the report.
+    /// The description of the relation in the report.
     pub(super) about: &'static str,
     /// Whether pictures are the same bit for bit.
     pub(super) is_exact: bool,

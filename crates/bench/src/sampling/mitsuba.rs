@@ -36,7 +36,7 @@ pub(super) struct Truth {
     pub(super) samples: u32,
     /// Half of the root mean square difference of its two halves.
     pub(super) error: f64,
-    /// Its mean level.
+    /// The mean level of the picture.
     pub(super) level: f64,
 }
 
