@@ -54,9 +54,9 @@ pub(crate) enum Unavailable {
 /// The effect of a change on the disk space, and whether a caller waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// It needs disk space.
+    /// The change needs disk space.
     Grows,
-    /// It frees disk space, so it also runs when the disk is nearly full.
+    /// The change frees disk space, so it also runs when the disk is nearly full.
     Shrinks,
     /// No caller waits for it, and a kill may undo it.
     Lazy,
