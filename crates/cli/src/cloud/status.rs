@@ -56,7 +56,7 @@ struct Report<'a> {
     misplaced: Option<Misplaced<'a>>,
 }
 
-/// Objects that belong to no animation, of which the first are named.
+/// The number of objects that belong to no animation, and the names of the first of them.
 #[derive(Serialize)]
 struct Misplaced<'a> {
     count: usize,
