@@ -207,13 +207,13 @@ impl Section {
 }
 
 /// Returns the time that an invocation waits for requests and pauses, in milliseconds, for an animation of `frames`
-/// frames on so many places, or on those of an account.
+/// frames on `places` places, or on those of an account.
 pub fn waiting_ms(frames: u64, places: Option<u64>) -> f64 {
     let is_at_once = places.unwrap_or(PLACES).saturating_mul(2) > frames;
     if is_at_once { WAITING_AT_ONCE_MS } else { WAITING_MS }
 }
 
-/// Returns the milliseconds that the render function takes per frame of an animation of `frames` frames on so many
+/// Returns the milliseconds that the render function takes per frame of an animation of `frames` frames on `places`
 /// places, if drawing a frame takes `drawing_ms` on one processor and the function has `memory_mb`.
 pub fn render_ms(frames: u64, places: Option<u64>, drawing_ms: f64, memory_mb: f64) -> f64 {
     drawing_ms * PROCESSOR_MB / memory_mb + waiting_ms(frames, places)
