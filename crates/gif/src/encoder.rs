@@ -36,12 +36,12 @@ pub struct Settings {
 /// The number of times that an animation is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Plays {
-    /// It repeats without end.
+    /// The animation repeats without end.
     #[default]
     Endless,
-    /// It is shown once, then the last frame stays.
+    /// The animation is shown once, then the last frame stays.
     Once,
-    /// It is shown once, and then repeated this many times.
+    /// The animation is shown once, and then repeated this many times.
     Repeated(NonZeroU16),
 }
 
@@ -115,15 +115,15 @@ struct Running<W: Write> {
     size: (u32, u32),
     file: gif::Encoder<Counting<W>>,
     quantiser: Quantiser,
-    /// From the first frame with clear pixels on, in place of the quantiser.
+    /// The encoder that replaces the quantiser from the first frame with clear pixels on.
     alone: Option<Alone>,
 }
 
 /// A frame as it is drawn.
 enum Frame {
-    /// All of it is covered.
+    /// All of the frame is covered.
     Opaque(RgbImage),
-    /// Some of it is clear.
+    /// Some of the frame is clear.
     Clear(RgbaImage),
 }
 

@@ -25,7 +25,7 @@ pub enum Error {
     UnlikeSize {
         /// The number of the frame.
         frame: u64,
-        /// Its width and height.
+        /// The width and height of the frame.
         found: (u32, u32),
         /// The width and height of the first frame.
         expected: (u32, u32),
@@ -35,7 +35,7 @@ pub enum Error {
     Size {
         /// The number of the frame.
         frame: u64,
-        /// Its width and height.
+        /// The width and height of the frame.
         found: (u32, u32),
     },
     /// [`Encoder::finish`](crate::Encoder::finish) was called before any [`Encoder::push`](crate::Encoder::push).

@@ -59,7 +59,7 @@ pub(crate) struct Alternatives {
     pub(crate) indices: [u8; ALTERNATIVES],
     /// If there are fewer entries, the rest have levels that are far from every colour.
     pub(crate) levels: [[f32; 3]; ALTERNATIVES],
-    /// Their squared distances from the entry, the least first.
+    /// The squared distances of these entries from the entry itself, the least first.
     pub(crate) apart: [f32; ALTERNATIVES],
 }
 
