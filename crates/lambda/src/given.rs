@@ -77,7 +77,7 @@ pub(crate) struct Kept(Arc<Mutex<State>>);
 
 #[derive(Default)]
 struct State {
-    /// By their keys.
+    /// The kept files, by their keys.
     files: BTreeMap<String, File>,
     /// The library of the last drawing. A drawing takes it, so that another one at the same time makes its own.
     library: Option<GivenLibrary>,
