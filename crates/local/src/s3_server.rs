@@ -60,7 +60,7 @@ impl StoreKind {
     /// All kinds, the built-in store first.
     pub const ALL: [Self; 3] = [Self::BuiltIn, Self::Minio, Self::SeaweedFs];
 
-    /// Returns its name for a flag.
+    /// Returns the name of the kind, as flags use it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::BuiltIn => "built-in",

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::process::{Command, ServerProcess};
 use crate::program::SEAWEEDFS;
 
-/// Its file of identities, in the data folder.
+/// The name of SeaweedFS's file of identities, in the data folder.
 pub(crate) const CONFIG: &str = "seaweedfs.json";
 
 /// The services whose ports only the process itself uses.

@@ -25,13 +25,13 @@ use crate::observation::{Observer, Seen};
 /// The prefix of the invokers' objects.
 pub(crate) const INVOKERS: &str = "invokers/";
 
-/// The interval between two listings, with each of which the invoker writes its own object again.
+/// The interval between two listings. With each listing the invoker writes its own object again.
 const BEAT: Duration = Duration::from_secs(1);
 
-/// The number of listings with the same object after which its invoker has no share.
+/// The number of listings that show the object of an invoker unchanged after which that invoker has no share.
 const SILENT: u32 = 10;
 
-/// The number after which its share is swept. An invoker that has left is silent at once.
+/// The number of such listings after which the invoker's share is swept. An invoker that has left is silent at once.
 const LOST: u32 = SILENT + 3;
 
 /// This invoker, and its view of the others.
