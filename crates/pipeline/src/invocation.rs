@@ -202,11 +202,11 @@ fn blank(animation: &Animation) -> Manifest {
 pub(crate) enum ManifestPrefix {
     /// There is no manifest.
     Nothing,
-    /// It cannot be read.
+    /// The manifest cannot be read.
     Unreadable(Known),
     /// The request has read the whole manifest.
     Whole(Known),
-    /// Its beginning; the manifest is larger.
+    /// The beginning of a larger manifest.
     Start { beginning: Beginning, info: ObjectInfo },
 }
 

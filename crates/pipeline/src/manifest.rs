@@ -101,7 +101,7 @@ pub struct Head {
 pub struct Made {
     /// The set that it was made of.
     pub generation: Generation,
-    /// Its entity tag.
+    /// The entity tag of the file.
     pub version: ETag,
 }
 
@@ -162,9 +162,9 @@ pub enum FrameState {
         /// The renderer's pixel version that is used.
         pixels: u32,
     },
-    /// It cannot be drawn before files arrive that the script names.
+    /// The frame cannot be drawn before files arrive that the script names.
     Waiting(Fault),
-    /// It cannot be drawn.
+    /// The frame cannot be drawn.
     Failed(Fault),
 }
 

@@ -19,7 +19,7 @@ use crate::{Clock, Result};
 pub enum Scope<'a> {
     /// Frames that failed or are missing.
     Failed,
-    /// All frames, even those that are drawn.
+    /// Every frame, even if it is drawn.
     All,
     /// This frame, even if it is drawn.
     Frame(&'a ScriptName, Part),

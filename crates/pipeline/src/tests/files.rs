@@ -238,7 +238,7 @@ async fn a_changed_file_has_only_the_scripts_drawn_again_that_name_it() {
     world.put(EARTH, "green");
     world.render(EARTH).await;
     assert_eq!(world.status(), (Status::Rendering, 1, 1, 0));
-    // The same event twice triggers nothing twice.
+    // A repeated event triggers nothing again.
     world.render(EARTH).await;
     assert_eq!(world.woken(&[]).await.len(), 1);
     assert_eq!(world.status(), (Status::Done, 2, 0, 0));
