@@ -74,7 +74,7 @@ impl Encoder {
         Ok(Self { encoding: Some(encoding), sink })
     }
 
-    /// Adds the next frame, shown for so many seconds if not as long as the others.
+    /// Adds the next frame. It is shown for this number of seconds if one is given, otherwise as long as the others.
     #[pyo3(signature = (image, seconds = None))]
     fn push(&mut self, py: Python<'_>, image: &Bound<'_, Image>, seconds: Option<f64>) -> PyResult<()> {
         let Pixels::Levels(image) = &image.get().pixels else {
