@@ -121,7 +121,7 @@ pub enum Code {
     MalformedSettings,
     /// A field that settings do not have.
     UnknownField,
-    /// A field that is there twice.
+    /// A field that occurs twice.
     DuplicateField,
     /// A field with a value of the wrong type or range.
     InvalidField,

@@ -13,12 +13,12 @@ pub struct Image {
 /// The mapping of a picture onto a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImageMap {
-    /// By the texture coordinates of a mesh.
+    /// The texture coordinates of a mesh place the picture.
     Uv,
-    /// On a plane of the coordinates of the object's numbers, with this width, greater than 0, and its lower left
-    /// corner at 0. It repeats.
+    /// The picture lies on a plane of the coordinates of the object's numbers. It has this width, greater than 0, and
+    /// its lower left corner is at 0. It repeats.
     Flat(f64, Axes),
-    /// Around the middle of the coordinates of the object's numbers, or that of a sphere.
+    /// The picture surrounds the centre of a sphere, or else the origin of the coordinates of the object's numbers.
     Ball,
 }
 

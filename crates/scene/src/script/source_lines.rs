@@ -11,9 +11,9 @@ pub(crate) struct SourceLines(Vec<Run>);
 /// Items on consecutive lines.
 #[derive(Clone, Copy, Debug)]
 struct Run {
-    /// The index of the first.
+    /// The index of the first item.
     first: usize,
-    /// Its line, counted from 1; 0 if the items come from no text.
+    /// The line of the first item, counted from 1; 0 if the items come from no text.
     line: usize,
 }
 
