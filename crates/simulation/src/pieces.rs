@@ -33,7 +33,7 @@ pub struct Pieces {
     pub overwritten_at: Option<u64>,
     /// Whether the script is changed back at once.
     pub is_changed_back: bool,
-    /// One in this many invocations is killed, and its event tried again.
+    /// One in `kill` invocations is killed, and its event is tried again.
     pub kill: u64,
     /// A rule that is broken.
     pub mutation: Option<Mutation>,

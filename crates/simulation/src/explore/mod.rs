@@ -114,9 +114,9 @@ pub fn provoke(worlds: &[World], seed: u64, mutation: Option<Mutation>) -> Resul
 
 /// The points at which faults happen.
 enum Aim {
-    /// Once in this number of steps.
+    /// At one of this number of steps, on average.
     Anywhere(u64),
-    /// In this write, counted from 0.
+    /// At this write, counted from 0.
     Write(u64),
 }
 

@@ -11,7 +11,8 @@ const CHANGES: u32 = 4;
 /// The maximum number of preemptions of a schedule with few.
 const FEW: u64 = 2;
 
-/// The number of writes of a schedule at which preemptions and faults are aimed: in most of the worlds all of them.
+/// The number of writes of a schedule, from its start, at which preemptions and faults can be aimed. Schedules of most
+/// worlds have no more writes.
 pub(super) const MAX_WRITES: u64 = 12;
 
 /// Random priorities are above this; changed priorities are below.

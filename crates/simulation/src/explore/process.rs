@@ -118,8 +118,8 @@ pub(super) struct Process {
     /// The hash of all the above.
     begun: u64,
     history: Vec<Event>,
-    /// The index of the first reply that has had no effect yet, because replies to requests that were sent together
-    /// with its request are still to come.
+    /// The index of the first reply that has had no effect yet. It waits for the replies to the requests that were sent
+    /// together with its own.
     silent: usize,
     /// The hash of all that has happened.
     pub(super) hash: u64,

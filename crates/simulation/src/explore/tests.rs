@@ -5,7 +5,7 @@ use super::*;
 /// The number of states up to which every `cargo test` searches a world.
 const SMALL: u64 = 8_000;
 
-/// The worlds with at most that many states.
+/// The number of worlds with at most [`SMALL`] states.
 const SMALL_WORLDS: usize = 26;
 
 fn world(name: &str) -> World {
