@@ -46,7 +46,7 @@ pub(crate) struct Faces {
 pub(crate) struct Shared(usize);
 
 impl Shared {
-    /// All triangles are written out.
+    /// No tree is shared: all triangles are written out.
     pub(crate) const NONE: Self = Self(usize::MAX);
 
     /// Returns what the options ask for.

@@ -58,7 +58,7 @@ struct Pane {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Edge {
     Disc,
-    /// Of any angle.
+    /// A parallelogram, with any angle between its sides.
     Rectangle,
     Triangle,
 }

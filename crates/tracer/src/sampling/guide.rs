@@ -33,7 +33,7 @@ const BRIGHT: f64 = 0.4;
 pub(crate) struct Guide {
     /// Glowing objects, and after them the windows.
     lights: Vec<Bright>,
-    /// The number of those that glow.
+    /// The number of glowing objects among the lights.
     glowing: usize,
     /// The box in which windows are seen.
     room: Option<[DVec3; 2]>,

@@ -30,7 +30,7 @@ pub(crate) struct Dimensions {
     /// For each light with an extent, the first of its dimensions: three of a lamp, two of a sun, in the order of the
     /// script.
     pub(crate) lights: Vec<Option<usize>>,
-    /// The first of two.
+    /// The first of the two dimensions of the lens.
     pub(crate) lens: Option<usize>,
     pub(crate) time: Option<usize>,
     /// The number of dimensions.
@@ -115,7 +115,7 @@ pub enum Sampler {
     Sobol,
     /// Its first two dimensions for each pair of dimensions, in another order for each.
     Pairs,
-    /// Each for itself.
+    /// Independent random points.
     Independent,
     /// The default, with the points of other pixels: a ground truth that shares no points with a picture.
     Others(u8),

@@ -37,13 +37,13 @@ impl Way {
     }
 }
 
-/// Returns the first of the two dimensions of the direction in which a path goes on after so many hits.
+/// Returns the first of the two dimensions of the direction in which a path continues after `hits` hits.
 #[inline(always)]
 pub(crate) fn direction_dimension(dimensions: &Dimensions, hits: u32) -> usize {
     dimensions.count + 2 * hits as usize
 }
 
-/// Returns the number from 0 to 1 that decides whether a path goes this way after so many hits.
+/// Returns the number from 0 to 1 that decides whether a path continues in this way after `hits` hits.
 #[inline(always)]
 pub(crate) fn choice(pixel_seed: u32, sample: u32, hits: u32, way: Way) -> f64 {
     independent(pixel_seed, sample, choice_dimension(hits, way))

@@ -137,7 +137,7 @@ enum Shape<E> {
     Capsule(Capsule<E>),
     Roundbox(Roundbox<E>),
     Cuboid(Cuboid<E>),
-    /// In the coordinates of the scene.
+    /// A triangle with holes, in the coordinates of the scene.
     Cutout(Box<Cutout<E>>),
     Model(Box<SharedModel<E>>),
 }

@@ -61,7 +61,7 @@ struct ModelTree<E> {
     /// The texture coordinates and the colour factors at their corners; empty if there are none.
     uvs: Vec<[Vec2; 3]>,
     colors: Vec<[Color; 3]>,
-    /// Their corners, as indices among the positions of the model, which are unrounded.
+    /// The corners of the triangles, as indices among the positions of the model, which are unrounded.
     corners: Vec<[u32; 3]>,
     positions: Vec<DVec3>,
     /// The index here of each triangle of the file.

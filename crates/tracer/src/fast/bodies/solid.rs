@@ -125,7 +125,7 @@ impl Frame {
 }
 
 impl Span {
-    /// Returns the one along the last axis.
+    /// Returns the span along the last axis of the frame.
     pub(super) fn across(frame: &Frame, half: f64, hole: f64) -> Self {
         Self { axis: frame.axes[2], half, hole }
     }

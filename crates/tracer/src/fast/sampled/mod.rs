@@ -61,7 +61,7 @@ pub(super) const MARGIN: f64 = 0.5 + crate::fast::arithmetic::rounding::MARGIN;
 struct Moment<E> {
     prepared: Prepared<E>,
     window: Window,
-    /// Of few bodies.
+    /// The candidates among the bodies, if they are few.
     bodies: Option<Window>,
     extents: Option<Extents>,
     lens: Option<Aperture<E>>,
@@ -72,7 +72,7 @@ struct Moment<E> {
 /// A scene at all its moments.
 #[derive(Debug)]
 pub(super) struct Sampled<'a, E> {
-    /// In the middle.
+    /// The scene in the middle of the exposure.
     scene: Cow<'a, Scene>,
     options: RenderOptions<'a>,
     dimensions: Dimensions,

@@ -117,7 +117,7 @@ impl<'a, E: Real> Workspace<'a, E> {
 
 /// The drawn samples of a tile.
 pub(super) struct Drawn<'a, 'b> {
-    /// The sums of its pixels.
+    /// The sums of the tile's pixels.
     pub(super) pixels: &'a mut Vec<Pixel>,
     /// The first samples of the tile's row of tiles.
     pub(super) first: Option<&'a mut FirstRows<'b>>,
@@ -272,12 +272,12 @@ fn add_equal<T: Copy>(
 }
 
 impl SampledTile {
-    /// Of the film.
+    /// Returns the tile's columns of the film.
     pub(super) fn columns(&self) -> Range<usize> {
         self.left..self.left + self.width
     }
 
-    /// The same, from the top.
+    /// Returns the tile's rows of the film, from the top.
     pub(super) fn rows(&self) -> Range<usize> {
         self.top..self.top + self.height
     }
@@ -290,7 +290,7 @@ impl SampledTile {
         });
     }
 
-    /// The same of those that are wanted.
+    /// Does the same for the pixels that are wanted.
     #[inline(always)]
     fn each_wanted_pixel(&self, wanted: PassTargets, mut each: impl FnMut((u32, u32))) {
         self.each_block(|left, row, columns| {
@@ -320,7 +320,7 @@ impl SampledTile {
         }
     }
 
-    /// A pixel's place in the tile.
+    /// Returns a pixel's place in the tile.
     #[inline(always)]
     fn in_tile(&self, (column, row): (u32, u32)) -> usize {
         row as usize * self.side.0 + column as usize
@@ -483,7 +483,7 @@ fn draw_batch<S: Simd, E: Real, N: Kernel<E>>(
     scratch.follow::<S, N>(simd, scene, pass.bounces, (soft, paths), watch);
 }
 
-/// The colours of a batch as parts.
+/// Returns the [`quantised`] colours of a batch.
 #[inline(always)]
 fn levels<E: Real>(count: usize, workspace: &Workspace<E>) -> [[u32; ROOM]; CHANNELS] {
     let mut levels = [[0; ROOM]; CHANNELS];

@@ -150,7 +150,7 @@ pub(in crate::fast) struct Facet<E> {
 struct Line {
     direction: DVec3,
     moment: DVec3,
-    /// A bound on the error of the moment that `f64` adds.
+    /// A bound on the error that rounding in `f64` adds to the moment.
     noise: f64,
 }
 

@@ -17,7 +17,7 @@ pub(crate) enum Surface {
 /// A flat part: a face, a cap, or all of what is flat.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flat {
-    /// Of length 1.
+    /// A unit vector.
     pub(crate) normal: DVec3,
     /// `normal · point` of its points.
     pub(crate) height: f64,
@@ -41,7 +41,7 @@ pub(crate) enum Plain {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Side {
     pub(crate) end: DVec3,
-    /// Of length 1.
+    /// A unit vector.
     pub(crate) axis: DVec3,
     pub(crate) height: f64,
     /// The radii at the end and at the other end.
@@ -52,7 +52,7 @@ pub(crate) struct Side {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ring {
     pub(crate) center: DVec3,
-    /// Of length 1.
+    /// A unit vector.
     pub(crate) axis: DVec3,
     pub(crate) radius: f64,
     pub(crate) thickness: f64,

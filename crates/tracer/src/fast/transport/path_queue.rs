@@ -105,7 +105,7 @@ impl<E: Real> PathQueues<E> {
         self.turns[ray]
     }
 
-    /// Adds a ray that goes on this way.
+    /// Adds a ray to the queue of its `way`.
     #[inline(always)]
     pub(crate) fn push(&mut self, way: Way, ray: PathRay<E>) {
         let before = ray.turns.hits() as usize - 1;

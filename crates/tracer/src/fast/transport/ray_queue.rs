@@ -306,8 +306,8 @@ impl<E: Real> RayQueues<'_, E> {
         !self.is_cancelled() && self.paths.take(queue, &mut self.marks)
     }
 
-    /// Returns the share of its pixel that stays clear if a ray of the batch reaches nothing after so many hits, in scenes
-    /// without background; at most 0 if it counts for nothing then.
+    /// Returns the share of its pixel that stays clear if a ray of the batch hits nothing after `hits` hits, in scenes
+    /// without background. The share is at most 0 if such a miss does not count.
     #[inline(always)]
     pub(crate) fn clear_share(&self, ray: usize, hits: u32) -> f64 {
         if hits == 0 { 1.0 } else { self.marks.0[ray].widen() }

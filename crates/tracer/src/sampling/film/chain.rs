@@ -78,7 +78,7 @@ pub(crate) struct Verdict {
     /// The count of numbers of the chain, from the second on, from which even neighbours go on because of this pixel.
     /// If samples are not clamped, 1 means that all neighbours get more samples.
     pub(crate) reach: usize,
-    /// Whether they differ.
+    /// Whether the samples differ.
     pub(crate) is_uneven: bool,
     /// Whether the pixel counts as varying when densities are computed.
     pub(crate) is_varying: bool,

@@ -71,7 +71,7 @@ impl Density {
         self.sets.iter().filter(|set| set.has(column, row)).count()
     }
 
-    /// The pixels around which much varies.
+    /// Returns the pixels around which much varies.
     pub(super) fn dense(&self) -> &Bits {
         &self.sets[0]
     }

@@ -68,7 +68,7 @@ pub(crate) struct Film {
 pub(crate) struct Band<'a> {
     /// The sums of each tile, row by row. Empty for a tile that has no sums yet.
     pub(crate) tiles: &'a mut [Vec<Pixel>],
-    /// Row by row.
+    /// The first samples, row by row.
     pub(crate) first: Option<FirstRows<'a>>,
     /// The cover, in scenes without background.
     pub(crate) cover: Option<CoverRows<'a>>,
@@ -128,7 +128,7 @@ impl Film {
         self.plan.raise(count)
     }
 
-    /// The first samples of its pixels.
+    /// Returns the first samples of the film's pixels.
     pub(crate) fn into_first(self) -> Option<First> {
         self.first
     }
@@ -296,12 +296,12 @@ impl Film {
 pub(crate) enum Color {
     /// The colour of the only sample, [`quantised`].
     Sample([u16; CHANNELS]),
-    /// Of several.
+    /// The mean of several samples.
     Mean(DVec3),
 }
 
 impl Color {
-    /// In 0..1.
+    /// Returns the colour in 0..1.
     pub(crate) fn unit(&self) -> DVec3 {
         match self {
             Self::Sample(color) => DVec3::from_array(color.map(f64::from)) / ONE,

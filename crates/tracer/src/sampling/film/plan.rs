@@ -49,7 +49,7 @@ const BAND: usize = 16;
 pub(crate) struct PassTargets<'a> {
     chain: &'a SampleSchedule,
     density: Option<&'a Density>,
-    /// Who gets something.
+    /// The pixels that get samples.
     pub(crate) pixels: &'a Bits,
     /// Whether the pass gives the first sample to pixels that may get no other.
     pub(crate) is_first_look: bool,
@@ -97,7 +97,7 @@ pub(crate) struct Judged<'a> {
     unsettled: BitRows<'a>,
     spreading: Vec<BitRows<'a>>,
     uneven: BitRows<'a>,
-    /// While it counts.
+    /// Pixels that count as varying, until densities are computed.
     varying: Option<BitRows<'a>>,
 }
 
@@ -126,7 +126,7 @@ pub(super) struct Plan {
     /// Pixels that vary so much that even neighbours may have missed a part of it: one set for each number of samples
     /// of those neighbours, from the second of the chain on.
     spreading: Vec<Bits>,
-    /// Whose samples differ.
+    /// Pixels whose samples differ.
     uneven: Bits,
     /// Pixels that count as varying. Empty once densities are computed.
     varying: Bits,
