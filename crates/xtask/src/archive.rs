@@ -11,7 +11,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 /// A file in an archive.
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {
-    /// Its path, with slashes.
+    /// The path of the file, with slashes.
     pub(crate) name: String,
     bytes: Vec<u8>,
     mode: u32,
