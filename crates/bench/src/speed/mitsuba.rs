@@ -15,7 +15,7 @@ const PROGRAM: &str = include_str!("mitsuba_peer.py");
 pub(crate) struct Seconds {
     /// The time of camera rays and shadow rays together.
     pub(crate) seconds: f64,
-    /// The number of these rays.
+    /// The number of camera rays and shadow rays.
     pub(crate) rays: f64,
 }
 
