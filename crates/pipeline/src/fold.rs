@@ -44,7 +44,7 @@ use crate::{Clock, Error, Result, invariants};
 /// The outcome of a fold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Folded {
-    /// There is no result that a manifest shows, so the manifest was not read.
+    /// The invocation changed nothing that a manifest shows, so it did not read the manifest.
     Untouched,
     /// The manifest, by another writer, showed the fact. Nothing was listed.
     Covered,

@@ -207,7 +207,7 @@ pub(crate) struct Subject {
     pub(crate) animation: Animation,
     pub(crate) name: ScriptName,
     pub(crate) part: Part,
-    /// The rows of it, if not all.
+    /// The rows to draw, if these are not all rows of the frame.
     woken: Option<Woken>,
     /// The version of a part or a band. If another version is current, there is nothing to draw.
     only: Option<ETag>,
