@@ -31,9 +31,9 @@ pub(super) struct MaterialInfo {
 
 /// The parser's data about a group.
 pub(super) struct GroupInfo {
-    /// The largest number of objects that drawing it draws.
+    /// The largest number of objects that one use of the group draws.
     pub(super) drawn: usize,
-    /// The largest number of groups that drawing it draws.
+    /// The largest number of groups that one use of the group draws.
     pub(super) uses: usize,
     /// The looks of its objects.
     pub(super) looks: Looks,

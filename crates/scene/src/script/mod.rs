@@ -189,7 +189,7 @@ impl ClauseLine {
 pub(crate) struct Group {
     name: Box<str>,
     objects: Objects,
-    /// The largest number of objects that drawing it draws.
+    /// The largest number of objects that one use of it draws.
     drawn: usize,
 }
 

@@ -79,7 +79,7 @@ impl GroupRecorder {
         self.others.push((self.still.len(), drawn));
     }
 
-    /// Finishes the group. `drawn` is the largest number of objects that drawing it draws.
+    /// Finishes the group. `drawn` is the largest number of objects that one use of it draws.
     pub(crate) fn finish(self, name: &str, drawn: usize) -> Group {
         let list = Sequence { still: self.still.into(), others: self.others };
         let objects = Objects { list, surfaces: self.surfaces.0, lines: self.lines };
