@@ -39,7 +39,7 @@ pub(crate) struct Film {
     job: Job,
     /// The script and the index of each frame, in the order in which they are shown.
     frames: Vec<(Arc<Script>, usize)>,
-    /// The seconds of those frames that have their own.
+    /// The durations, in seconds, of the frames that have their own duration.
     durations: BTreeMap<u64, f64>,
     file: Bounded,
     encoding: Option<Encoding<Bounded>>,
