@@ -140,7 +140,7 @@ impl Bright {
         Some(Self { brightness, form: Form::Pane(Pane::new(Edge::Rectangle, origin, sides, true)?) })
     }
 
-    /// Returns what is somewhere in a box.
+    /// Returns a bright object somewhere in a box.
     pub(crate) fn within(brightness: f64, bounds: [DVec3; 2]) -> Self {
         Self { brightness, form: Form::Within(bounds) }
     }
