@@ -16,6 +16,7 @@ use glam::{DVec2, DVec3, I64Vec2, Vec3};
 use crate::error::{AssetError, Fault};
 use crate::limits;
 use crate::model::{Model, NONE, Parts, too_many_triangles};
+use outline::contours;
 use plate::Plate;
 use shaping::Glyph;
 
@@ -218,7 +219,11 @@ pub(crate) fn cut(lettering: &Lettering, font: &Font) -> Result<Option<Model>, L
         let down = (1.2 * (number * font.em) as f64).round() as i64;
         for Glyph { glyph, x, y } in line.glyphs {
             if let std::collections::hash_map::Entry::Vacant(entry) = plates.entry(glyph) {
-                entry.insert(Plate::of_glyph(font, glyph).map_err(intricate)?);
+                let contours = contours(font, glyph).map_err(|fault| match &lettering.font {
+                    Some(name) => fault.of_font(name).into(),
+                    None => intricate(fault),
+                })?;
+                entry.insert(Plate::new(contours).map_err(intricate)?);
             }
             if !plates[&glyph].is_empty() {
                 placed.push(Placed { glyph, at: I64Vec2::new(start + x * font.unit, y * font.unit - down) });

@@ -9,8 +9,7 @@ use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::i_float::int::point::IntPoint;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use super::Font;
-use super::outline::{Contour, Corner, contours};
+use super::outline::{Contour, Corner};
 use crate::error::Fault;
 
 /// The largest distance from the middle of joined outlines, in units of the grid. Predicates with such numbers are exact.
@@ -47,11 +46,6 @@ pub(super) struct Side {
 }
 
 impl Plate {
-    /// Makes the shape of a glyph.
-    pub(super) fn of_glyph(font: &Font, glyph: u32) -> Result<Self, Fault> {
-        Self::new(contours(font, glyph)?)
-    }
-
     /// Joins shapes, each at a place.
     pub(super) fn joined(parts: &[(&Self, I64Vec2)]) -> Result<Self, Fault> {
         let corners: usize = parts.iter().flat_map(|(part, _)| &part.contours).map(Vec::len).sum();
@@ -65,7 +59,8 @@ impl Plate {
         Self::new(contours.collect())
     }
 
-    fn new(contours: Vec<Contour>) -> Result<Self, Fault> {
+    /// Makes the shape of contours.
+    pub(super) fn new(contours: Vec<Contour>) -> Result<Self, Fault> {
         let Some(bounds) = bounds(&contours) else { return Ok(Self::default()) };
         let middle = (bounds[0] + bounds[1]) / 2;
         if (bounds[1] - middle).max_element() > REACH {

@@ -322,6 +322,20 @@ fn a_font_that_is_cut_off_is_an_error() {
 }
 
 #[test]
+fn a_faulty_glyph_is_a_fault_of_its_font() {
+    let mut font = dejavu::sans::regular().to_vec();
+    let count = usize::from(u16::from_be_bytes([font[4], font[5]]));
+    let entry = (0..count).map(|k| 12 + 16 * k).find(|at| &font[*at..at + 4] == b"glyf").unwrap();
+    let number = |at: usize| u32::from_be_bytes(font[at..at + 4].try_into().unwrap()) as usize;
+    let (start, length) = (number(entry + 8), number(entry + 12));
+    font[start..start + length].iter_mut().step_by(7).for_each(|byte| *byte ^= 0x55);
+    let error = letters(&font).unwrap();
+    assert!(error.to_string().starts_with("`f`: glyph "), "{error}");
+    assert!(error.to_string().contains(" of the font is faulty ("), "{error}");
+    assert_eq!(error.help().unwrap(), "fonts are TrueType and OpenType (.ttf, .otf, .ttc)");
+}
+
+#[test]
 fn fonts_that_are_none_are_errors() {
     let said = |bytes: &[u8]| letters(bytes).unwrap().to_string();
     let font = dejavu::sans::bold();
