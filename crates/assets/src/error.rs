@@ -1,5 +1,6 @@
 //! The reasons why a file that a script names cannot be used.
 
+use crate::files::likeness;
 use crate::limits;
 
 /// The reason why a file cannot be used. It names the file.
@@ -87,9 +88,7 @@ impl AssetError {
     /// Returns advice for a correction.
     pub fn help(&self) -> Option<String> {
         Some(match self {
-            Self::Absent { similar: Some(similar), .. } => {
-                format!("there is `{similar}`: names are compared byte for byte")
-            }
+            Self::Absent { similar: Some(similar), name } => likeness(similar, name),
             Self::Extension { extension, .. } => match extension.as_str() {
                 "KHR_draco_mesh_compression" => {
                     "export without compression: in Blender, clear `Compression` under `Data`".into()

@@ -157,6 +157,15 @@ pub fn file_name(name: &str) -> Result<(), NameFault> {
     Ok(())
 }
 
+/// Describes the file that is there in place of one of another name, which differs from its own as `same_but_for_case` says.
+pub(crate) fn likeness(there: &str, wanted: &str) -> String {
+    let form = match there.nfc().eq(wanted.nfc()) {
+        true => ", whose letters are in another Unicode normal form",
+        false => "",
+    };
+    format!("there is `{there}`{form}: names are compared byte for byte")
+}
+
 /// Returns whether two names differ, and only in letter case or in their Unicode normal forms.
 pub fn same_but_for_case(a: &str, b: &str) -> bool {
     let plain = |name: &str| name.nfkc().flat_map(char::to_lowercase).nfkc().collect::<String>();

@@ -463,6 +463,10 @@ mod tests {
         let library = Library::new(MemoryFiles::from([("Corner.OBJ", CORNER.to_vec())]));
         let error = library.model("corner.obj", Smoothing::Flat).unwrap_err();
         assert_eq!(error.help().unwrap(), "there is `Corner.OBJ`: names are compared byte for byte");
+        let library = Library::new(MemoryFiles::from([("u\u{308}.obj", CORNER.to_vec())]));
+        let error = library.model("\u{fc}.obj", Smoothing::Flat).unwrap_err();
+        let help = "there is `u\u{308}.obj`, whose letters are in another Unicode normal form: names are compared byte for byte";
+        assert_eq!(error.help().unwrap(), help);
         let error = Library::none().model("corner.obj", Smoothing::Flat).unwrap_err();
         assert!(error.to_string().contains("files are not read here"), "{error}");
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::{AssetError, Fault, shortened};
-use crate::files::{FileInfo, Files, file_name, same_but_for_case};
+use crate::files::{FileInfo, Files, file_name, likeness, same_but_for_case};
 use crate::limits;
 use crate::picture::{self, Picture};
 
@@ -168,8 +168,8 @@ impl<'a> Referred<'a> {
 
     /// Returns the warning that a model lacks an optional file, with the effect of that.
     pub(crate) fn absence(&self, path: &str, effect: &str) -> String {
-        let similar = similar(self.files, last_part(path));
-        let similar = similar.map(|other| format!(" (there is `{other}`: names are compared byte for byte)"));
+        let name = last_part(path);
+        let similar = similar(self.files, name).map(|other| format!(" ({})", likeness(&other, name)));
         format!("there is no file `{}`{}: {effect}", shortened(path), similar.unwrap_or_default())
     }
 
