@@ -27,9 +27,7 @@ impl<'a> Iterator for Lines<'a> {
             self.rest = rest;
             let line = line.trim_ascii_end();
             let (line, goes_on) = match line.strip_suffix(b"\\") {
-                Some(line) if whole.is_some() || !line.trim_ascii_start().starts_with(b"#") => {
-                    (line, !rest.is_empty())
-                }
+                Some(line) if !line.contains(&b'#') => (line, !rest.is_empty()),
                 _ => (line, false),
             };
             match &mut whole {

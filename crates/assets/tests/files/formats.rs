@@ -326,7 +326,7 @@ fn what_only_some_lines_of_an_obj_have_is_that_of_these_lines() {
 #[test]
 fn a_comment_of_an_obj_neither_goes_on_nor_counts() {
     let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt .5\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
-    let commented = "# from C:\\models\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 \\  \n 0 #1\n\
+    let commented = "# from C:\\models\\\nv 0 0 0 # here\nv 1 0 0 # C:\\models\\\nv 0 1 \\  \n 0 #1\\\n\
                      vt .5 # u\nvn 0 0 1 #\nf 1/1/1 2/1/1 3/1/1 # 4/4/4\n";
     let [plain, commented] = [plain, commented].map(|text| model("a.obj", text.into()));
     assert_eq!(triangles(&plain), triangles(&commented));
