@@ -3,6 +3,7 @@
 use crate::error::{AssetError, Fault};
 use crate::model::{Model, Parts};
 use crate::referred::Referred;
+use crate::text::{unmarked, with_line_feeds};
 use crate::{gltf, obj, ply, stl};
 
 /// Makes a model of the bytes of the file with this name, with the normals of the file.
@@ -20,13 +21,14 @@ fn read(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Parts, 
     if bytes.starts_with(b"glTF") {
         return gltf::read_binary(name, bytes, referred);
     }
-    if bytes.starts_with(b"ply") {
-        return ply::read(bytes);
+    let text = unmarked(bytes);
+    if text.starts_with(b"ply") {
+        return ply::read(text);
     }
     if stl::is_binary(bytes) {
         return stl::read_binary(bytes);
     }
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = &*with_line_feeds(text);
     if text.trim_ascii_start().starts_with(b"{") {
         return gltf::read_text(name, text, referred);
     }
@@ -35,7 +37,7 @@ fn read(name: &str, bytes: &[u8], referred: &mut Referred<'_>) -> Result<Parts, 
     }
     // Foreign bytes would be lines that say nothing.
     if text[..text.len().min(4096)].contains(&0) {
-        return Err(stl::cut_off(name, bytes).unwrap_or_else(Fault::no_model));
+        return Err(stl::of_another_length(name, bytes).unwrap_or_else(Fault::no_model));
     }
     obj::read(text, referred)
 }

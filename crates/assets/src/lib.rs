@@ -35,6 +35,7 @@ mod ply;
 mod referred;
 mod srgb;
 mod stl;
+mod text;
 mod texture;
 
 pub use closure::Closure;

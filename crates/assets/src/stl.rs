@@ -17,14 +17,15 @@ pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     bytes.len() as u64 == HEAD as u64 + TRIANGLE as u64 * u64::from(count)
 }
 
-/// Returns the fault of a binary file that is shorter than its header says. Any bytes can look like one, so its name decides.
-pub(crate) fn cut_off(name: &str, bytes: &[u8]) -> Option<Fault> {
+/// Returns the fault of a binary file that is not as long as its header says. Any bytes can look like one, so its name decides.
+pub(crate) fn of_another_length(name: &str, bytes: &[u8]) -> Option<Fault> {
     let count = bytes.get(80..HEAD).filter(|_| name.to_ascii_lowercase().ends_with(".stl"))?;
     let count = u64::from(u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
     let (whole, there) = (HEAD as u64 + TRIANGLE as u64 * count, bytes.len() as u64);
+    let why = if there < whole { "cut off" } else { "too long" };
     let what =
-        format!("it has {there} bytes of {whole} for {count} triangles: it is cut off, or no binary STL");
-    (there < whole).then(|| Fault::new(what))
+        format!("it has {there} bytes of {whole} for {count} triangles: it is {why}, or no binary STL");
+    (there != whole).then(|| Fault::new(what))
 }
 
 /// Returns whether the bytes are a text: it begins with `solid`, and has a facet or an end.

@@ -8,6 +8,7 @@ use crate::error::{Fault, shortened};
 use crate::limits;
 use crate::model::Look;
 use crate::referred::Referred;
+use crate::text::{unmarked, with_line_feeds};
 use crate::texture::Texture;
 
 /// A picture that a material names: the library of materials, the line in it, and the path.
@@ -129,8 +130,8 @@ impl Reader {
     fn read_materials(&mut self, file: &str, bytes: &[u8], refer: &mut Referred<'_>) -> Result<(), Fault> {
         let within = |fault: Fault| within(file, fault);
         let mut look: Option<u32> = None;
-        let rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        for (line, text) in (Lines { rest, number: 0 }) {
+        let rest = with_line_feeds(unmarked(bytes));
+        for (line, text) in (Lines { rest: &rest, number: 0 }) {
             let mut words = words(&text);
             match words.next() {
                 Some(b"newmtl") => {

@@ -253,6 +253,42 @@ fn what_is_wrong_is_said() {
     }
 }
 
+#[test]
+fn texts_of_other_systems_are_read() {
+    let read = |text: &str, name: &str| {
+        let mtl = b"newmtl red\rKd 1 0 0\r".to_vec();
+        let files = MemoryFiles::from([(name, text.as_bytes().to_vec()), ("a.mtl", mtl)]);
+        Library::new(files).model(name, Smoothing::OfFile).unwrap_or_else(|error| panic!("{name}: {error}"))
+    };
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    for (name, text) in [("x.obj", text(obj())), ("x.ply", text(ply_text())), ("x.stl", text(stl_text()))] {
+        for other in [format!("\u{feff}{text}"), text.replace('\n', "\r\n"), text.replace('\n', "\r")] {
+            assert_eq!(triangles(&read(&other, name)), expected(), "{name}");
+        }
+    }
+    let red = read(&format!("mtllib a.mtl\rusemtl red\r{}", text(obj()).replace('\n', "\r")), "x.obj");
+    assert_eq!(red.look_color(red.look(0), false), DVec3::X);
+}
+
+#[test]
+fn a_binary_stl_of_another_length_is_said() {
+    let fault = |bytes: Vec<u8>| {
+        let library = Library::new(MemoryFiles::from([("x.stl", bytes)]));
+        library.model("x.stl", Smoothing::OfFile).map(|_| ()).unwrap_err().to_string()
+    };
+    let [mut longer, mut shorter] = [stl_binary(), stl_binary()];
+    longer.push(b'\n');
+    shorter.pop();
+    assert_eq!(
+        fault(longer),
+        "`x.stl`: it has 285 bytes of 284 for 4 triangles: it is too long, or no binary STL"
+    );
+    assert_eq!(
+        fault(shorter),
+        "`x.stl`: it has 283 bytes of 284 for 4 triangles: it is cut off, or no binary STL"
+    );
+}
+
 /// Returns a binary PLY of the tetrahedron whose faces are lists of `kind`, each with its corners.
 fn ply_with_faces(little: bool, kind: &str, faces: &[Vec<u32>]) -> Vec<u8> {
     let order = if little { "little" } else { "big" };
