@@ -27,6 +27,12 @@ pub(super) struct Document {
     pub(super) cameras: Vec<IgnoredAny>,
 }
 
+/// A document of any version.
+#[derive(Debug, Deserialize)]
+pub(super) struct Versioned {
+    pub(super) asset: Asset,
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Asset {

@@ -11,9 +11,9 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec2};
 
 use self::accessor::Buffers;
 use self::address::{data, decoded_path};
-use self::document::{Document, Material, Node, Primitive, TextureInfo};
+use self::document::{Document, Material, Node, Primitive, TextureInfo, Versioned};
 use self::pictures::{Pictures, coordinates};
-use crate::error::Fault;
+use crate::error::{Fault, shortened};
 use crate::limits;
 use crate::model::{Colors, Look, NONE, Parts, too_many_triangles, unit};
 use crate::referred::Referred;
@@ -62,8 +62,15 @@ pub(crate) fn read_text(name: &str, text: &[u8], referred: &mut Referred<'_>) ->
 
 fn read(name: &str, json: &[u8], binary: Option<&[u8]>, referred: &mut Referred<'_>) -> Result<Parts, Fault> {
     bounded(json)?;
-    let document: Document = serde_json::from_slice(json)
-        .map_err(|error| Fault::at(error.line(), format!("its JSON: {error}")))?;
+    let document: Document = serde_json::from_slice(json).map_err(|error| {
+        // Other versions have other types.
+        match serde_json::from_slice(json) {
+            Ok(Versioned { asset }) if !asset.version.is_empty() && !asset.version.starts_with("2.") => {
+                Fault::new(format!("it is glTF of version {}, not 2", shortened(&asset.version)))
+            }
+            _ => Fault::at(error.line(), format!("its JSON: {error}")),
+        }
+    })?;
     if !document.asset.version.starts_with("2.") {
         return Err(Fault::new("it is not glTF of version 2"));
     }
@@ -218,6 +225,9 @@ fn paint(
     Ok(())
 }
 
+/// The most extensions that a warning names.
+const NAMED: usize = 5;
+
 /// Names the parts of a file that are not used.
 fn unused(document: &Document) -> Option<String> {
     let any = |has: fn(&Material) -> bool| document.materials.iter().any(has);
@@ -237,7 +247,19 @@ fn unused(document: &Document) -> Option<String> {
         (any(|m| m.normal_texture.is_some()), "normal maps"),
         (any(|m| m.occlusion_texture.is_some()), "occlusion maps"),
     ];
-    let names: Vec<&str> = parts.iter().filter(|(is_there, _)| *is_there).map(|(_, name)| *name).collect();
+    let mut names: Vec<String> =
+        parts.iter().filter(|(is_there, _)| *is_there).map(|(_, name)| (*name).into()).collect();
+    // What is compressed, and not required, is there without compression as well.
+    let is_unknown = |extension: &&String| {
+        !KNOWN.contains(&extension.as_str())
+            && *extension != "KHR_lights_punctual"
+            && !extension.ends_with("_compression")
+    };
+    let unknown: Vec<&String> = document.extensions_used.iter().filter(is_unknown).collect();
+    names.extend(unknown.iter().take(NAMED).map(|extension| shortened(extension)));
+    if unknown.len() > NAMED {
+        names.push(format!("{} more extensions", unknown.len() - NAMED));
+    }
     (!names.is_empty()).then(|| format!("its {} are not used", names.join(", ")))
 }
 

@@ -190,24 +190,31 @@ fn nodes_move_and_mirrors_turn_faces() {
     assert_eq!(nested.corners(0)[0], DVec3::new(1.0, 1.0, 0.0));
 }
 
+/// A glTF of one triangle, whose positions are in a buffer at this address.
+fn gltf(uri: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":
+        {{"POSITION":0}}}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],"buffers":[{{"uri":"{uri}","byteLength":36}}]}}"#
+    )
+}
+
+/// The address of a buffer that is data: three corners.
+fn corners_as_data() -> String {
+    let corners: Vec<u8> = CORNERS[..3].iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+    format!("data:application/octet-stream;base64,{}", base64_simd::STANDARD.encode_to_string(&corners))
+}
+
 #[test]
 fn data_and_files_are_buffers() {
     let corners: Vec<u8> = CORNERS[..3].iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-    let json = |uri: &str| {
-        format!(
-            r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":
-            {{"POSITION":0}}}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
-            "bufferViews":[{{"buffer":0,"byteLength":36}}],"buffers":[{{"uri":"{uri}","byteLength":36}}]}}"#
-        )
-    };
-    let encoded = base64_simd::STANDARD.encode_to_string(&corners);
-    let data = json(&format!("data:application/octet-stream;base64,{encoded}"));
+    let data = gltf(&corners_as_data());
     assert_eq!(model("a.gltf", data.into_bytes()).triangle_count(), 1);
-    let files = MemoryFiles::from([("a.gltf", json("./parts/a%20b.bin").into_bytes()), ("a b.bin", corners)]);
+    let files = MemoryFiles::from([("a.gltf", gltf("./parts/a%20b.bin").into_bytes()), ("a b.bin", corners)]);
     let library = Library::new(files);
     assert_eq!(library.model("a.gltf", Smoothing::OfFile).unwrap().triangle_count(), 1);
     assert_eq!(library.sources("a.gltf")[1], ("a b.bin".to_string(), "parts/a b.bin".to_string()));
-    let alone = Library::new(MemoryFiles::from([("a.gltf", json("a.bin").into_bytes())]));
+    let alone = Library::new(MemoryFiles::from([("a.gltf", gltf("a.bin").into_bytes())]));
     let error = alone.model("a.gltf", Smoothing::OfFile).unwrap_err();
     assert_eq!(error, AssetError::Absent { name: "a.bin".into(), similar: None });
 }
@@ -243,6 +250,10 @@ fn what_is_wrong_is_said() {
         (
             b"{\n\"nodes\": 7}",
             "`x`, line 2: its JSON: invalid type: integer `7`, expected a sequence at line 2 column 10",
+        ),
+        (
+            br#"{"asset":{"version":"1.0"},"scene":"defaultScene","nodes":{"a":{}}}"#,
+            "`x`: it is glTF of version 1.0, not 2",
         ),
         (
             br#"{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}"#,
@@ -286,6 +297,30 @@ fn a_binary_stl_of_another_length_is_said() {
     assert_eq!(
         fault(shorter),
         "`x.stl`: it has 283 bytes of 284 for 4 triangles: it is cut off, or no binary STL"
+    );
+}
+
+#[test]
+fn what_of_a_gltf_is_not_used_is_named() {
+    let warnings = |extensions: &str| {
+        let extended = gltf(&corners_as_data()).replacen(
+            '{',
+            &format!("{{\"skins\":[{{}}],\"extensionsUsed\":[{extensions}],"),
+            1,
+        );
+        model("x.gltf", extended.into()).warnings().join("\n")
+    };
+    assert_eq!(warnings(r#""KHR_materials_unlit""#), "its skins are not used");
+    // These have other data beside theirs, unless they are required.
+    assert_eq!(warnings(r#""KHR_draco_mesh_compression""#), "its skins are not used");
+    assert_eq!(
+        warnings(r#""KHR_lights_punctual","KHR_materials_pbrSpecularGlossiness","EXT_mesh_gpu_instancing""#),
+        "its skins, lights, KHR_materials_pbrSpecularGlossiness, EXT_mesh_gpu_instancing are not used"
+    );
+    let many: Vec<_> = (0..9).map(|k| format!("\"EXT_{k}\"")).collect();
+    assert_eq!(
+        warnings(&many.join(",")),
+        "its skins, EXT_0, EXT_1, EXT_2, EXT_3, EXT_4, 4 more extensions are not used"
     );
 }
 
