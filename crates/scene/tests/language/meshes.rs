@@ -185,6 +185,14 @@ fn doubts_about_a_mesh_are_warnings() {
     );
 }
 
+/// Programs write the two ends of a seam, or the points of a pole, with roundoff between them.
+#[test]
+fn glass_with_a_hairline_gap_says_how_to_close_it() {
+    let said = parsed("Material g glass 1 1 1 1.5\nMesh \"corner.obj\" g").diagnostics;
+    let help = said[0].help.as_deref().unwrap();
+    assert!(help.contains("merge them by distance"), "{help}");
+}
+
 #[test]
 fn a_caller_without_files_says_who_reads_them() {
     let parsed = parse("a.txt", b"Screen 4 3\nMesh \"corner.obj\"\nTrace", &Limits::default());

@@ -73,8 +73,14 @@ pub(in crate::parse) fn open_glass(what: &str, closure: &Closure) -> Fault {
         Closure::InsideOut => "is inside out: its faces are seen clockwise from outside".to_string(),
         Closure::NoVolume | Closure::Closed => "has no volume".to_string(),
     };
+    let help = match closure {
+        Closure::Open(_) => {
+            "a closed model refracts. Points that differ by roundoff leave a gap: merge them by distance before the export"
+        }
+        _ => "a closed model, whose faces are seen counterclockwise from outside, refracts",
+    };
     Fault::new(Code::GlassPanes, format!("{what} {why}, so its glass is panes that do not refract"))
-        .help("a closed model, whose faces are seen counterclockwise from outside, refracts")
+        .help(help)
 }
 
 pub(in crate::parse) fn own_without_file(command: Command) -> Fault {
