@@ -1,8 +1,8 @@
 //! Measurements of rayfold, and the reports that they write.
 //!
 //! Each subcommand of the program is a module and writes one report. Parts that several of them share (the oracle, the
-//! hard cases, the backends, the scenes) are modules beside them. Nothing that ships depends on this crate. Each number
-//! in a report was measured by the run that wrote the report.
+//! hard cases, the backends, the scenes) are modules beside them. The feature `bucket` (on by default) adds the
+//! subcommands that need the AWS SDK. Each number in a report was measured by the run that wrote the report.
 
 #![allow(clippy::print_stderr, reason = "a measurement says what it is at")]
 

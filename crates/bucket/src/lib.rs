@@ -1,8 +1,8 @@
 //! An S3-compatible object store in a folder, which runs in the process that starts it.
 //!
 //! [`Server::start`] opens the folder and serves S3's protocol on an address. The caller provides the owner's key
-//! ([`Options::root`]) and the receiver of events ([`Options::webhook`]). Every acknowledged change is on disk, and
-//! its event is written in the same commit.
+//! ([`Options::root`]) and the receiver of events ([`Options::webhook`]). Every acknowledged change is on disk, and its
+//! event is written in the same commit.
 //!
 //! The store does not interpret keys or bodies.
 //!
@@ -21,6 +21,21 @@
 //! server.stop().await;
 //! # Ok(()) }
 //! ```
+//!
+//! A request passes these modules:
+//!
+//! 1. `connection_service` gives it an id. `gate` refuses every operation, header and element that its tables lack.
+//!    `cors` answers browsers.
+//! 2. `s3s` (a dependency) checks signatures and parses the protocol. `identity` and `policy` decide about the caller's
+//!    rights.
+//! 3. `service` has one module per family of operations. `ingest` and `body_stream` stream bodies.
+//! 4. `storage::writer` commits pending changes as one batch with one sync of the `journal`, then applies it to
+//!    `database` (redb). `bodies` stores large bodies as files. `delivery` sends events to the webhook.
+//!
+//! `opening` refuses files that are damaged or do not belong together. `check` and `salvage` read a damaged folder.
+//! `medium` is an interface to the disk, so that tests can cut the power (`power`) and damage files (`damage`).
+//!
+//! Invariants: a refusal changes nothing. A body file without a row is garbage.
 
 mod answer;
 mod check;

@@ -1,8 +1,17 @@
 //! The `rayfold` command, as a library for its `main` alone.
 //!
-//! Each subcommand is a module with its flags (`Args`) and a function `run`. `run` takes the flags and the `Console`,
-//! which holds the resolved global flags and environment. Data goes to standard output, everything for people to
-//! standard error. Exit codes: see `outcome`.
+//! `app` parses the flags. `Console` holds the global flags and the environment, resolved once. Each subcommand is a
+//! module with its flags (`Args`) and a function `run`, which takes both and returns the exit code (`Outcome`).
+//!
+//! - `render` first reads all scripts (`plan`, `survey`). `render/movie` writes the container (GIF, APNG, WebP, Y4M).
+//!   `render/fit` finds the quality that fits into a size. `render/passes` writes the files beside images
+//!   (`docs/passes.md`).
+//! - `encode` reads images and videos (`encode/picture`).
+//! - `cloud` is the command-line interface to `client`.
+//! - Without the feature `network` (on by default), only the subcommands that need no network are built. `elsewhere`
+//!   has the message for the others.
+//!
+//! `docs/commands` has the help of each subcommand, and a test compares them.
 
 mod ahead;
 mod app;

@@ -1,10 +1,19 @@
 //! A client for animations in a bucket: uploads scripts, reports progress, downloads frames and GIFs.
 //!
-//! The command line, the web page and the Python package are built on this crate. Like the functions, the client reads all state
-//! from the bucket and keeps none, so an interrupted operation resumes from the bucket's contents. It knows no
-//! terminal, no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store) and time a
-//! [`Clock`](rayfold_pipeline::Clock). It reports progress as values ([`Sending`], [`Waiting`], [`RemoveProgress`])
-//! to a closure of the caller. [`cost`] estimates what an animation costs on AWS.
+//! The command line, the web page and the Python package are built on this crate. Like the functions, the client reads
+//! all state from the bucket and keeps none, so an interrupted operation resumes from the bucket's contents. It knows
+//! no terminal, no flags and no S3: the bucket is a [`Store`](rayfold_pipeline::store::Store) and time a
+//! [`Clock`](rayfold_pipeline::Clock). It reports progress as values ([`Sending`], [`Waiting`], [`RemoveProgress`]) to
+//! a closure of the caller.
+//!
+//! - `submit` makes an animation's folder in the bucket equal to a local one. It deletes only scripts that the caller
+//!   asked to delete.
+//! - `watch` polls until the outputs exist.
+//! - `status`, `fetch`, `retry` and `remove` are the commands of the same names. An object that is replaced during a
+//!   read is read again.
+//! - `download` writes an output to a file.
+//! - `explain` has the words for errors.
+//! - [`cost`] estimates the price of an animation on AWS.
 //!
 //! ```
 //! use rayfold_client::{Client, File, Submission, Submitted};

@@ -1,14 +1,15 @@
 //! The single way in which the project's programs read and write a user's files.
 //!
-//! A file is written under a short random name in its target folder, and renamed when it is complete. If anything
-//! ends the run before that (an error, a full disk, Ctrl-C), the old file stays. A run that is killed leaves its
-//! temporary file behind. A later run that writes into the same folder removes it (`leftover`).
+//! A file is written under a short random name in its target folder, and renamed when it is complete ([`OutputFile`]).
+//! If anything ends the run before that (an error, a full disk, Ctrl-C), the old file stays. A run that is killed
+//! leaves its temporary file behind. A later run that writes into the same folder removes it (`leftover`).
 //!
-//! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files. [`library_beside`] gives the
-//! models in the folder of a script.
+//! [`Folder`] reads a folder as an animation: its scripts, its settings, and misnamed files. [`library_beside`] returns
+//! the models in the folder of a script. [`files_beside`] returns the files alone, for a library that also has others.
+//! [`open`] accepts regular files only.
 //!
-//! This crate knows neither pictures nor signals, and of scenes only the names of files. A program that exits
-//! without unwinding calls [`remove_unfinished`].
+//! This crate knows neither pictures nor signals, and of scenes only the names of files. A program that exits without
+//! unwinding calls [`remove_unfinished`].
 //!
 //! ```
 //! use std::io::Write;

@@ -38,6 +38,31 @@
 //! assert!(gif.starts_with(b"GIF89a"));
 //! # Ok::<(), rayfold_gif::Error>(())
 //! ```
+//!
+//! # Inside
+//!
+//! `encoder` checks frames and writes. `quantise` calls the steps.
+//!
+//! Preparing a frame:
+//!
+//! 1. `exact` keeps a frame of at most 256 colours without loss, unless it is large and drifts.
+//! 2. `update_map` compares the frame with the picture that a viewer will see before it. Each pixel is drawn, left or
+//!    refined.
+//! 3. `refine_budget` limits the refinement.
+//! 4. `bound` computes the largest error that a pixel may have, from a palette for this frame alone.
+//! 5. `plan` makes a histogram of the drawn colours (`histogram`), and a palette by splitting, then k-means
+//!    (`palette`). It finds the nearest entry of each colour (`nearest`), and smaller palettes within the bound
+//!    (`quantised`).
+//!
+//! Drawing it:
+//!
+//! 1. `stripe` chooses the indices while `lzw` reads them, so that strings get long. `ahead` looks for the cheapest
+//!    string of the next pixels. A pixel that the next frame changes may have a larger error. Errors are diffused in
+//!    smooth surroundings only.
+//! 2. `block` writes the format.
+//!
+//! `alone` draws frames with alpha, each on a canvas that the block before has cleared. `state` suspends an animation.
+//! `timeline` sets delays. `thinning` drops frames. `colour` defines the measure of errors.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 

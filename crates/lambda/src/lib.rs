@@ -1,13 +1,19 @@
 //! The render and the assemble function on AWS Lambda, as thin wrappers: they take events, run the pipeline's steps,
 //! and return outcomes and logs.
 //!
-//! The two binaries are this crate with different handlers. The store's client is made once per cold start. Handlers
-//! take the payload as JSON and know nothing of the runtime, so they are tested without it. A handler repeats no
-//! decision of a step. `raytracer` and `animator` are the steps' renderer and animator.
+//! The two binaries are this crate with different handlers. The store's client is made once per cold start (`context`).
+//! Handlers take the payload as JSON and know nothing of the runtime, so they are tested without it. A handler repeats
+//! no decision of a step.
 //!
-//! Invariants: a batch gives one outcome per record. An error that another try cannot change never fails an
-//! invocation. A message that cannot be handled stays in its queue, or is logged with `unhandled`, which an alarm
-//! watches. Logs are JSON and hold no script contents.
+//! - `event` parses the events: S3's in the form of AWS and of MinIO, the schedule's, and batches of the failure queue.
+//! - `raytracer` and `animator` (by `movie`) implement the pipeline's traits.
+//! - `capacity` decides whether an invocation can bear a frame, and into how many bands to cut it. `joining` puts bands
+//!   together.
+//! - `answer` has the outcomes, and the failure that makes Lambda retry.
+//!
+//! Invariants: a batch gives one outcome per record. A permanent error is recorded, and never fails an invocation. A
+//! message that cannot be handled stays in its queue. Anything else that a function can neither handle nor hand on is
+//! logged with `unhandled`, which an alarm counts. Logs are JSON and hold no script contents.
 
 pub mod animator;
 pub mod answer;

@@ -1,8 +1,9 @@
 //! Encodes ordered frames into one file of an animation: GIF, APNG, WebP or YUV4MPEG2.
 //!
 //! An [`Encoding`] takes the frames one by one and writes as it goes, so that memory does not grow with their number.
-//! `rayfold-gif` encodes GIFs; the other containers are here. Every program that writes animations uses this crate, so that
-//! the same frames give the same bytes everywhere.
+//! [`Encoding::suspend`] stops between two frames, and [`Encoding::resume`] continues in another process, with the same
+//! bytes (`state`). `rayfold-gif` encodes GIFs; the other containers are the modules `apng`, `webp` and `y4m`. Every
+//! program that writes animations uses this crate, so that the same frames give the same bytes everywhere.
 
 mod apng;
 mod rate;

@@ -1,15 +1,33 @@
 //! The extension module of the Python package: scenes as text, pictures, animations.
 //!
-//! Python's side (`python/rayfold`) is small: it makes a method of each command in `signature::METHODS`, gives arrays
-//! their shape, and takes scenes from functions and iterators. This crate makes all checks, texts and pictures. A scene
-//! is the text of its script (`script`), so Python draws the same picture as `rayfold render` does from that text.
+//! A scene is the text of its script (`script`), so Python draws the same picture as `rayfold render` does from that
+//! text. This crate makes all checks, texts and pictures:
+//!
+//! 1. `signature` turns the table of commands and clauses into methods, parameters and keywords. `describe` makes their
+//!    docstrings and the type stub `__init__.pyi`, which a test compares.
+//! 2. A call binds its arguments, writes them as a line (`value`, `material`, `curve`), and lets the command check the
+//!    numbers (`Command::check`). A wrong argument is an error at the call.
+//! 3. `drawing` parses the text and draws frames ahead on the rayon pool, and looks for Ctrl-C while it waits.
+//!    `encoder` writes them. `folder` reads folders of scripts. `bucket` renders them in a bucket, by the crate
+//!    `client`.
+//! 4. Meshes and pictures from arrays are files in memory (`given`), named by the hash of their content: binary PLY,
+//!    PNG and OpenEXR (`arrays`). A script that names one finds it by the same trait as files in folders. They are
+//!    written beside saved scripts.
+//!
+//! Python's side (`python/rayfold`) is small. `_scene` makes a method of each command in `signature::METHODS` when it
+//! is first asked for. `_animation` takes scenes from functions and iterators. `_picture` is an array with a picture,
+//! and `_arrays` checks arrays and gives them their shape. Only the last two import NumPy, and only when they are
+//! needed, so that `import rayfold` is fast.
 //!
 //! `unsafe`: this crate writes none. PyO3's attributes expand to `unsafe` for the pointers that CPython passes when
 //! Python calls a Rust function. The lint allows that in code from other crates' macros, so `forbid` holds here as in
 //! the whole workspace.
 //!
 //! Invariants: Python's lock is released while a scene is parsed, drawn or encoded. A panic becomes a Python exception.
-//! The library is built without an interpreter; its tests are those of Python (`crates/python/tests`).
+//!
+//! Cargo builds the library without an interpreter, and `cargo clippy --workspace` checks it. A test program could not
+//! be linked, so there are no tests in Rust. The tests are pytest (`crates/python/tests`), run by `.ci/run`. `cargo
+//! xtask wheel` builds the file that pip installs.
 
 mod arrays;
 mod bucket;

@@ -1,7 +1,14 @@
 //! Parser and writer of scene scripts: text to typed scenes and back, with all diagnostics.
 //!
-//! Does no I/O: text comes in, scenes and diagnostics go out. It uses only one other crate of the project,
+//! The crate does no I/O: text comes in, scenes and diagnostics go out. It uses only one other crate of the project,
 //! `rayfold-assets`, which decodes the files that scripts name. The caller provides their bytes ([`parse_with_files`]).
+//! Frames are lazy: a frame is a few indices, and its [`Scene`] is built when a caller asks for it.
+//!
+//! Invariants:
+//!
+//! - [`parse`] returns a script if and only if it reports no error.
+//! - A valid line without curves and names allocates nothing.
+//! - The size of the text bounds time and memory, whatever the errors, the nesting of groups or the number of frames.
 //!
 //! ```
 //! use rayfold_scene::{Limits, parse};
@@ -13,6 +20,25 @@
 //! assert!(parsed.script.is_none());
 //! assert_eq!(parsed.diagnostics[0].help.as_deref(), Some("did you mean `Sphere`?"));
 //! ```
+//!
+//! # Inside
+//!
+//! - `command` is the one table of all commands. Parser, writer, hints, editors and the test of `docs/language.md` read
+//!   it.
+//! - `form` has the syntax of a command. A type that a line can hold implements `Scripted`. `form/color` decides where
+//!   a colour may be `#rrggbb`.
+//! - `model` is the typed scene, with a file per shape in `shapes` and per light in `lights`. Values with constraints
+//!   have constructors that check them.
+//! - `parse` reads lines (`line`), and names and groups (`definitions`). It checks lines with curves (`visibility`),
+//!   and warns about lines that lack their intended effect (`doubts`). It recognises files in other formats
+//!   (`foreign`), and writes the messages (`wording`).
+//! - `curve` is a number as a curve. `row` has the numbers of a line, and the conditions that they provably satisfy.
+//! - `script` has frames as ranges of one shared object list. `moment` evaluates curves and groups for one frame.
+//!   `origins` numbers its objects and has their lines.
+//! - `diagnostic` is an error or a warning with its place and text. `report` is a list of them, of limited length.
+//! - `language` is the table of commands as data for editors.
+//! - `name` has the classes of file names, `natural` the order of frames, and `limits` the limits. `settings` reads
+//!   `animation.json`, and `container` has the kinds of files that it can ask for.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 

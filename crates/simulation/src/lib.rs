@@ -16,6 +16,13 @@
 //! ```
 //! rayfold_simulation::run(1, None).expect("the protocol holds");
 //! ```
+//!
+//! [`explore`] models an invocation as a function from the replies received so far to its next requests, so that states
+//! can be copied and compared. A step can declare the values that its remaining behaviour depends on
+//! (`Invocation::forget_history_before`). Then [`explore`] drops the earlier history, which merges states.
+//!
+//! Rules that are broken on purpose ([`Mutation`]) are branches of the steps, so they stay in `pipeline`. Without the
+//! feature `simulation` none can be chosen.
 
 use std::sync::Arc;
 

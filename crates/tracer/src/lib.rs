@@ -19,6 +19,10 @@
 //! assert_eq!(image.dimensions(), (4, 3));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # Inside
+//!
+//! `docs/tracer.md` in the repository describes the phases and the modules.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 

@@ -2,16 +2,33 @@
 //! ([`rayfold_studio::browser`]). Its functions of numbers are called by the scripts of a page
 //! (`crates/studio/web/src/static/module.ts`).
 //!
-//! Each worker of the page has a module of its own, which works as a desk, as a drawer or as a reel. A call takes its
-//! bytes from one buffer and leaves its result in another. The page writes to the address that [`input`] returns, and
-//! [`call`]s. Then it reads the result from the address that [`output`] returns, with the length that [`call`] returns.
-//! The first byte of a result is 0 for success. It is 1 for an error, and then the error message follows.
+//! Each worker of the page has a module of its own, and workers share no memory. A module works as one of these:
+//!
+//! - [`Desk`] holds the session, and returns the tasks of the page's scripts ([`Effect`]). Its files are in memory
+//!   (`storage::Memory`), and the page keeps them in the browser's storage.
+//! - [`Drawer`] draws rows of a picture.
+//! - [`Reel`] draws and encodes the frames of an animation.
+//!
+//! A call takes its bytes from one buffer and leaves its result in another. The page writes to the address that
+//! [`input`] returns, and [`call`]s. Then it reads the result from the address that [`output`] returns, with the length
+//! that [`call`] returns. The first byte of a result is 0 for success. It is 1 for an error, and then the error message
+//! follows.
 //!
 //! A panic ends a module: the call does not return, and no other call may follow. Then [`fault`] returns the length of
 //! its message.
 //!
 //! The module imports nothing from the page. There is no unsafe code here. Exporting a name needs an exception from the
 //! lint `unsafe_code`, because two functions of one name would be undefined behaviour.
+//!
+//! # The page
+//!
+//! The page is that of the program, with another connection (`#connection`, `#runs`). `variant.ts` in `static` chooses
+//! one of two builds of the module. If a stack serves the page, it can submit, by the scripts in `static/stack`:
+//!
+//! - They sign requests to S3, and compute the state of runs from manifests, as `studio::runs` does for the program.
+//!   Tests compare both on the cases in `studio/src/runs/standing.json`.
+//! - `cost` computes the same estimate as `client::cost` from the same prices. A test compares them.
+//! - `retry` does the work of `pipeline::retry`, within the rights of a person.
 
 use std::fmt::Display;
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};

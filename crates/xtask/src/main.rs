@@ -1,7 +1,13 @@
 //! `cargo xtask`: chores that need more than Cargo, without a shell.
 //!
-//! Packages the function binaries for Lambda, the programs of a release and the Python package. Draws the pictures of
-//! the language page from its scripts.
+//! - `package` builds the zip files for Lambda, linked against the glibc of Amazon Linux 2023, and reproducible.
+//! - `dist` builds the archive of a release for the machine that it runs on, also reproducible. It runs the built
+//!   `rayfold` to make the completions and the manual pages.
+//! - `pictures` draws the pictures of `docs/language.md` from its scripts.
+//! - `site` builds the studio as a static site. `--draft` builds it sooner, with a larger module, for tests.
+//! - `wheel` builds the Python package with maturin.
+//!
+//! `package` and `dist` use `archive` (the zip file) and `sources` (the checkout and its copy).
 
 use clap::{Parser, Subcommand};
 
