@@ -11,6 +11,9 @@ export const REPLACED = { "@marijn/find-cluster-break": own("clusters.ts"), "w3c
 /** Rules of a theme for light or dark editors, with those inside of them. */
 const COLOURS = /^ {4}"&(light|dark)[^"]*": (\{[^{}\n]*\}|\{\n[^]*?\n {4}\}),?$/gm;
 
+/** What the packages say of wrong calls is for those who write an editor; the place of the error says it, too. */
+const WORDS_OF_ERRORS = [/new (Range)?Error\((?:"[^"]*"|`[^`]*`)\)/g, "new $1Error()"];
+
 /** Replacements in a package's text. Each must be found: a new version of the package may have moved its code. */
 const CUTS = {
   "@codemirror/view": [
@@ -25,10 +28,12 @@ const CUTS = {
     [/typeof (ResizeObserver|IntersectionObserver) == "function"/g, "true"],
     [/^ {4}tabSize: .*$/gm, '    tabSize: "tab-size"'],
     [COLOURS, ""],
+    // Rules for what the page does not use.
+    [/^ {4}"\.cm-(highlightSpace|highlightTab|trailingSpace|placeholder|tooltip-arrow)": \{\n[^]*?\n {4}\},$/gm, ""],
+    WORDS_OF_ERRORS,
   ],
   "@codemirror/search": [[COLOURS, ""]],
-  // What it says of wrong calls is for those who write an editor; the place of the error says it, too.
-  "@codemirror/state": [[/new RangeError\((?:"[^"]*"|`[^`]*`)\)/g, "new RangeError()"]],
+  "@codemirror/state": [WORDS_OF_ERRORS],
 };
 
 /** Cuts the packages while they are bundled. */
