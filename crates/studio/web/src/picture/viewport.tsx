@@ -249,7 +249,7 @@ export function Viewport(): JSX.Element {
       </div>
       {now && picture && <ViewCube axes={now.axes} />}
       {simplified.value && <p class="under simple">Mirrors and glass are simplified while this moves.</p>}
-      {now && !picture && <p class="hint">The scene is empty: drag a shape in from the left, or click one.</p>}
+      {now && !picture && <p class="hint">{lines.value.some(({ text }) => text.trim()) ? "There is no picture yet: see the errors of the script." : "The scene is empty: drag a shape in from the left, or click one."}</p>}
       {under && !held.current && !selected.value.has(hovered.value ?? -1) && (
         <p class="under">{visible(under.name ?? under.subject ?? under.command ?? "")}</p>
       )}
@@ -280,7 +280,7 @@ function ViewCube({ axes }: { readonly axes: readonly (readonly [number, number]
           return (
             <g key={`${name}${end}`} class={`axis-${name}`} role="button" tabindex={0} aria-label={`${title}, along ${name}`} onPointerDown={(event) => event.stopPropagation()} onClick={run} onKeyDown={(event) => event.key === "Enter" && run()}>
               <title>{title}</title>
-              <line x2={to} y2={up} />
+              {end < 0 && <line x1={-to} y1={-up} x2={to} y2={up} />}
               <circle cx={to} cy={up} r={end < 0 ? 5 : 9} />
               {end > 0 && <text x={to} y={up}>{name}</text>}
             </g>
@@ -310,8 +310,18 @@ interface HandleProps {
   readonly keyed: (event: KeyboardEvent, handle: Handle) => void;
 }
 
+/**
+ * The shapes of handles, in pixels: arrows move, squares move along a plane or scale, bars are lengths, keys have the shape
+ * that they have in the timeline, and the others are round.
+ */
+const ROUND = "M-6 0a6 6 0 1 0 12 0a6 6 0 1 0-12 0";
+const SQUARE = "M-5-5H5V5H-5Z";
+const SHAPES: Readonly<Record<string, string>> = { axis: "M10 0-6 7V-7Z", plane: SQUARE, scale: SQUARE, size: SQUARE, length: "M-3-7H3V7H-3Z", key: "M0-8 8 0 0 8-8 0Z" };
+
 function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
   const { grip, at, from, label, way } = handle;
+  // An arrow has the direction of its line, and a bar lies across it.
+  const turned = grip.what === "axis" || grip.what === "length" ? ` rotate(${(Math.atan2(at[1] - from[1], at[0] - from[0]) * 180) / Math.PI})` : "";
   const which = "axis" in grip ? `${grip.what}-${"xyz"[grip.axis] ?? ""}` : grip.what;
   return (
     <g
@@ -327,11 +337,7 @@ function HandleShape({ handle, unit, press, keyed }: HandleProps): JSX.Element {
       {way && <path class="ring" d={way} />}
       <line x1={from[0]} y1={from[1]} x2={at[0]} y2={at[1]} />
       <circle class="reach" cx={at[0]} cy={at[1]} r={FINGER * unit} />
-      {grip.what === "plane" ? (
-        <rect class="dot" x={at[0] - 5 * unit} y={at[1] - 5 * unit} width={10 * unit} height={10 * unit} />
-      ) : (
-        <circle class="dot" cx={at[0]} cy={at[1]} r={6 * unit} />
-      )}
+      <path class="dot" transform={`translate(${at}) scale(${unit})${turned}`} d={SHAPES[grip.what] ?? ROUND} />
     </g>
   );
 }
