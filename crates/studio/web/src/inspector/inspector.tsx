@@ -15,6 +15,7 @@ import { visible } from "../parts/visible";
 import type { FieldTable, Inspected } from "../protocol";
 import { iconOf } from "../scene/icons";
 import { sphereOf } from "../scene/materials";
+import { titleOf } from "../scene/outliner";
 import { ask, commands, gesture, language, lines, select, selection, state, tables } from "../store";
 import { wish } from "../timeline/keys";
 import { sunAngles, sunDirection } from "./sun";
@@ -23,7 +24,7 @@ import { meaningOf, nameOf, shortOf, unitOf, wordOf } from "./words";
 /** The gesture of the slider that is being moved. */
 let sliding: number | null = null;
 
-/** The colours whose channels are shown, by the names of their parameters. */
+/** The colours whose channels are shown, by their words. */
 const unfolded = signal<ReadonlySet<string>>(new Set());
 
 /** Three decimals are finer than a level of a picture. Small numbers have three digits. */
@@ -73,10 +74,10 @@ export function Inspector(): JSX.Element {
   const faults = state.value?.faults.some((fault) => fault.needsSamples && (!inspected || fault.line === inspected.line || table?.role === "light"));
   return (
     <Panel name="inspector" title={count > 0 ? "Object" : "Scene settings"}>
-      {table && (
+      {inspected && table && line && (
         <h3 class="subject">
           <Icon of={iconOf(table.name, table.role)} />
-          <b>{visible(line?.name ?? inspected?.text ?? inspected?.subject ?? table.name) || table.name}</b>
+          <b>{visible(line.name ?? inspected.text ?? "") || titleOf(line, inspected.line)}</b>
           <span class="note">{table.name}</span>
         </h3>
       )}
@@ -311,13 +312,13 @@ function FieldRow({ field, inspected }: FieldProps): JSX.Element {
   const values = field.names.map((_, i) => inspected.values[field.first + i]);
   const isColor = (field.kind === "colour" || field.kind === "coefficients") && field.names.length === 3;
   const missing = field.optional && values.every((value) => value === undefined);
-  const word = wordOf(field.label);
+  const word = wordOf(field);
   const isSun = field.kind === "direction" && inspected.command === "Ilight";
   const isFolded = isColor || isSun;
-  const isOpen = !isFolded || unfolded.value.has(field.label);
+  const isOpen = !isFolded || unfolded.value.has(word);
   const toggle = (): void => {
     const next = new Set(unfolded.value);
-    if (!next.delete(field.label)) next.add(field.label);
+    if (!next.delete(word)) next.add(word);
     unfolded.value = next;
   };
   const help = [meaningOf(field.label), field.unit, field.values, missing && "not set"].filter(Boolean).join("; ");
@@ -354,9 +355,9 @@ function WordRow({ field, inspected }: FieldProps): JSX.Element {
   const word = field.words?.find((word) => word.toLowerCase() === now) ?? (field.optional ? field.words?.[0] : "");
   return (
     <p class="field">
-      <span class="label">{wordOf(field.label)}</span>
+      <span class="label">{wordOf(field)}</span>
       <select
-        aria-label={wordOf(field.label)}
+        aria-label={wordOf(field)}
         value={word}
         onChange={(event) => ask({ ask: "word", line: inspected.line, number: field.first, word: event.currentTarget.value })}
       >
@@ -387,7 +388,7 @@ function Swatch({ field, inspected, values }: SwatchProps): JSX.Element | null {
   return (
     <input
       type="color"
-      aria-label={`${wordOf(field.label)}, as a colour`}
+      aria-label={`${wordOf(field)}, as a colour`}
       value={`#${values.map(byte).join("")}`}
       onFocus={() => (sliding = gesture())}
       onInput={(event) => pick(event.currentTarget.value, sliding)}
@@ -473,7 +474,7 @@ function ends(field: FieldTable, value: number): readonly [number, number] {
 
 function NumberRow({ field, inspected, name, index, value, slider }: NumberProps): JSX.Element {
   const at = field.first + index;
-  const word = wordOf(field.label);
+  const word = wordOf(field);
   const short = shortOf(name, field.kind);
   const label = field.names.length > 1 ? `${word}: ${short}` : word;
   if (value === null) {

@@ -1,5 +1,7 @@
 // Parameters in people's words. One that is not here has the name of the language.
 
+import type { FieldTable } from "../protocol";
+
 const WORDS: Readonly<Record<string, string>> = {
   "ambient coefficient": "shadow colour",
   "diffuse coefficient": "colour",
@@ -17,7 +19,12 @@ const WORDS: Readonly<Record<string, string>> = {
   "size s": "pattern size",
   "start a": "from",
   "end b": "to",
+  "axis's end ax": "start",
   "axis's end": "end",
+  "background R": "above",
+  "corner vx": "other corner",
+  "vertex vx": "second vertex",
+  "vertex wx": "third vertex",
   "radius Ra": "radius at the start",
   "radius Rb": "radius at the end",
   "thickness r": "thickness",
@@ -26,6 +33,7 @@ const WORDS: Readonly<Record<string, string>> = {
   "depth of the letters": "depth",
   "window's distance s": "window distance",
   "window's corner": "window corner",
+  "window's corner bu": "other corner",
   "number of samples": "samples",
   "error e": "allowed noise",
   "lens's radius": "blur",
@@ -45,19 +53,20 @@ const MEANINGS: Readonly<Record<string, string>> = {
   "exponent n": "Larger numbers make highlights smaller, as on polished surfaces",
 };
 
-export function wordOf(label: string): string {
-  return WORDS[label] ?? label;
+/** The word of a parameter. The name of its first number tells those of a line apart that have the same label. */
+export function wordOf({ label, names }: FieldTable): string {
+  return WORDS[`${label} ${names[0]}`] ?? WORDS[label] ?? label;
 }
 
 export function meaningOf(label: string): string {
   return MEANINGS[label] ?? label;
 }
 
-/** Short names of a number among those of a parameter: `x` for `cx`, `red` for `rr`. */
+/** Short names of a number among those of a parameter: `x` for `cx`, `u` for `au`, `red` for `rr`. */
 export function shortOf(name: string, kind: string): string {
   const last = name.at(-1) ?? "";
   if (kind === "colour" || kind === "coefficients") return { r: "red", g: "green", b: "blue" }[last] ?? name;
-  return "xyz".includes(last) && name.length <= 3 ? last : name;
+  return "xyzuv".includes(last) && name.length <= 3 ? last : name;
 }
 
 /** Commands and clauses in people's words. */
@@ -75,6 +84,8 @@ const NAMES: Readonly<Record<string, string>> = {
   diffuse: "colour",
   shine: "highlight",
   own: "own colours",
+  'Sky "FILE"': "Sky picture",
+  Roundbox: "Rounded box",
 };
 
 export function nameOf(command: string): string {

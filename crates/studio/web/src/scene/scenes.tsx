@@ -31,7 +31,7 @@ export function Scenes(): JSX.Element | null {
   const starts: number[] = [];
   all.reduce((start, { frames }) => (starts.push(start), start + frames), 0);
   return (
-    <Panel name="scenes" title="Scenes">
+    <Panel name="scenes" title="Scripts">
       <List class="list" count={all.length} height={ROW} reveal={shown} role="group" aria-label="Scripts of the folder">
         {(row) => {
           const file = all[row];
