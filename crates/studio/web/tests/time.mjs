@@ -382,6 +382,6 @@ test("a script of one frame says how it becomes an animation, and a folder that 
   assert.equal(await number(one.page).count(), 0);
   one.check();
   const folder = await open(t, { from: join(scenes, "hello"), name: "hello" });
-  await folder.page.getByText("Each script here is a single frame").waitFor();
+  await folder.page.getByText("Keys need one script").waitFor();
   folder.check();
 });

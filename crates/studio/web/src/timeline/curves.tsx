@@ -121,7 +121,7 @@ export function Curves({ time }: { readonly time: TimeState }): JSX.Element {
     <div class="curves track">
       <span class="label note">
         <span>{Number(high.toPrecision(3))}</span>
-        <span>{all.length === 0 ? "Select a track." : all.map(({ label }) => label).join(", ")}</span>
+        <span>{all.length === 0 ? "Select a track." : all.map((track, at) => <u key={nameOf({ ...track, frame: 0 })} class={`curve-${at % 3}`}>{track.label} </u>)}</span>
         <span>{Number(low.toPrecision(3))}</span>
       </span>
       <div ref={lane} class="lane" onWheel={zoom} onDblClick={() => (zoomed.value = null)} onPointerMove={(event) => held.current?.move(event)} onPointerUp={release} onPointerCancel={release}>

@@ -130,7 +130,7 @@ function Tools({ time, frames }: { readonly time: TimeState; readonly frames: nu
           <Button action={actions.onion} label="Onion skin" pressed={time.onion} />
         </>
       ) : (
-        <span class="note">Each script here is a single frame; keys need one script with many frames.</span>
+        <span class="note">Keys need one script with many frames.</span>
       )}
       {tracks.value.tracks.length > 0 && <Button action={actions.pasteKeys} label={time.copied > 0 ? `Paste ${time.copied}` : "Paste"} />}
     </div>
@@ -222,12 +222,12 @@ function Tracks({ time }: { readonly time: TimeState }): JSX.Element {
           onPointerMove={(event) => scrub(event, true)}
           onPointerUp={(event) => scrub(event, false)}
         >
+          <Head time={time} />
           {ticks(time).map((frame) => (
             <span key={frame} class="tick" style={{ left: `${place(time, frame)}%` }}>
               {frame}
             </span>
           ))}
-          <Head time={time} />
         </div>
       </div>
       <List class="list" style={{ height: `${Math.min(SEEN, all.length) * ROW}px` }} count={all.length} height={ROW} reveal={revealed < 0 ? null : revealed} role="group" aria-label="Tracks">
@@ -283,6 +283,8 @@ function Row({ row, track, line, time, press }: RowProps): JSX.Element {
         <b>{name}</b> {track.label}
       </button>
       <div class="lane">
+        <Behind time={time} />
+        <Head time={time} />
         {keys.map((key, at) =>
           key.frame < time.first ? null : (
             <button
@@ -305,8 +307,6 @@ function Row({ row, track, line, time, press }: RowProps): JSX.Element {
             </button>
           ),
         )}
-        <Behind time={time} />
-        <Head time={time} />
       </div>
     </div>
   );
