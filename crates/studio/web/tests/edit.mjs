@@ -8,7 +8,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
 
-import { audit, drag, open, over, clickRow, shot, until } from "./stage.mjs";
+import { audit, drag, open, over, clickRow, scenes, shot, until } from "./stage.mjs";
 
 const HEAD = "Screen 320 180\nLook 0 3 9  0 0.5 0  40\nIlight 1 1 1 1 -1 -1\n";
 const FLOOR = "Plane 0 0 0  0 1 0  .1 .1 .1 .5 .5 .5   # floor\n";
@@ -315,7 +315,7 @@ test("the ruler's frames are above the keys, and keys behind the last frame are 
   const [ruler, lane] = await Promise.all([page.locator(".ruler .lane").boundingBox(), page.locator(".tracks .list .lane").first().boundingBox()]);
   assert.ok(Math.abs(ruler.x - lane.x) < 0.6 && Math.abs(ruler.width - lane.width) < 0.6, JSON.stringify([ruler, lane]));
   await page.getByRole("button", { name: /at frame 60:/ }).first().waitFor();
-  assert.equal(await page.getByText("Each script here is a single frame").count(), 0);
+  assert.equal(await page.getByText("Keys need one script").count(), 0);
   await shot(page, "keys-behind");
   studio.check();
 });
@@ -387,4 +387,24 @@ test("at four sizes and in both themes nothing is clipped, bars have one row, an
       studio.check();
     });
   }
+});
+
+test("a sun's angles have a row each, and nothing covers the player, a menu's button or what a tour is about", async (t) => {
+  const folder = await open(t, { from: join(scenes, "hello"), name: "hello", size: [1024, 768] });
+  await clickRow(folder.page, ".item.light");
+  const [azimuth, height] = await Promise.all(["azimuth", "height"].map((name) => folder.page.getByRole("slider", { name: `sun ${name}, slider` }).boundingBox()));
+  assert.ok(height.y - azimuth.y > 20 && azimuth.width > 60, JSON.stringify([azimuth, height]));
+  const free = (locator) => locator.evaluate((of) => of.contains(document.elementFromPoint(...((box) => [box.x + box.width / 2, box.y + box.height / 2])(of.getBoundingClientRect()))));
+  assert.ok(await free(folder.page.getByRole("button", { name: "Play" })));
+  await folder.page.getByRole("button", { name: "Keys", exact: true }).click();
+  await folder.page.getByRole("button", { name: "Tour" }).click();
+  await folder.page.locator(".tour").waitFor();
+  assert.ok(await free(folder.page.locator(".tile", { hasText: "Sphere" })));
+  folder.check();
+  const phone = await open(t, { text: `${HEAD}${FLOOR}Trace\n`, size: [390, 844] });
+  const button = phone.page.getByRole("button", { name: "More output" });
+  await button.click();
+  const [menu, above] = await Promise.all([phone.page.locator("#more-output").boundingBox(), button.boundingBox()]);
+  assert.ok(menu.y >= above.y + above.height && menu.x >= 0 && menu.x + menu.width <= 390, JSON.stringify([menu, above]));
+  phone.check();
 });

@@ -29,7 +29,7 @@ export function Keys(): JSX.Element | null {
           <Section key={title} title={title} rows={rows.map(([what, how]) => [what, how.split(" | ")])} />
         ))}
       </div>
-      <form method="dialog">
+      <form method="dialog" class="buttons">
         <button
           type="button"
           onClick={(event) => {

@@ -33,8 +33,10 @@ export function Tour(): JSX.Element | null {
   const [part, text] = STEPS[at ?? -1] ?? [];
   const box = part && document.querySelector(part)?.getBoundingClientRect();
   if (at === null || !box) return null;
-  const left = Math.max(8, Math.min(innerWidth - WIDTH - 8, box.left + box.width / 2 - WIDTH / 2));
-  const top = Math.max(8, Math.min(innerHeight - 150, box.top + Math.min(box.height, 120) / 2));
+  // Beside a narrow part, and above one that is below the middle.
+  const beside = box.left > WIDTH ? box.left - WIDTH - 8 : box.right + 8;
+  const left = Math.max(8, Math.min(innerWidth - WIDTH - 8, box.width < WIDTH * 2 ? beside : box.left + (box.width - WIDTH) / 2));
+  const top = Math.max(8, Math.min(innerHeight - 150, box.top + (box.top > innerHeight / 2 ? -130 : Math.min(box.height, 120) / 2)));
   return (
     <div
       key={at}
