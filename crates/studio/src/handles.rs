@@ -206,17 +206,13 @@ pub(crate) fn handles(
             Kind::Rotation => {
                 if let Some(degrees) = values.vector(first) {
                     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                        let (_, reference) = rotate_handles::frame(degrees, axis);
-                        let radius = rotate_handles::RADIUS * arrow;
+                        let (about, reference) = rotate_handles::frame(degrees, axis);
+                        // Around the body, as the arrows are. The handle is between two axes, whose arrows are elsewhere.
+                        let radius = rotate_handles::RADIUS * (arrow + body);
+                        let spoke = (reference - about.cross(reference)).normalize_or_zero();
                         let way = rotate_handles::circle(projection, anchor, degrees, axis, radius);
                         let label = format!("about {name}: {label}");
-                        add(
-                            HandleKind::Turn { first, axis },
-                            anchor,
-                            anchor + radius * reference,
-                            &label,
-                            way,
-                        );
+                        add(HandleKind::Turn { first, axis }, anchor, anchor + radius * spoke, &label, way);
                     }
                 }
             }
@@ -678,6 +674,23 @@ mod tests {
         let (from, to) = (DVec2::from(scale.from), DVec2::from(scale.at));
         let text = drag(scale.grip, "Use table", to, to - from, DragOptions::default());
         assert_eq!(text, "Use table 0 0 0 0 0 0 2", "twice as far is twice as large");
+    }
+
+    #[test]
+    fn each_handle_of_a_group_has_a_place_of_its_own() {
+        let bounds = Bounds { low: DVec3::splat(-2.0), high: DVec3::splat(2.0) };
+        let camera = Orbit::at(bounds, 0.0, 0.3).camera(1.5).unwrap();
+        let scene = Scene::new(Screen::new(300, 200).unwrap(), Camera::Pinhole(camera));
+        let values = Values::of(&Line::new("Use table"), 1.0).unwrap();
+        for size in [None, Some(0.5), Some(1.5)] {
+            let all = super::handles(0, &values, &Projection::new(&scene), DVec3::ZERO, size);
+            for (number, one) in all.iter().enumerate() {
+                for other in &all[..number] {
+                    let apart = DVec2::from(one.at).distance(other.at.into());
+                    assert!(apart > 12.0, "{:?} and {:?} are {apart} pixels apart", one.grip, other.grip);
+                }
+            }
+        }
     }
 
     #[test]
