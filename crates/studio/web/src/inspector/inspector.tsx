@@ -77,7 +77,7 @@ export function Inspector(): JSX.Element {
       {inspected && table && line && (
         <h3 class="subject">
           <Icon of={iconOf(table.name, table.role)} />
-          <b>{visible(line.name ?? inspected.text ?? "") || titleOf(line, inspected.line)}</b>
+          <b>{(!line.name && visible(inspected.text ?? "")) || titleOf(line, inspected.line)}</b>
           <span class="note">{table.name}</span>
         </h3>
       )}
