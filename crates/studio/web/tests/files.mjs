@@ -18,7 +18,7 @@ test("an example comes in place of the text as one step, and a file of one's own
   await shot(page, "file");
   assert.deepEqual(await audit(page), []);
   assert.equal(await page.getByRole("button", { name: "Save as" }).count(), 0, "one script was opened");
-  await page.getByRole("button", { name: "Put it in place of mine.txt" }).click();
+  await page.getByRole("button", { name: "Replace mine.txt" }).click();
   const hello = readFileSync(join(scenes, "hello/frame01.txt"), "utf8");
   await until(() => readFileSync(path, "utf8") === hello);
   await settled();
@@ -33,7 +33,7 @@ test("an example comes in place of the text as one step, and a file of one's own
   await page.getByRole("button", { name: "File", exact: true }).click();
   await page.getByLabel("Choose a file").setInputFiles(own);
   await page.getByLabel("Your file own.txt").waitFor();
-  await page.getByRole("button", { name: "Put it in place of mine.txt" }).click();
+  await page.getByRole("button", { name: "Replace mine.txt" }).click();
   await until(() => readFileSync(path).equals(readFileSync(own)));
   await saved();
 

@@ -66,7 +66,7 @@ export function FileDialog({ places }: { readonly places?: ComponentChildren }):
     >
       <h2 id="file-title">Open, new, save as</h2>
       <fieldset>
-        <legend>What</legend>
+        <legend>Which text</legend>
         {option("shown", `${visible(shown)}, as it stands`)}
         {option("empty", "An empty scene")}
         {examples.value.map((example) => option(example, `Example: ${example}`))}
@@ -75,7 +75,7 @@ export function FileDialog({ places }: { readonly places?: ComponentChildren }):
       </fieldset>
       <div class="buttons">
         <button type="button" class="main" disabled={chosen.value === "shown"} onClick={() => load(null)}>
-          Put it in place of {visible(shown)}
+          Replace {visible(shown)}
         </button>
         <span class="note">Undo restores the previous text.</span>
       </div>
