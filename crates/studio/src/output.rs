@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use image::{DynamicImage, ImageFormat};
 use rayfold_movie::{Container, Encoding, Movie, Plays};
-use rayfold_scene::{AnimationSettings, Camera, Scene, Screen, Script};
+use rayfold_scene::{AnimationSettings, Camera, Samples, Scene, Screen, Script};
 use rayfold_tracer::{Exposure, RenderOptions, picture_of_frame, render_picture};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -22,8 +22,11 @@ use crate::protocol::OutputState;
 /// The largest file in bytes that is kept in memory.
 const LARGEST: usize = 512 << 20;
 
-/// The longer side of a small picture, in pixels.
-const THUMBNAIL: f64 = 96.0;
+/// The longer side of a small picture, in pixels: as wide as a card of the start page.
+const THUMBNAIL: f64 = 192.0;
+
+/// The factor by which the error of a pixel may be larger in a small picture.
+const NOISE: u32 = 2;
 
 /// The input of a rendering: scripts in order, the settings, and the kind of file.
 #[derive(Debug)]
@@ -182,6 +185,10 @@ pub(crate) fn thumbnail(mut scene: Scene) -> Result<Option<Vec<u8>>, Error> {
     let scale = (THUMBNAIL / width.max(height)).min(1.0);
     let side = |side: f64| (side * scale).round().max(1.0) as u32;
     scene.screen = Screen::new(side(width), side(height)).map_err(|error| no_picture(&error))?;
+    // A pixel of a small picture may be noisier than one of the whole.
+    let samples = scene.samples;
+    let fewer = Samples::new(samples.most().div_ceil(NOISE * NOISE), f64::from(NOISE) * samples.error());
+    scene.samples = fewer.unwrap_or(samples);
     let image = render_picture(Exposure::still(&scene), &RenderOptions::default())
         .map_err(|error| no_picture(&error))?;
     png(&image).map(Some)
