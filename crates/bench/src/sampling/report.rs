@@ -51,11 +51,12 @@ pub(super) fn write(
     table.flush()?;
     let mut page = format!(
         "# Sampling: error against time\n\n\
-         Written by `rayfold-bench sampling`; all figures are in [sampling.csv](sampling.csv). Pictures of {width} x {height}, one \
-         thread, processor time of preparing and drawing, the shortest of three runs. An error is the root mean square over pixels \
-         and channels, in levels (0..255) before rounding, from the truth: the same picture in `f64` with {truth} samples in every \
-         pixel. Pairs of dimensions and independent samples are there for their errors: their points are worked out one by one, so \
-         that their times say little.\n\n"
+         Written by `rayfold-bench sampling`; all figures are in [sampling.csv](sampling.csv). Pictures have {width} x \
+         {height} pixels and are drawn on one thread. Times are processor times of preparation and drawing, the \
+         shortest of three runs. The error is the root mean square over pixels and channels, in levels (0..255) before \
+         rounding. It is measured against the truth, which is the same picture in `f64` with {truth} samples in every \
+         pixel. The samplers *pairs of dimensions* and *independent samples* are measured for their errors only: their \
+         points are computed one by one, so their times say little.\n\n"
     );
     page.push_str(&slopes(drawn));
     page.push_str(&rays_saved(drawn));
@@ -101,7 +102,8 @@ fn rows<'a>(drawn: &'a [Drawn], effect: &'a str, way: &'a str) -> impl Iterator<
 
 /// Returns the exponents of the error by samples, between 4 and 64 per pixel.
 fn slopes(drawn: &[Drawn]) -> String {
-    let mut text = "## Slopes\n\nError over samples a pixel, between 4 and 64, as an exponent: independent samples have -0.5.\n\n\
+    let mut text = "## Slopes\n\nThe table shows the exponent of the error as a power of the samples per pixel, \
+                    between 4 and 64. Independent samples have an exponent of -0.5.\n\n\
                     | effect | all dimensions | pairs of dimensions | independent |\n| ------ | ------ | ------ | ------ |\n"
         .to_owned();
     for effect in &EFFECTS {
@@ -122,8 +124,9 @@ fn slopes(drawn: &[Drawn]) -> String {
 
 /// Returns the section on the rays of adaptive pictures, compared with pictures that have as many samples everywhere.
 fn rays_saved(drawn: &[Drawn]) -> String {
-    let mut text = "## What adaptive pictures take\n\nAsked for at most *n* rays a pixel and an error of *e* levels. *Blocks* is the \
-                    error of means of 4 x 4 pixels: noise leaves it a quarter of the error, bias more.\n\n\
+    let mut text = "## The cost of adaptive pictures\n\nEach adaptive picture has a limit of *n* rays per pixel and a \
+                    requested error of *e* levels. *Blocks* is the error of the means of 4 x 4 pixels. It is a quarter \
+                    of the error if the error is noise alone, and larger if the error has a bias.\n\n\
                     | effect | n, e | rays a pixel | error | share of pixels off by > 4 levels | blocks | ms | the error with n everywhere | ms |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
@@ -154,10 +157,11 @@ fn rays_saved(drawn: &[Drawn]) -> String {
 /// Returns the section that checks the truth itself.
 fn agreement(agreements: &[Agreement], args: &Args) -> String {
     let mut text = format!(
-        "## Against independent samples of the plain tracer\n\nWhether the truth is one: small pictures (48 x 36) by the kernels with \
-         {} samples in every pixel and by the plain tracer with {} independent random ones. Their difference in standard errors of \
-         the latter, and both in levels (root mean squares). Two estimates of the same thing have a mean square of about 1, less \
-         where most pixels are of one colour.\n\n\
+        "## Against independent samples of the plain tracer\n\nThis section checks the truth itself. The kernels draw \
+         small pictures (48 x 36) with {} samples in every pixel, and the plain tracer draws them with {} independent \
+         random samples. *Mean square* and *largest* describe the difference of the two pictures, divided by the \
+         standard error of the plain tracer. *Difference* and *standard error* are root mean squares in levels. Two \
+         estimates of the same value have a mean square of about 1, or less if most pixels have one colour.\n\n\
          | effect | mean square | largest | difference, levels | standard error, levels |\n| --- | --- | --- | --- | --- |\n",
         args.truth.max(args.independent),
         args.independent

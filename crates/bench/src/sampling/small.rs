@@ -25,9 +25,10 @@ const ASKED: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 
 /// Measures and writes sampling-small.md.
 pub(super) fn run(args: &Args) -> Result<()> {
-    let mut page = "# Sampling: what is small\n\n\
-                    Written by `rayfold-bench sampling --small`. An adaptive picture asks few samples who needs more. What is \
-                    narrower than a pixel they may miss altogether. Here stands what of that is left.\n\n"
+    let mut page = "# Sampling: small objects\n\n\
+                    Written by `rayfold-bench sampling --small`. An adaptive picture decides from a few samples per \
+                    pixel which pixels need more. These samples may miss objects that are narrower than a pixel. This \
+                    page measures the errors that remain.\n\n"
         .to_owned();
     wires(&mut page, args.truth)?;
     others(&mut page, args.truth)?;
@@ -68,9 +69,11 @@ fn rays(means: &Means) -> f64 {
 fn wires(page: &mut String, truth: u32) -> Result<()> {
     write!(
         page,
-        "## Wires\n\nA white wire on black, 640 x 240 (`Cylinder r -5 .35 0 5 -.35 0`), at most *n* rays a pixel and an error of *e*: \
-         its light, as a share of the truth ({truth} rays in every pixel); the same with n rays in every pixel, whose error is that \
-         of the samples themselves; columns without any light, of those that have some in truth; rays a pixel.\n\n\
+        "## Wires\n\nThe picture is a white wire on black, 640 x 240 (`Cylinder r -5 .35 0 5 -.35 0`), with at most \
+         *n* rays per pixel and a requested error of *e*. *Light* is the light of the wire as a share of the truth \
+         ({truth} rays in every pixel). *With n everywhere* is that share with n rays in every pixel; its error is \
+         that of the samples themselves. *Empty columns* counts the columns without any light, among those with light \
+         in the truth.\n\n\
          | width | n | e | light | with n everywhere | empty columns | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
     )?;
     for width in WIDTHS {
@@ -149,8 +152,9 @@ fn pictures() -> Vec<(&'static str, String)> {
 fn others(page: &mut String, truth: u32) -> Result<()> {
     write!(
         page,
-        "## Other things that are small\n\nAt most 256 rays a pixel. The error is that of the picture, in levels from one of {truth} rays in \
-         every pixel; the mean is that of the difference, and of it the worst block of 10 x 10 pixels.\n\n\
+        "## Other things that are small\n\nPictures have at most 256 rays per pixel. *Error* is the error of the \
+         picture in levels, against a picture with {truth} rays in every pixel. *Mean* is the mean of the difference, \
+         and *worst block* is its mean in the worst block of 10 x 10 pixels.\n\n\
          | picture | e | error | with 256 everywhere | mean | worst block | rays a pixel |\n| --- | --- | --- | --- | --- | --- | --- |\n",
     )?;
     for (name, text) in pictures() {
@@ -182,8 +186,8 @@ fn others(page: &mut String, truth: u32) -> Result<()> {
     let (least, most) = sums.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &x| (a.min(x), b.max(x)));
     writeln!(
         page,
-        "\nA star of .3 pixels' radius drifts through 40 frames (`Samples 256`): it has {least:.1} to {most:.1} levels in each; its area \
-         says {:.1}.\n",
+        "\nA star with a radius of .3 pixels drifts through 40 frames (`Samples 256`). The sum of its levels in a \
+         frame is {least:.1} to {most:.1}. Its area gives {:.1}.\n",
         255.0 * core::f64::consts::PI * 0.09
     )?;
     Ok(())
@@ -260,13 +264,16 @@ pub(super) fn at_random(args: &Args) -> Result<String> {
     let (width, height) = SIZE;
     let truth = args.truth / 2;
     let mut page = format!(
-        "{HEADING}\n\n{} of each, {width} x {height}, at most {MOST} rays a pixel: checkered and striped \
-         floors to the horizon under `Tone srgb`, with lenses and soft light; and scenes of all that the language has. Their seeds, \
-         from {} on, are not those by which numbers of the rule were chosen. Errors are in levels of the shown picture, as parts of *e*, \
-         or of the error of {MOST} rays in every pixel where that is larger. The truth is two pictures of {truth} rays in every pixel, \
-         whose points neither share with each other nor with the picture: the mean product of the distances from both is the \
-         square of the error without theirs. *Over* counts pictures above {OVER}, *mean off* those whose mean is off by more \
-         than {MEAN} levels, *blocks* those with a block of 10 x 10 pixels, in its worst channel, that is off by more than {BLOCKS} *e*.\n\n\
+        "{HEADING}\n\nThere are {} pictures of each kind, of {width} x {height} pixels and with at most {MOST} rays \
+         per pixel. *Floors* are checkered and striped planes to the horizon under `Tone srgb`, with lenses and soft \
+         light. *Scenes* use all features of the language. Their seeds start at {}; the numbers of the sampling rule \
+         were chosen with other seeds. Errors are in levels of the shown picture. They are divided by the requested \
+         error *e*, or by the error of {MOST} rays in every pixel if that is larger. The truth consists of two \
+         pictures with {truth} rays in every pixel. They share no sample points with each other or with the measured \
+         picture. The mean product of the differences from the two is therefore the square of the error, without the \
+         errors of the truth. *Over* counts pictures with a ratio above {OVER}. *Mean off* counts pictures whose mean \
+         is off by more than {MEAN} levels. *Blocks* counts pictures with a block of 10 x 10 pixels that is off by \
+         more than {BLOCKS} *e* in its worst channel.\n\n\
          | pictures | e | error / e: mean | worst | over | largest mean | mean off | blocks / e: root mean square, worst picture | \
          worst block / e | blocks | rays a pixel |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
