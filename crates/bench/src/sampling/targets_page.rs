@@ -23,12 +23,14 @@ pub(super) fn write(
     table(args, curves)?;
     let mut page = format!(
         "# Time to an error\n\n\
-         Written by `rayfold-bench sampling --targets`; all figures are in [time-to-error.csv](time-to-error.csv). The scene of \
-         the [report on speed](speed.md): 26 objects, two suns, mirrors. One thread, processor time of preparing and drawing, the \
-         shortest of three runs; the full frame is 1024 x 768, a quarter of it 512 x 384. Soft shadows are those of suns of 4 \
-         degrees; the lens has a radius of .05 at a distance of about 10; every fourth ball moves. An error is the root mean square \
-         over pixels and channels in levels (0..255) from the truth, the same picture in `f64` with {} samples in every pixel. \
-         Times are read off the line between neighbouring measurements; a dash stands where none was as good.\n\n",
+         Written by `rayfold-bench sampling --targets`; all figures are in [time-to-error.csv](time-to-error.csv). The \
+         scene is that of the [report on speed](speed.md): 26 objects, two suns, mirrors. Times are processor times of \
+         preparation and drawing on one thread, the shortest of three runs. The full frame has 1024 x 768 pixels, a \
+         quarter of it 512 x 384. Soft shadows come from suns of 4 degrees. The lens has a radius of .05 at a distance \
+         of about 10. Every fourth ball moves. The error is the root mean square over pixels and channels in levels \
+         (0..255). It is measured against the truth, which is the same picture in `f64` with {} samples in every \
+         pixel. Times are interpolated between neighbouring measurements. A dash means that no measurement reached the \
+         error.\n\n",
         args.truth,
     );
     page += &about_povray();
@@ -41,7 +43,7 @@ pub(super) fn write(
             .filter(|(name, ..)| *name == work.name)
             .map(|(_, level, ms)| format!("{ms:.1} ms with {level}"))
             .collect();
-        writeln!(page, "## {}\n\nOne ray a pixel takes {}.\n", work.about, single.join(", "))?;
+        writeln!(page, "## {}\n\nOne ray per pixel takes {}.\n", work.about, single.join(", "))?;
         page += "| ms to an error of | 2 | 1 | .5 | .25 |\n| --- | --- | --- | --- | --- |\n";
         for curve in &ways {
             row(&mut page, &curve.way, |error| Some(format!("{:.0}", curve.time(error)?)));
@@ -89,8 +91,8 @@ fn about_povray() -> String {
         return "POV-Ray is not on this machine: not measured.\n\n".to_owned();
     }
     format!(
-        "Of POV-Ray the best of {} settings (`+A`, `+AM`, `+R`, `-J`) counts, drawing alone; its picture has whole levels, which \
-         are an error of .29.\n\n",
+        "POV-Ray draws with {} settings (`+A`, `+AM`, `+R`, `-J`), and the best of them counts. Its time is that of \
+         drawing alone. Its picture has whole levels; this rounding is an error of .29.\n\n",
         PEER.len()
     )
 }
@@ -103,16 +105,18 @@ fn about_mitsuba(truths: &[(&str, Truth)]) -> String {
     let errors: Vec<String> =
         truths.iter().map(|(work, truth)| format!("{:.2} ({work})", truth.error)).collect();
     format!(
-        "Of {} {version} (LLVM variant, single precision, `path` of the same depth without roulette, box filter) the best of \
-         `independent`, `stratified`, `multijitter`, `orthogonal` and `ldsampler` counts, with 4, 16, 64 samples a pixel and so on \
-         until an error of .5 (`orthogonal` rounds up, to 121 for 64), drawing alone: the scene is loaded and the kernels are \
-         compiled before, and what a picture of 8 x 6 takes is taken off. Its errors are from a truth of its own, {samples} samples \
-         of `multijitter` by other seeds, whose own error is estimated at {} levels. In this language light that was scattered is \
-         not scattered again, and suns are not seen \
-         in mirrors: Mitsuba's own surfaces and suns do both, which is another picture and a noisier one. So its path tracer is \
-         given the surfaces, and the suns of 4 degrees, as classes of Python, which it compiles into its kernels like its own. A \
-         path goes on as a mirror does; each hit asks one sun, the brighter one more often; ambient light is emitted and not \
-         sampled. It draws neither the full frame nor motion, of which it has none.\n\n",
+        "{} {version} (LLVM variant, single precision, box filter) draws with `path`, of the same depth and without \
+         Russian roulette. The best of its samplers `independent`, `stratified`, `multijitter`, `orthogonal` and \
+         `ldsampler` counts. They take 4, 16, 64 samples per pixel and so on, until the error is .5 (`orthogonal` \
+         rounds up, to 121 for 64). The time is that of drawing alone: the scene is loaded and the kernels are \
+         compiled before, and the time of a picture of 8 x 6 pixels is subtracted. Mitsuba's errors are measured \
+         against a truth of its own, {samples} samples of `multijitter` with other seeds. The error of that truth is \
+         estimated at {} levels. In the language of rayfold, scattered light is not scattered again, and mirrors do \
+         not show suns. Mitsuba's own surfaces scatter light again, and its own suns are visible in mirrors, which \
+         makes another picture, and a noisier one. Its path tracer therefore uses Python classes for the surfaces and \
+         for the suns of 4 degrees, which Mitsuba compiles into its kernels like its own classes. A path continues in \
+         the mirror direction. Each hit samples one sun, the brighter sun more often. Ambient light is emitted and not \
+         sampled. Mitsuba draws neither the full frame nor the picture with motion, because it has no motion.\n\n",
         mitsuba::NAME,
         errors.join(", ")
     )
