@@ -34,7 +34,8 @@ const WORKS: [Work; 5] = [
         about: "a closed room of 40 objects, sky and sun through a window, `Indirect 4`",
         errors: &[8.0, 4.0],
         asked: 20.0,
-        differs: "Light of the sun has one bounce less in Mitsuba, whose paths have one length for all light.",
+        differs: "Sunlight has one bounce less in Mitsuba, because Mitsuba's paths have the same length for all \
+                  light.",
         script: || {
             room(
                 "Sky 5 6 7\nIlight 12 11 9 1 -.9 -.35 .5\n",
@@ -84,8 +85,8 @@ const WORKS: [Work; 5] = [
         about: "10 rough mirrors of .2 on a floor, two suns and a sky, no indirect light",
         errors: &[1.0],
         asked: 8.0,
-        differs: "Its rough mirrors lose what their microfacets hide, about a fiftieth. The floor is a class of Python that suns alone \
-                  light.",
+        differs: "Mitsuba's rough mirrors lose the light that their microfacets block, about a fiftieth. The floor is \
+                  a Python class that is lit by suns only.",
         script: || {
             let mut text =
                 "Depth 4\nSky .3 .35 .4 .6 .7 .8\nIlight .4 .4 .35 1 -1.7 -1\nIlight .25 .25 .3 -1 -1.2 -.4\n\
@@ -255,11 +256,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
 
 fn page(args: &Args, (width, height): (u32, u32), all: &[Compared]) -> Result<String> {
     let mut page = format!(
-        "# Light that goes round: the time to an error\n\n\
-         Written by `rayfold-bench sampling --light`. Pictures of {width} x {height}, one thread, processor time of preparing and \
-         drawing, the shortest of three runs. An error is the root mean square over pixels and channels in levels (0..255) of the \
-         clamped means, from the same picture with {} other samples in every pixel. *Adaptive* pictures are asked for `Samples 4096 e`. \
-         Times are read off the line between neighbouring measurements.\n\n",
+        "# Indirect light and rough mirrors: the time to an error\n\n\
+         Written by `rayfold-bench sampling --light`. Pictures have {width} x {height} pixels and are drawn on one \
+         thread. Times are processor times of preparation and drawing, the shortest of three runs. The error is the \
+         root mean square over pixels and channels in levels (0..255) of the clamped means. It is measured against the \
+         same picture with {} other samples in every pixel. *Adaptive* pictures use `Samples 4096 e`. Times are \
+         interpolated between neighbouring measurements. A dash means that no measurement reached the error. *Asked* \
+         is the goal for the ratio.\n\n",
         args.truth
     );
     let Some(version) = all.iter().find_map(|one| Some(&one.peer.as_ref()?.version)) else {
@@ -268,10 +271,11 @@ fn page(args: &Args, (width, height): (u32, u32), all: &[Compared]) -> Result<St
     };
     write!(
         page,
-        "Of Mitsuba {version} (LLVM variant, single precision, `path` without roulette, box filter) the best of its samplers \
-         counts, drawing alone, with its kernels compiled before. Its surfaces are `diffuse` and `roughconductor` (GGX, without a \
-         material, which reflects everything), and its lights `area`, `constant` and `envmap`; suns are a class of Python. \
-         Its error is estimated from pairs of pictures by other seeds.\n\n\
+        "Mitsuba {version} (LLVM variant, single precision, box filter) draws with `path` without Russian roulette, \
+         and the best of its samplers counts. Its time is that of drawing alone; its kernels are compiled before. Its \
+         surfaces are `diffuse` and `roughconductor` (GGX, without a material, so that it reflects everything). Its \
+         lights are `area`, `constant` and `envmap`; suns are a Python class. Its error is estimated from pairs of \
+         pictures with different seeds.\n\n\
          | picture | mean level, ours | Mitsuba's | error | ours, ms | way | Mitsuba, ms | Mitsuba / ours | asked |\n\
          | --- | ---: | ---: | ---: | ---: | --- | ---: | ---: | ---: |\n"
     )?;
