@@ -4,8 +4,8 @@
     rayfold-bucket --data FOLDER --address 127.0.0.1:9001     # with AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY
     python tests/bucket/service-report.py http://127.0.0.1:9001 > docs/reports/s3-operations.md
 
-A call of an operation that the store does not have, and one with a parameter that it refuses, must leave all that is in
-the store as it was: the script fails otherwise.
+A call of an operation that the store does not have must not change anything in the store. Nor may a call with a
+parameter that the store refuses. Otherwise the script fails.
 """
 
 import datetime
@@ -17,7 +17,7 @@ import botocore.exceptions
 import botocore.session
 
 BUCKET, KEY = "films", "a"
-# These change what there is, as they are asked to: on a bucket of their own.
+# These operations change the store as intended, so they run on a bucket of their own.
 CHANGING = {
     "AbortMultipartUpload", "CompleteMultipartUpload", "CopyObject", "CreateBucket", "CreateMultipartUpload",
     "DeleteBucket", "DeleteBucketCors", "DeleteObject", "DeleteObjects", "PutBucketAcl", "PutBucketCors",
@@ -130,15 +130,17 @@ def main():
         refused += answer == "NotImplemented"
         rows.append((name, answer, " ".join(not_there), "; ".join(f"{k}: {' '.join(v)}" for k, v in others.items())))
     print("# S3's operations, one by one\n")
-    print(f"Every operation of the service model of botocore {botocore.__version__}, called by it on the store: once with")
-    print("what it must have, and once more with each other parameter. *Answer* is a status or S3's code for the first call.")
-    print("*Refused* are the parameters for which the store says that it does not have them (`NotImplemented`, or")
-    print("`AccessControlListNotSupported`); *other answers* come of values that this script makes up. After each operation all")
-    print("buckets, objects, their bodies and times, uploads and rules were compared with those before; operations that change")
-    print("what there is ran on a bucket of their own.\n")
-    print(f"{refused} of {len(rows)} operations are refused whole. Operations that changed what they should not: "
+    print(f"botocore {botocore.__version__} calls every operation of its S3 service model on the store. The first")
+    print("call has the required parameters alone. If the store has the operation, each further call has one other")
+    print("parameter in addition. *Answer* is the HTTP status or the S3 error code of the first call. *Refused*")
+    print("lists the parameters that the store rejects as not implemented (`NotImplemented`, or")
+    print("`AccessControlListNotSupported`). *Other answers* are caused by values that this script makes up. After")
+    print("each operation the script compares all buckets, objects, their bodies and times, uploads and rules with")
+    print("those before. Operations that are meant to change the store run on a bucket of their own.\n")
+    print(f"{refused} of {len(rows)} operations are refused entirely. Operations with an unintended change: "
           f"{', '.join(changed) or 'none'}.\n")
-    print("Made by `tests/bucket/service-report.py`; `cargo test` sends the same operations raw (`tests/bucket/model.rs`).\n")
+    print("Written by `tests/bucket/service-report.py`. `cargo test` sends the same operations as raw requests")
+    print("(`tests/bucket/model.rs`).\n")
     print("| operation | answer | refused | other answers |\n| --- | --- | --- | --- |")
     for row in rows:
         print("| " + " | ".join(row) + " |")
