@@ -273,26 +273,27 @@ fn report(runs: &[Run], quietest: &[&Run]) -> String {
         .collect();
     let mut text = format!(
         "# The studio\n\n\
-         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The first frames of three \
-         scenes at {} x {}, in headless Chromium on the machine that draws. In each an object is dragged on a circle, by \
-         125 pointer moves per second: {}. The studio sends only the part of a picture that differs from the one before. \
-         Moving the view changes all of it, and is not measured here. The *static page* is that of `--site`, without a server. \
-         The driver uses the browser's debugging protocol \
-         without the Network domain, which would copy every picture.\n\n\
-         - *Pointer to canvas* is the time from the pointer's event to the end of `putImageData` of the first picture \
-         that was requested with it or after it; it excludes the browser's time to show its canvas.\n\
-         - *Least size* and *median size* are those of the pictures while the object moves, as shares of the width or of \
-         the height, the lesser of the two. A smaller picture is stretched. Where even the smallest takes too long, its rays follow \
-         fewer mirrors and glass. In `clockwork` and `glass` nearly all surfaces mirror or are glass, so a change can reach \
-         every pixel, and all of a picture is drawn.\n\
-         - *Final after a rest* is the time from the last move to the final picture, which is the one of `rayfold \
-         render`, while the button stays down; *after a release* is the time from the release of the button, of an \
-         object that was moving.\n\
-         - *First picture* is the time from opening the page in a running browser; that of the static page comes from an empty \
-         cache over loopback.\n\
-         - *Others* is the share of all processors used by programs outside the measurement, *processor ms* the time of \
-         the studio and the browser.\n\n\
-         Of {} runs of a scene the one with the least other load counts.\n\n\
+         Written by `rayfold-bench studio`; all figures are in [studio.csv](studio.csv). The measurement uses the \
+         first frames of three scenes at {} x {}, in headless Chromium on the machine that draws. In each scene an \
+         object is dragged on a circle, with 125 pointer moves per second: {}. The studio sends only the part of a \
+         picture that differs from the previous picture. Moving the view changes the whole picture and is not measured \
+         here. The *static page* is the page of `--site`, which needs no studio server. The driver uses the browser's \
+         debugging protocol without the Network domain, which would copy every picture.\n\n\
+         - *Pointer to canvas* is the time from a pointer event to the end of `putImageData` of the first picture that \
+         was requested with the event or after it. The time in which the browser shows its canvas is excluded.\n\
+         - *Least size* and *median size* are sizes of the pictures while the object moves. A size is the smaller of \
+         two shares, that of the full width and that of the full height. A smaller picture is stretched. If even the \
+         smallest picture takes too long, its rays follow fewer reflections and refractions. In `clockwork` and \
+         `glass` nearly all surfaces are mirrors or glass. A change can therefore reach every pixel, and the whole \
+         picture is drawn.\n\
+         - *Final after a rest* is the time from the last move to the final picture while the button stays down. The \
+         final picture is that of `rayfold render`. *Final after a release* is the time from the release of the button \
+         to the final picture, if the object was moving.\n\
+         - *First picture* is the time from opening the page in a running browser. The static page is loaded over \
+         loopback with an empty cache.\n\
+         - *Others* is the share of all processors that programs outside the measurement use. *Processor ms* is the \
+         processor time of the studio and the browser.\n\n\
+         Each scene is measured in {} runs. The run with the least other load counts.\n\n\
          | scene | | measured | goal | |\n\
          | --- | --- | --: | --: | --- |\n",
         SIZE.0,
