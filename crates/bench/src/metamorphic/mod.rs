@@ -164,13 +164,14 @@ fn judged(
 fn report(args: &Args, found: &[Found]) -> Result<String> {
     let Args { scenes, seed, .. } = args;
     let mut text = format!(
-        "# What must show the same\n\n\
-         Written by `cargo run --release -p rayfold-bench -- metamorphic --scenes {scenes} --seed {seed}`. Random scenes of all \
-         kinds of the hard cases, each drawn as users get it (`auto`), against what must show the same picture. *Different*: \
-         pixels that are not the same; *off*: by more than 2 levels. *Unexplained* are those of them that are off by more \
-         than 2 levels from all that an oracle of 640 bits sees within a sixteenth of the pixel, in either of the two scenes; \
-         for relations that hold bit for bit, all that differ. Scenes that a relation says nothing of are left out of its \
-         row.\n\n\
+        "# Scenes that must show the same picture\n\n\
+         Written by `cargo run --release -p rayfold-bench -- metamorphic --scenes {scenes} --seed {seed}`. Random \
+         scenes of all kinds of the hard cases are drawn as users get them (`auto`). Each picture is compared with \
+         another one that must be the same. *Different* counts pixels that are not equal. *Off* counts pixels that \
+         differ by more than 2 levels. *Unexplained* counts the pixels of *off* that are wrong in at least one of the \
+         two pictures. A pixel is wrong if it differs by more than 2 levels from everything that an oracle of 640 bits \
+         sees within a sixteenth of the pixel. For relations that hold bit for bit, *unexplained* counts all pixels \
+         that differ. If a relation does not apply to a scene, the scene is left out of the row of that relation.\n\n\
          | relation | scenes | pixels | different | off | off, % | unexplained | seeds of these |\n\
          | --- | --: | --: | --: | --: | --: | --: | --- |\n"
     );

@@ -40,44 +40,45 @@ pub(super) enum Other {
 pub(super) const RELATIONS: [Relation; 7] = [
     Relation {
         name: "the plain tracer",
-        about: "the same scene by the reference in `f64`, object by object for every ray",
+        about: "the same scene, drawn by the reference in `f64`, which tests every object for every ray",
         is_exact: false,
         other: Other::Plain,
     },
     Relation {
         name: "scaled",
-        about: "all lengths times a power of two from 2^-60 to 2^60",
+        about: "all lengths multiplied by a power of two from 2^-60 to 2^60",
         is_exact: true,
         other: Other::Made(scaled_by_two),
     },
     Relation {
         name: "turned",
-        about: "everything turned by right angles, as a group and the camera and lights with it",
+        about: "the objects as a group, the camera and the lights, all turned by right angles",
         is_exact: false,
         other: Other::Made(turned),
     },
     Relation {
         name: "permuted",
-        about: "the objects in another order; where two surfaces coincide, another may be seen",
+        about: "the objects in another order; if two surfaces coincide, another one may be visible",
         is_exact: false,
         other: Other::Made(permuted),
     },
     Relation {
         name: "taken apart",
-        about: "each opaque triangle in two, at the middle of its longest edge",
+        about: "each opaque triangle divided in two at the middle of its longest edge",
         is_exact: false,
         other: Other::Made(taken_apart),
     },
     Relation {
         name: "split",
-        about: "the scene as the second of three frames of a script with curves, and as `rayfold split` writes that frame",
+        about: "the scene as the second of three frames of a script with curves, and then as `rayfold split` writes \
+                that frame",
         is_exact: true,
         other: Other::Made(split),
     },
     Relation {
         name: "groups",
-        about: "moved, turned by right angles and scaled as a group, against the same numbers written out (patterns, which \
-                groups carry along, are left out)",
+        about: "the scene moved, turned by right angles and scaled as a group, against the same numbers written out \
+                (patterns are left out, because groups carry them along)",
         is_exact: false,
         other: Other::Both(grouped),
     },
