@@ -192,11 +192,12 @@ pub(crate) fn dots(image: &RgbImage, exact: &RgbImage) -> Vec<(u32, u32)> {
 fn report(args: &Args, found: &[Found]) -> Result<String> {
     let mut text = format!(
         "# Dots at outlines\n\n\
-         Written by `cargo run --release -p rayfold-bench -- outlines --millions {} --seed {}`. Pictures of {} x {} pixels, each \
-         drawn as users get it (`auto`) and by the `f64` kernels. A *dot* is a pixel of `auto` that is more than {SEEN} levels from \
-         each of the nine `f64` pixels around it: what a person sees in a film. None is asked for. *Off*: more than 2 levels from \
-         the `f64` pixel; at most {} % of all pixels are asked for, and of no picture more than {} %. Where needles are finer than \
-         pixels no pixel is like those around it, and only that is counted.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- outlines --millions {} --seed {}`. Pictures have {} x {} \
+         pixels. Each is drawn as users get it (`auto`), and again by the `f64` kernels. A *dot* is a pixel of `auto` \
+         that differs by more than {SEEN} levels from each of the nine `f64` pixels around it. Such a pixel is visible \
+         in a film. The goal is no dots. *Off* counts pixels that differ by more than 2 levels from the `f64` pixel. \
+         The goal is at most {} % of all pixels, and at most {} % of the pixels of a picture. Needles that are finer \
+         than pixels make every pixel unlike its neighbours, so only *off* is counted for them.\n\n\
          | pictures of | pictures | drawn in f32 | pixels | off | off, % | worst picture, % | dots |\n\
          | --- | --: | --: | --: | --: | --: | --: | --: |\n",
         args.millions, args.seed, SIZE.0, SIZE.1, MOST.0, MOST.1
