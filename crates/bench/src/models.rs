@@ -97,8 +97,10 @@ pub fn run(args: &Args) -> Result<()> {
     let mut report = format!(
         "# Models\n\n\
          Written by `cargo run --release -p rayfold-bench -- models{command}`. The models are generated. All times are \
-         processor times, because the machine may be busy with other work: of the busier of {THREADS} threads for loading, which is \
-         the time by the clock on free cores, of all threads for the next frame, and of one thread for all else. Each part runs {} times. The tables show the mean and the worst of them.\n\n\
+         processor times, because the machine may be busy with other work. The time to load is that of the busier of \
+         {THREADS} threads, which is the elapsed time on idle cores. The time of the next frame is that of all \
+         threads. All other times are those of one thread. Each part runs {} times. The tables show the mean and the \
+         worst of these runs.\n\n\
          | what | measured | goal | |\n| --- | ---: | ---: | --- |\n",
         plan.rounds
     );

@@ -122,8 +122,8 @@ impl Report {
         };
         Ok(format!(
             "# Hard cases\n\n\
-             Inputs that are known to be difficult for ray tracers. Of {} figures with a bound {} are within it; of \
-             the naive tracer's {} figures {} are.\n\n\
+             This page measures inputs that are known to be difficult for ray tracers. Of {} figures with a bound, {} \
+             are within the bound. Of the naive tracer's {} figures, {} are within the bound.\n\n\
              Written by `cargo run --release -p rayfold-bench -- accuracy --hard-cases`, which measures every backend: \
              the plain `f64` tracer (`reference`), and packets in each precision and vector width, with a tree and in \
              other tiles. `{naive}` is a tracer with textbook formulas and an absolute epsilon, for comparison. The \
@@ -320,7 +320,8 @@ mod tests {
         let page = report.page("textbook").unwrap();
         assert!(
             page.contains(
-                "Of 4 figures with a bound 2 are within it; of the naive tracer's 2 figures 1 are."
+                "Of 4 figures with a bound, 2 are within the bound. \
+                 Of the naive tracer's 2 figures, 1 are within the bound."
             ),
             "{page}"
         );

@@ -188,12 +188,13 @@ fn report(args: &Args, rows: &[Row]) -> Result<String> {
         "# The cost of a ray by shape\n\n\
          Written by `cargo run --release -p rayfold-bench -- shapes{command}`; all figures are from one run. Pictures \
          have 1024 x 768 pixels, 24 objects of one kind (planes: 3) and a sun, with shadows and 5 bounces, on one \
-         core. Times are processor times, because the machine may be busy; programs that are compared draw in turn, \
-         and the table shows medians. Ours is that of `render`, including preparation. POV-Ray's (one thread, no \
-         anti-aliasing) excludes its time for an image of 8 x 6 pixels. A ray is a camera ray or one to a light that a \
-         surface faces; rays spawned by glass are not counted. *Off*: pixels of POV-Ray's picture that differ by more \
-         than 2 levels from ours; its noise is another function. Mitsuba 3 (LLVM variant, single precision, one \
-         thread) gets the rays and computes hits and shadows, without shading; its cylinders have no caps.\n\n"
+         core. Times are processor times, because the machine may be busy. Programs that are compared draw in turn, \
+         and the table shows medians. Our time is that of `render`, including preparation. POV-Ray's time (one thread, \
+         no anti-aliasing) excludes its time for an image of 8 x 6 pixels. A ray is a camera ray or a ray to a light \
+         that a surface faces. Rays spawned by glass are not counted. *Off* is the share of pixels of POV-Ray's \
+         picture that differ by more than 2 levels from ours. POV-Ray's noise is a different function. Mitsuba 3 (LLVM \
+         variant, single precision, one thread) gets the rays and computes hits and shadows, without shading; its \
+         cylinders have no caps.\n\n"
     );
     let short: Vec<String> = rows.iter().flat_map(short_of).collect();
     let verdict = match (rows.iter().any(|row| row.pov.is_some()), short.is_empty()) {
