@@ -230,7 +230,7 @@ fn processor_time(process: u32) -> Result<f64> {
     Ok(ticks / TICKS)
 }
 
-const HEADER: &str = "# What the functions take
+const HEADER: &str = "# Memory and time of the functions
 
 Written by `cargo run --release -p rayfold-bench -- footprint` with the built-in store. The program puts all frames of an
 animation but the last into the bucket. Then the shipped functions do the rest, in one invocation each: *render* draws the last

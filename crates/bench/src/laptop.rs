@@ -99,12 +99,13 @@ fn report(rows: &[Row], load: &str) -> Result<String> {
     writeln!(
         page,
         "# The pipeline on a laptop\n\n\
-         Written by `cargo run --release -p rayfold-bench -- laptop`: the store built in, the local invoker and the function \
-         programs, as `rayfold dev FOLDER --concurrency PLACES` runs them, on {threads} processors with a load of {load} \
-         (`/proc/loadavg`) at the start. Whatever else runs on the machine is in the seconds, but not in the requests.\n\n\
-         *Seconds* are from the first upload to the GIF, the start of the processes included. *Requests* are those of the \
-         render function per frame, without those of the uploads; *assembler* are those of the assemble function. *Fold* is \
-         the mean time after a result was written, in milliseconds.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- laptop`: the built-in store, the local invoker and the \
+         function programs, as `rayfold dev FOLDER --concurrency PLACES` runs them, on {threads} processors with a \
+         load of {load} (`/proc/loadavg`) at the start. Other programs on the machine affect the seconds, but not the \
+         requests.\n\n\
+         *Seconds* are from the first upload to the GIF, including the start of the processes. *Requests* are the \
+         requests of the render function per frame, without those of the uploads. *Assembler* are the requests of the \
+         assemble function per frame. *Fold* is the mean time after a result was written, in milliseconds.\n\n\
          | animation | places | seconds | requests | GET | PUT | LIST | assembler | fold, ms |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     )?;

@@ -33,7 +33,7 @@ enum Measurement {
     /// The packages for Lambda, run by the local invoker: they make the GIF that this machine's functions make
     #[cfg(feature = "bucket")]
     Packages(packages::Args),
-    /// Light that goes round: means of blocks of pixels, compared with independent paths of the oracle
+    /// Indirect light: means of blocks of pixels, compared with independent paths of the oracle
     Paths(paths::Args),
     /// Time and memory to read and write the largest scripts
     Parsing(parsing::Args),

@@ -229,10 +229,10 @@ fn compared(blocks: &[Block], means: &[DVec3], paths: u32, samples: f64) -> Comp
 /// Fails if a mean has a bias beyond chance at an error of 0, or if a scene cannot be drawn.
 pub fn run(args: &Args) -> Result<()> {
     let mut report = String::from(
-        "# Light that goes round: bias\n\n`rayfold-bench paths` wrote this page. Pictures of 64 x 48 pixels are compared with independent \
-         paths of the oracle, in 12 blocks and three channels each. *Mean square* and *worst* are the differences in standard errors: \
-         about 1, and below 4, if there is no bias. *Bias* is the mean difference in levels with its standard error, with all samples, \
-         and where sampling stops at an error.\n\n",
+        "# Indirect light: bias\n\n`rayfold-bench paths` wrote this page. Pictures of 64 x 48 pixels are compared with \
+         independent paths of the oracle, in 12 blocks and three channels each. *Mean square* and *worst* are the \
+         differences in standard errors: about 1, and below 4, if there is no bias. *Bias* is the mean difference in \
+         levels with its standard error, with all samples, and where sampling stops at an error.\n\n",
     );
     writeln!(report, "{} paths of the oracle a block, {} samples a pixel.\n", args.paths, args.samples)?;
     writeln!(report, "| scene | mean square | worst | bias | bias at `Samples 4096 {}` |", args.error)?;

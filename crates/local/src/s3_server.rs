@@ -95,7 +95,7 @@ impl StoreKind {
 
 impl fmt::Display for StoreKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.program().map_or("the store built in", |program| program.name))
+        f.write_str(self.program().map_or("the built-in store", |program| program.name))
     }
 }
 
