@@ -133,12 +133,13 @@ pub(super) fn write(
         frames per second, one after the other on the same machine ({} processors). rayfold and {RIVAL} run in turns, \
         several times, and the best run counts; the others run once. Wall times depend on the other load of the \
         machine. FFmpeg decodes every result.\n\n\
-        PSNR is over the three channels of sRGB: the mean of all frames, and that of the worst frame (99: exact). dE \
-        is the CIE 1976 colour difference, dE 2000 that of CIE 142-2001 (every seventh pixel), blurred the CIE 1976 \
-        difference of pictures averaged over 5 x 5 pixels. These three are means over at most {JUDGED} frames of a \
-        set, evenly spread. Flicker is measured on pixels that should stay from one frame to the next: the mean CIE \
-        1976 difference between the shown frames, and the share of these pixels that changes. If a program drops \
-        frames, the picture that it shows at the frame's time counts. On time: every frame is present, for its \
+        PSNR is computed over the three channels of sRGB. The tables give the mean of all frames, and the PSNR of the \
+        worst frame (99: exact). dE is the CIE 1976 colour difference. dE 2000 is the difference of CIE 142-2001 \
+        (every seventh pixel). *Blurred* is the CIE 1976 difference of pictures averaged over 5 x 5 pixels. These \
+        three are means over at most {JUDGED} frames of a set, evenly spread. Flicker is measured on pixels that \
+        should not change from one frame to the next. *Flicker* is their mean CIE 1976 difference between the shown \
+        frames, and *share* is the share of these pixels that changes. If a program drops a frame, the picture that it \
+        shows at the time of that frame counts. *On time* means that every frame is present and is shown for its \
         time.\n\n",
         std::thread::available_parallelism().map_or(1, usize::from),
     );
@@ -232,9 +233,9 @@ fn palettes(text: &mut String, results: &[Measured]) -> anyhow::Result<()> {
     text.push_str(
         "\n\
         ## The palette compared with quantette's\n\n\
-        The middle frame alone, by `rayfold-gif` and by the crate `quantette` (k-means in Oklab, no dithering; \
-        `rayfold-gif` writes its result without further loss). PSNR and dE: each pixel in the palette's nearest \
-        colour. CPU: milliseconds from pixels to GIF.\n\n\
+        The middle frame alone is encoded with palettes of `rayfold-gif` and of the crate `quantette` (k-means in \
+        Oklab, no dithering; `rayfold-gif` writes its result without further loss). PSNR and dE are those of the frame \
+        with each pixel in the nearest colour of the palette. CPU is the time in milliseconds from pixels to GIF.\n\n\
         | set | PSNR | quantette | dE | quantette | CPU ms | quantette | kB | quantette |\n\
         | --- | --: | --: | --: | --: | --: | --: | --: | --: |\n",
     );

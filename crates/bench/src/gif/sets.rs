@@ -73,7 +73,7 @@ pub(super) fn all() -> Vec<Set> {
     };
     let hello_1080p = Set {
         name: "hello-1080p",
-        about: "its first frames, large",
+        about: "the first frames of hello, large",
         source: Source::Traced { folder: "hello", size: Some((1920, 1080)), most: 12 },
     };
     vec![
@@ -84,7 +84,7 @@ pub(super) fn all() -> Vec<Set> {
         traced("moving_up", "a mirror ball rises and sinks", None, 10),
         traced("sphere_light", "a shadow sweeps a slab", None, 10),
         drawn("spheres", "shaded spheres over a gradient", (640, 480), 50, spheres),
-        drawn(LARGE, "the same, large", (1920, 1080), 30, spheres),
+        drawn(LARGE, "the frames of spheres, large", (1920, 1080), 30, spheres),
         drawn("camera", "a moving camera: every pixel changes", (640, 480), 20, camera),
         drawn(
             "light",
