@@ -98,7 +98,7 @@ impl Fate {
             Fate::CutRequests(_) => "requests cut",
             Fate::CutAnswers(_) => "answers cut",
             Fate::LoseAnswer => "answers lost",
-            Fate::Lie => "lies of a failure",
+            Fate::Lie => "false failures",
             Fate::Twice => "requests doubled",
         })
     }

@@ -81,7 +81,7 @@ pub(crate) fn page(store: StoreKind, rounds: &[Round], took: Duration) -> String
         format_args!(
             "\n\
              ## A run\n\n\
-             {} rounds in {:.0} minutes, {acts} actions of the user. Every animation ended right in every round.\n\n",
+             {} rounds in {:.0} minutes, {acts} user actions. Every animation ended correctly in every round.\n\n",
             rounds.len(),
             took.as_secs_f64() / 60.0
         ),
