@@ -182,8 +182,8 @@ pub fn run(args: &Args) -> Result<()> {
         "# Cost of objects that a tree cannot separate\n\n\
          Written by `cargo run --release -p rayfold-bench -- growth --seconds {}`. Pictures have {} x {} pixels and \
          one light. The table shows the processor time in seconds to prepare a scene and to draw it, with 1,000 to \
-         1,000,000 objects. A dash: fewer objects took more than {} s. *Exponent*: the sum grows with this power of \
-         the number of objects, in the last step.\n\n\
+         1,000,000 objects. A dash means that a scene with fewer objects took more than {} s. *Exponent* is the power \
+         of the number of objects with which the sum of both times grows in the last step.\n\n\
          | scene | 1,000 | 10,000 | 100,000 | 1,000,000 | exponent |\n\
          | --- | --- | --- | --- | --- | --: |\n",
         args.seconds, SIZE.0, SIZE.1, args.seconds

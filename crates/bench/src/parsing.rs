@@ -51,10 +51,10 @@ pub fn run(args: &Args) -> Result<()> {
     args.output.prepare()?;
     let mut report = format!(
         "# Parsing\n\n\
-         Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are from one run: processor time in \
-         seconds on one thread, the median of {} rounds. Every script has {} MiB, the default limit. *Show* is the \
-         formatting of all diagnostics that are described (at most {} errors and as many warnings; the others are \
-         counted). *Write* is the conversion of the script to text.\n\n\
+         Written by `cargo run --release -p rayfold-bench -- parsing`; all figures are from one run. Times are \
+         processor times in seconds on one thread, medians of {} rounds. Every script has {} MiB, the default limit. \
+         *Show* is the time to format all diagnostics that are described. At most {} errors and as many warnings are \
+         described; the others are only counted. *Write* is the time to convert the script to text.\n\n\
          | script | lines | parse | MiB/s | errors and warnings described | show | write |\n\
          | --- | --: | --: | --: | --: | --: | --: |\n",
         args.rounds,

@@ -90,7 +90,8 @@ fn introduction(quick: bool) -> String {
          against an oracle that computes with 640 bits. *Depth* is the number of reflections that are traced. The \
          language's depth is {MAX_BOUNCES}; depths up to {DEEPEST} are drawn if they add rays. *Unfinished* is the \
          root mean square difference from the true image of the greatest depth, caused by rounding and by stopping \
-         early. *Front*: no other backend and depth is both as fast and as accurate.\n\n\
+         early. *Front* marks the rows for which no other combination of backend and depth is both as fast and as \
+         accurate.\n\n\
          RMSE and the largest error are in levels (0 to 255) over the three channels; FLIP is the mean of LDR-FLIP \
          (Andersson et al. 2020) at 67 pixels per degree; *dots* are pixels that differ by more than 16 levels from \
          each of the nine pixels around them in the true image. This is the visible part of an error at an outline \
@@ -123,10 +124,10 @@ fn subjects(quick: bool) -> Result<Vec<Subject>> {
 fn cost_of_robustness(subjects: &[Subject], quick: bool) -> Result<String> {
     let pairs = if quick { 3 } else { 31 };
     let mut text = format!(
-        "## What robustness costs\n\n\
+        "## The cost of robustness\n\n\
          CPU time of `f32 robust` divided by that of `f32 naive`, both with packets, drawn in turn {pairs} times. \
          *Fastest* is the ratio of the fastest runs, *median* the median of the ratios. The naive backend has three \
-         kernels. The robust one has a kernel for each kind of scene, which is an advantage.\n\n\
+         kernels. The robust backend has a kernel for each kind of scene, which is an advantage.\n\n\
          | scene | naive, ms | robust, ms | fastest | median |\n\
          | --- | --- | --- | --- | --- |\n"
     );

@@ -264,11 +264,11 @@ fn report(rows: &[Row]) -> Result<String> {
          Written by `cargo run -p rayfold-bench -- needs`; `.ci/run` runs it with `--check`. `valgrind \
          --tool=callgrind` counts the instructions of a frame, including its preparation, on one thread and the AVX2 \
          path. It does so for the whole tracer, compiled as one unit, and for builds without a part that the scene \
-         does not use. *Beyond* is the excess of the whole tracer; the run fails if it is more than {MOST} %. Every \
-         pair draws the same picture bit for bit, and a build refuses a scene that uses a part which it lacks. Builds \
-         without a part of version 1 of the language also lack all of version 2. Parts of version 2 are left out \
-         several at a time, such that for each scene of version 2 and each part that it does not use there is a build \
-         without that part.\n\n\
+         does not use. *Beyond* is the share of instructions that the whole tracer executes in excess. The run fails \
+         if this share is more than {MOST} %. Both builds of a pair draw the same picture bit for bit. A build refuses \
+         a scene that uses a part which the build lacks. Builds without a part of version 1 of the language also lack \
+         all of version 2. Parts of version 2 are left out several at a time, such that for each scene of version 2 \
+         and each part that it does not use there is a build without that part.\n\n\
          {verdict}\n\n\
          | built without | scenes | most beyond | of |\n\
          | --- | --- | --- | --- |\n"
