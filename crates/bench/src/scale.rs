@@ -142,8 +142,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 const PLACES_HEADER: &str = "
 ## By places
 
-One animation, as above, on so many places for both functions; the means of 5 worlds, the tail of the worst. *Puts, lists* and
-*gets* are those of both functions. *USD* is for 1,000 frames: these requests, and the time beyond drawing.
+One animation runs as above, but both functions together have a limited number of *places* (concurrent invocations).
+The figures are means of 5 worlds; *tail* is that of the worst world. *Puts, lists* and *gets* are the requests of both
+functions per frame. *USD* is the cost of 1,000 frames: these requests, and the time beyond drawing.
 
 | frames | places | requests a frame | puts, lists | gets | beyond, ms | tail, ms | manifests written | USD |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -191,15 +192,16 @@ real steps use a bucket that accepts 3,500 writes and 5,500 reads per second, fo
 others with 503, and S3's client sends a request up to three times. GET takes 10-25 ms, PUT 25-60 ms, LIST 20-40 ms per 1,000
 names, and bodies are transferred at 80 MB/s (assumed). Lambda runs at most 1,000 concurrent invocations of both functions, the
 account's default. 1,000 scripts per second are uploaded, with `frames` set. A frame is drawn in 800 to 1,200 ms and encoded in
-6 ms (512 x 512) or 30 ms (1920 x 1080). An invocation has 15 minutes; a GIF that takes longer is built by several, one after
-the other. The model omits the processor time of the folds, the transfer of the encoder's state from one assembler to the next
-(some 5 MB at 1080p), and late events. Memory and processor time of the functions are [measured separately](footprint.md).
+6 ms (512 x 512) or 30 ms (1920 x 1080). An invocation has 15 minutes. A GIF that takes longer is built by several
+invocations, one after the other. The model omits the processor time of the folds, the transfer of the encoder's state
+from one assembler to the next (some 5 MB at 1080p), and late events. Memory and processor time of the functions are
+[measured separately](footprint.md).
 
 *Requests* are those of the render function, including 503s. *Beyond* is the mean time of its invocations except drawing; Lambda
 bills it. *Tail* is the time from the last frame's put to the render function's last claim. *Waited* is the time until an
 invocation could start, mean and maximum. *Assembling* is the time of all assemblers together. *In pieces* is the number of
-assemblers that built a GIF, each continuing from its predecessor's checkpoint. *Cost* is that of 1,000 frames in USD: requests
-and both functions.
+assemblers that built a GIF, each continuing from its predecessor's checkpoint. *Cost* is the cost of 1,000 frames in
+USD, for the requests and for both functions.
 ";
 
 const TABLE: &str = "

@@ -25,9 +25,9 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
          {threads} processors. The load at its start was {load} (`/proc/loadavg`); other programs on the machine \
          affect every time below.\n\n\
          {of_store}, the local invoker, the uploads and the functions share the machine. The paper's seconds are from \
-         its figure 4: up to ten ray tracers, each on its own machine, images of 1024 x 1024, another renderer. Our \
-         scenes have its names, object counts and frame counts, so the rows can be compared, but their ratios have no \
-         meaning.\n\n\
+         its figure 4: up to ten ray tracers, each on its own machine, with images of 1024 x 1024 and another \
+         renderer. Our scenes have the names, object counts and frame counts of the paper. The rows can therefore be \
+         compared, but their ratios have no meaning.\n\n\
          ## Seconds from the first upload to the GIF\n\n\
          *Cloud*: the assemble function makes the GIF. *Local*: the client fetches the frames and makes the GIF. Both \
          have warm processes. *Cold*: like cloud, with new processes. *Sequential*: every frame is drawn on one \
@@ -60,7 +60,7 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
         "\n\
          ## The stages of a frame\n\n\
          Means over the frames in milliseconds, from the render function's log. *GIF* is the time to build the whole \
-         GIF, *after upload* the seconds from the last upload to the GIF.\n\n\
+         GIF. *After upload* is the time in seconds from the last upload to the GIF.\n\n\
          | scene | at once | run | read | draw | put | fold | GIF | after upload |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     )?;
@@ -77,8 +77,8 @@ pub(super) fn text(store: StoreKind, scenes: &[Scene], load: &str, plot: &str) -
         page,
         "\n\
          ## Requests per frame, and cold starts\n\n\
-         Requests are counted between each process and the store. *Billed* are those that S3 charges for (all except \
-         DELETE), of both functions together, including the assembler's read of each frame.\n\n\
+         Requests are counted between each process and the store. *Billed* are the requests that S3 charges for (all \
+         except DELETE), of both functions together. They include the assembler's read of each frame.\n\n\
          | scene | at once | run | render: GET | PUT | LIST | assemble: GET | PUT | LIST | billed per frame | cold \
          starts | mean ms to the first `next` |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
