@@ -147,9 +147,9 @@ export function listen(): void {
     const name = `${control}${event.shiftKey && event.key !== "?" ? "Shift+" : ""}${event.key}`;
     const isObject = any() && !target.closest(".timeline");
     const found = Object.values<Action>(actions).find((action) => action.keys.includes(name) && !(action.ofKeys && isObject) && (action.enabled?.() ?? true));
-    if (found) {
-      event.preventDefault();
-      found.run();
-    }
+    // Where no step is left, the browser would undo typing in the script, as a new edit.
+    const isStep = control !== "" && /^[zy]$/i.test(event.key);
+    if (found || isStep) event.preventDefault();
+    found?.run();
   });
 }

@@ -102,6 +102,8 @@ test(`${EDITS} random edits, undone and redone, are byte-exact`, async (t) => {
       await until(async () => (now = await text()) !== before || !(await button.isEnabled()));
       if (now !== before) steps += 1;
     }
+    // The browser has steps of its own, and must not take them.
+    for (let more = 0; more < 3; more += 1) await page.keyboard.press(key);
     await studio.saved();
     return steps;
   };
@@ -111,5 +113,29 @@ test(`${EDITS} random edits, undone and redone, are byte-exact`, async (t) => {
   assert.equal(readFileSync(studio.path, "utf8"), TEXT);
   assert.equal(await all("Control+Shift+Z", redo), undone);
   assert.equal(readFileSync(studio.path, "utf8"), before);
+  studio.check();
+});
+
+test("where no step is left, the browser takes none of its own", async (t) => {
+  const studio = await open(t, { text: TEXT, size: [1200, 760] });
+  const { page } = studio;
+  const undo = page.getByRole("button", { name: "Undo", exact: true });
+  for (const line of [2, 16]) {
+    await goLine(page, line);
+    for (const key of ["9", "8", "Enter", "7"]) await page.keyboard.press(key);
+  }
+  await studio.saved();
+  await page.evaluate(() => {
+    window.foreign = 0;
+    addEventListener("beforeinput", (event) => setTimeout(() => (window.foreign += /^history/.test(event.inputType) && !event.defaultPrevented)), true);
+  });
+  const viewport = page.locator(".viewport");
+  await viewport.focus();
+  while (await undo.isEnabled()) await page.keyboard.press("Control+z");
+  for (let more = 0; more < 3; more += 1) await page.keyboard.press("Control+z");
+  await studio.saved();
+  assert.equal(await page.evaluate(() => window.foreign), 0);
+  assert.equal(readFileSync(studio.path, "utf8"), TEXT);
+  assert.ok(await viewport.evaluate((own) => own === document.activeElement), "the focus stays");
   studio.check();
 });

@@ -76,10 +76,17 @@ const short = EditorState.changeFilter.of((transaction) => {
   return isShort;
 });
 
-/** Typing over a selection, and deletions. A browser would keep the style of removed text as a style attribute. */
+/** Typing over a selection, deletions, and *Undo* of the browser's menu. A browser would keep the style of removed text as a
+ * style attribute, and undo typing as a new edit. */
 const typeOver = EditorView.domEventHandlers({
   beforeinput: (event, view) => {
     const { data, inputType } = event as InputEvent;
+    const step = { historyUndo: actions.undo, historyRedo: actions.redo }[inputType];
+    if (step) {
+      event.preventDefault();
+      step.run();
+      return true;
+    }
     const { selection: now, readOnly } = view.state;
     const forward = inputType === "deleteContentForward";
     const isTyped = inputType === "insertText" && data && !now.main.empty;
