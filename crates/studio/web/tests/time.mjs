@@ -295,7 +295,7 @@ test("a group is made, picked in the picture, moved, turned and sized as one", a
   const moved = await use();
   assert.match(moved, /^Use group1 {2}[-\d.]+ 0 [-\d.]+$/);
   const turn = await page.locator("[data-grip=turn-y] .reach").boundingBox().then(middle);
-  await drag(page, turn, [turn[0] + 40, turn[1] - 10]);
+  await drag(page, turn, [turn[0] + 40, turn[1] + 20]);
   assert.match(await use(), /^Use group1 {2}[-\d.]+ 0 [-\d.]+ 0 -?\d+ 0$/);
   await shot(page, "group");
   const size = await page.locator("[data-grip=scale] .reach").boundingBox().then(middle);
